@@ -1,0 +1,381 @@
+"""Control laws as small values: PD (12), filters (16)-(18), APD (19), CTC (20), redundant APD (28) and CTC (32).
+
+A law maps what a controller knows to drive torques: ``law.torque(model, q, qd, q_a, qd_a, desired)`` with the pose and
+its rate on V (..., 2N), the measured base angles and rates (..., N) and the desired motion; `model` is the
+controller's own manipulator.  Errors are measured minus desired.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arguments import bounded, joint_indices, matvec, positive_definite, real_array, transpose
+from .actuation import (
+    antagonism_filter,
+    command_filter,
+    control_matrix,
+    distal_cross_products,
+    drive_pairs,
+    explicit_pseudoinverse,
+    redundant_control_matrix,
+    select_independent,
+    weighted_pseudoinverse,
+)
+from .dynamics import (
+    coriolis_matrix,
+    generalized_forces,
+    mass_matrix,
+    minimal_dynamics,
+    orthogonal_complement,
+    orthogonal_complement_dot,
+    redundant_dynamics,
+)
+from .kinematics import ee_complement, estimate_pose, forward_kinematics, inverse_kinematics
+from .manipulator import Manipulator
+
+
+@dataclass(frozen=True, eq=False)
+class Desired:
+    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N)."""
+
+    n_arms: int
+    x: np.ndarray
+    xd: np.ndarray
+    xdd: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+
+    @property
+    def q_a(self) -> np.ndarray:
+        """Base angles (..., N), rad."""
+        return self.q[..., : self.n_arms]
+
+    @property
+    def qd_a(self) -> np.ndarray:
+        """Base rates (..., N), rad/s."""
+        return self.qd[..., : self.n_arms]
+
+    @property
+    def qdd_a(self) -> np.ndarray:
+        """Base accelerations (..., N), rad/s^2."""
+        return self.qdd[..., : self.n_arms]
+
+
+def _gain(name: str, value) -> np.ndarray:
+    """A positive number, diagonal or matrix of whatever size; the size is checked where the machine is known."""
+    K = real_array(name, value)
+    return bounded(name, K, 0.0, strict=True) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
+
+
+class Law:
+    """Base of the laws; `pose` says from where the model matrices take the configuration.
+
+    "measured": the least-squares pose of the measured base angles (`estimate_pose`); "true": the true one, for study.
+    """
+
+    pose = "measured"
+
+    def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
+        """Drive torques c (..., N) in N m."""
+        raise NotImplementedError
+
+    def _check_pose(self) -> None:
+        if self.pose not in ("measured", "true"):
+            raise ValueError(f"pose = {self.pose!r}; allowed: 'measured' or 'true'")
+
+
+@dataclass(frozen=True, eq=False)
+class PD(Law):
+    """Decentralized PD control (12), c = -K_P e - K_D ed, each drive for itself.
+
+    K_P in N m/rad, K_D in N m s/rad: one number, one per drive (N,), or a positive definite (N, N).
+    Raises ValueError when a gain is not positive.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+
+    def __post_init__(self):
+        object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+
+    def gains(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        """K_P and K_D as (m, m) matrices."""
+        return positive_definite("K_P", self.K_P, m), positive_definite("K_D", self.K_D, m)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        K_P, K_D = self.gains(model.n_arms)
+        return -matvec(K_P, q_a - desired.q_a) - matvec(K_D, qd_a - desired.qd_a)
+
+
+@dataclass(frozen=True, eq=False)
+class AntagonismFilter(Law):
+    """Force form (16): c = R c', R = (A^T)^+ A^T at the pose, of the torques c' of another law."""
+
+    law: Law
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        if not isinstance(self.law, Law):
+            raise ValueError(f"law = {self.law!r}; allowed: a law of this package, such as PD(7.05, 0.225)")
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        R = antagonism_filter(control_matrix(model, q))
+        return matvec(R, self.law.torque(model, q, qd, q_a, qd_a, desired))
+
+
+@dataclass(frozen=True, eq=False)
+class CommandFilter(Law):
+    """Command form (17)-(18): the PD drives get filtered commands, c = -K_P R_P e - K_D R_D ed.
+
+    R_P = (A^T K_P)^+ A^T K_P and R_D alike; the end-effector force is that of (16), the torques only for K = k I.
+    """
+
+    law: PD
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        if not isinstance(self.law, PD):
+            raise ValueError(f"law = {self.law!r}; allowed: PD, whose commands are filtered")
+
+    def commands(self, model, q, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
+        """The filtered commands (18) for angles and rates, each (..., N), formed with the *measured* angles."""
+        A = control_matrix(model, q)
+        e, ed = q_a - desired.q_a, qd_a - desired.qd_a
+        return q_a - matvec(command_filter(A, self.law.K_P), e), qd_a - matvec(command_filter(A, self.law.K_D), ed)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        K_P, K_D = self.law.gains(model.n_arms)
+        q_c, qd_c = self.commands(model, q, q_a, qd_a, desired)
+        return -matvec(K_P, q_a - q_c) - matvec(K_D, qd_a - qd_c)
+
+
+@dataclass(frozen=True, eq=False)
+class APD(Law):
+    """Augmented PD in minimal coordinates (19): c = (A^T)_W^+ (Gbar q2dd^d + Cbar q2d^d + Qbar - K_P e2 - K_D e2d).
+
+    K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
+    independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
+    Raises ValueError at run time where the independent coordinates are singular.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    independent: tuple[int, int] | None = (0, 1)
+    W: np.ndarray | None = None
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+        if self.independent is not None:
+            object.__setattr__(self, "independent", joint_indices("independent", self.independent, 2**31))
+
+    def _feedback(self, model, q, qd, q_a, qd_a, desired):
+        """Errors and desired motion of q2, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
+        state = _joint_state(model, q, qd, q_a, qd_a)
+        if self.independent is None:
+            xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
+            e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
+            return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
+        j = list(self.independent)
+        e, ed = state[0][..., j] - desired.q[..., j], state[1][..., j] - desired.qd[..., j]
+        return e, ed, desired.qd[..., j], desired.qdd[..., j], qd[..., j], control_matrix(model, q, j)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        e, ed, rate, acceleration, _, A = self._feedback(model, q, qd, q_a, qd_a, desired)
+        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
+        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
+        force = matvec(Gbar, acceleration) + matvec(Cbar, rate) + Qbar - matvec(K_P, e) - matvec(K_D, ed)
+        return matvec(weighted_pseudoinverse(A, self.W), force)
+
+
+class CTC(APD):
+    """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
+
+    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; gains in 1/s^2 and 1/s.
+    """
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        e, ed, _, acceleration, rate, A = self._feedback(model, q, qd, q_a, qd_a, desired)
+        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
+        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
+        v = acceleration - matvec(K_D, ed) - matvec(K_P, e)
+        return matvec(weighted_pseudoinverse(A, self.W), matvec(Gbar, v) + matvec(Cbar, rate) + Qbar)
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchedCTC(Law):
+    """CTC (20) that switches its pair of independent base joints (chapter, section 4.5), in 1/s^2 and 1/s.
+
+    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    hysteresis: float = 1.2
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+        bounded("hysteresis", real_array("hysteresis", self.hysteresis), 1.0, strict=False)
+
+    def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
+        """The pair to use at one pose q (2N,), given the current one."""
+        measure = np.abs(distal_cross_products(model, q))
+        pairs, best = drive_pairs(model), int(np.argmax(measure))
+        if current is not None and measure[best] <= self.hysteresis * measure[pairs.index(current)]:
+            return current
+        return pairs[best]
+
+    def pairs(self, model: Manipulator, q) -> np.ndarray:
+        """The pairs (k, 2) used along the poses q (k, 2N)."""
+        chosen = [self.choose(model, q[0])]
+        for pose in q[1:]:
+            chosen.append(self.choose(model, pose, chosen[-1]))
+        return np.array(chosen)
+
+    def fixed(self, pair) -> CTC:
+        """The CTC law in force while `pair` is used."""
+        return CTC(self.K_P, self.K_D, pair, pose=self.pose)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""
+        if np.ndim(q) == 1:
+            return self.fixed(self.choose(model, q)).torque(model, q, qd, q_a, qd_a, desired)
+        chosen = self.pairs(model, q)
+        c = np.empty_like(q_a)
+        for pair in {tuple(p) for p in chosen.tolist()}:
+            k = np.all(chosen == pair, axis=-1)
+            part = Desired(desired.n_arms, *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd,
+                                                            desired.qdd)))
+            c[k] = self.fixed(pair).torque(model, q[k], qd[k], q_a[k], qd_a[k], part)
+        return c
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantAPD(Law):
+    """Augmented PD in redundant coordinates (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
+
+    K_P, K_D : one number for all 2N joints, (N,) for the driven joints only, (2N,) or (2N, 2N); N m/rad, N m s/rad.
+    rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    rule: str = "sigma_min"
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+
+    def _feedback(self, model, q, qd, q_a, qd_a, desired):
+        """K_P e + K_D ed in all joints, and (A~^T)^+."""
+        state = _joint_state(model, q, qd, q_a, qd_a)
+        K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
+        feedback = matvec(K_P, state[0] - desired.q) + matvec(K_D, state[1] - desired.qd)
+        A_tilde = redundant_control_matrix(model, q)
+        return feedback, explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
+        G, C, Q = redundant_dynamics(model, q, qd)
+        return matvec(pinv, matvec(G, desired.qdd) + matvec(C, desired.qd) + Q - feedback)
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantCTC(RedundantAPD):
+    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; gains in 1/s^2 and 1/s.
+
+    projected : True reads line 1, c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
+    c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
+    """
+
+    projected: bool = True
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
+        v = desired.qdd - feedback
+        if self.projected:
+            G, C, Q = redundant_dynamics(model, q, qd)
+        else:
+            # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
+            G, C, Q = mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd)
+        return matvec(pinv, matvec(G, v) + matvec(C, qd) + Q)
+
+
+def _joint_state(model, q, qd, q_a, qd_a) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles and rates as known: driven joints as measured, elbows from the pose."""
+    N = model.n_arms
+    elbows, rates = np.asarray(q)[..., N:], np.asarray(qd)[..., N:]
+    return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
+
+
+def joint_gain(name: str, K, N: int) -> np.ndarray:
+    """A gain in redundant coordinates as (2N, 2N); (N,) acts on the driven joints only."""
+    K = real_array(name, K)
+    if K.shape == (N,):
+        return np.diag(np.concatenate([bounded(name, K, 0.0, strict=True), np.zeros(N)]))
+    return positive_definite(name, K, 2 * N)
+
+
+class Controller:
+    """A law at work in a sampled loop: it remembers the last pose estimate and the pair in use.
+
+    Called as ``controller(t, q_a, qd_a, desired, truth=(q, qd))`` with measured base angles and rates.
+    """
+
+    def __init__(self, law: Law, model: Manipulator):
+        self.law, self.model, self.x, self.pair = law, model, None, None
+
+    def __call__(self, t, q_a, qd_a, desired: Desired, truth=None) -> np.ndarray:
+        if isinstance(self.law, PD):
+            return self.law.torque(self.model, None, None, q_a, qd_a, desired)
+        q, qd = self._state(q_a, qd_a, desired, truth)
+        law = self.law
+        if isinstance(law, SwitchedCTC):
+            self.pair = law.choose(self.model, q, self.pair)
+            law = law.fixed(self.pair)
+        return law.torque(self.model, q, qd, q_a, qd_a, desired)
+
+    def _state(self, q_a, qd_a, desired, truth):
+        """Pose and its rate on V by least squares from the measurement, or from the true end-effector motion."""
+        model = self.model
+        if self.law.pose == "true":
+            x, xd = truth
+            q = inverse_kinematics(model, x)
+        else:
+            q = estimate_pose(model, q_a, desired.x if self.x is None else self.x)
+            A = control_matrix(model, q)
+            xd = np.linalg.solve(transpose(A) @ A, matvec(transpose(A), np.asarray(qd_a, dtype=float))[..., None])[..., 0]
+            self.x = forward_kinematics(model, q)
+        return q, matvec(ee_complement(model, q), xd)
+
+
+def closed_loop_projector(A_tilde) -> np.ndarray:
+    """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta."""
+    return transpose(A_tilde) @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
+
+
+def effective_gain(F, K) -> np.ndarray:
+    """(F^T F)^-1 F^T K F of (35) corrected, (..., 2, 2): the gain that the error e2 feels under `RedundantCTC`."""
+    F = real_array("F", F)
+    return np.linalg.solve(transpose(F) @ F, transpose(F) @ real_array("K", K, F.shape[-2], F.shape[-2]) @ F)
+
+
+def lyapunov_function(robot: Manipulator, q, e, ed, K_P) -> np.ndarray:
+    """V = (ed^T G~ ed + e^T K_P e) / 2 of (31), (...,) in J, for errors e, ed (..., 2N) in redundant coordinates."""
+    Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
+    K = joint_gain("K_P", K_P, robot.n_arms)
+    kinetic = np.einsum("...i,...ij,...j->...", ed, Gt, ed)
+    return (kinetic + np.einsum("...i,...ij,...j->...", e, K, e)) / 2

@@ -1,0 +1,272 @@
+"""The machine: N planar RR arms, driven at their bases, that meet in one revolute joint (chapter, section 3.3)."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ._arguments import bounded, real_array
+
+_UNITS = {
+    "base": "m", "lengths": "m", "masses": "kg", "centers": "m", "inertias": "kg m^2", "rotor_inertia": "kg m^2",
+    "resistance": "ohm", "torque_constant": "N m/A", "friction": "N m", "friction_velocity": "rad/s",
+    "gravity": "m/s^2", "load": "kg", "mode": "1",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Manipulator:
+    """A planar 2-DOF parallel manipulator with N >= 2 driven RR arms; read-only, SI units.
+
+    Per-link values are given as one number, as (2,) = (proximal, distal) for all arms, or as (N, 2);
+    per-drive values as one number or (N,).
+
+    base : (N, 2) base joints, m.
+    lengths : link lengths, m.
+    masses : link masses, kg.
+    centers : distance of a link's centre of mass from its inner joint, m; default: the middle.
+    inertias : link inertias about the centre of mass, kg m^2; default: slender rods, m l^2 / 12.
+    rotor_inertia : rotor inertia at the base joint, kg m^2.
+    resistance : winding resistance R, ohm.
+    torque_constant : k_t, N m/A.
+    friction : Coulomb friction f_c of each drive, N m; zero switches it off.
+    friction_velocity : v0 of f_c tanh(qd / v0), rad/s.
+    gravity : (2,) gravity vector in the plane, m/s^2; default zero (horizontal plane).
+    load : point mass at the end-effector, kg, carried by arm 2 of the cut tree.
+    mode : (N,) working mode, s_i = sign(sin(elbow angle i)).
+
+    Raises ValueError naming the argument, its value and what is allowed; also when the arms cannot meet.
+
+    >>> robot = Manipulator(base=[[-0.2, 0], [0.2, 0]], lengths=0.25, masses=0.1)
+    >>> robot.n_arms, robot.n_joints, robot.n_constraints
+    (2, 4, 2)
+    """
+
+    base: np.ndarray
+    lengths: np.ndarray
+    masses: np.ndarray
+    centers: np.ndarray | None = None
+    inertias: np.ndarray | None = None
+    rotor_inertia: np.ndarray = 0.0
+    resistance: np.ndarray = 0.611
+    torque_constant: np.ndarray = 0.0259
+    friction: np.ndarray = 0.0
+    friction_velocity: float = 0.01
+    gravity: np.ndarray = (0.0, 0.0)
+    load: float = 0.0
+    mode: np.ndarray = 1
+    name: str = field(default="manipulator")
+
+    def __post_init__(self):
+        base = real_array("base", self.base, 2)
+        if base.ndim != 2 or len(base) < 2:
+            raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
+        N = len(base)
+        if min(np.hypot(*(base[i] - base[j])) for i in range(N) for j in range(i)) == 0.0:
+            raise ValueError(f"base = {base.tolist()} holds one point twice; allowed: N different points")
+        lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
+        masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
+        given = {"base": base, "lengths": lengths, "masses": masses}
+        given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
+        if self.inertias is None:
+            given["inertias"] = masses * lengths**2 / 12
+        else:
+            given["inertias"] = bounded("inertias", _per_link("inertias", self.inertias, N), 0.0, strict=False)
+        for key in ("rotor_inertia", "friction"):
+            given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=False)
+        for key in ("resistance", "torque_constant"):
+            given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=True)
+        given["gravity"] = real_array("gravity", self.gravity, 2)
+        if given["gravity"].shape != (2,):
+            raise ValueError(f"gravity has shape {given['gravity'].shape}; allowed: (2,)")
+        for key, strict in (("friction_velocity", True), ("load", False)):
+            value = real_array(key, getattr(self, key))
+            if value.ndim:
+                raise ValueError(f"{key} has shape {value.shape}; allowed: one number")
+            object.__setattr__(self, key, float(bounded(key, value, 0.0, strict=strict)))
+        given["mode"] = _per_drive("mode", self.mode, N)
+        if not np.all(np.abs(given["mode"]) == 1.0):
+            raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
+        for key, value in given.items():
+            value = np.array(value, dtype=float)
+            value.setflags(write=False)
+            object.__setattr__(self, key, value)
+        if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
+            raise ValueError(
+                f"lengths = {lengths.tolist()} let no point be reached by all {N} arms from base = {base.tolist()}; "
+                "allowed: arms that can meet (longer links or closer base points)"
+            )
+
+    @property
+    def n_arms(self) -> int:
+        """N, the number of arms, which is also m, the number of drives."""
+        return len(self.base)
+
+    @property
+    def n_joints(self) -> int:
+        """n = 2N joint variables."""
+        return 2 * self.n_arms
+
+    @property
+    def n_constraints(self) -> int:
+        """r = 2(N - 1) loop constraints."""
+        return 2 * (self.n_arms - 1)
+
+    @property
+    def arm_inertias(self) -> np.ndarray:
+        """(N, 3) inertia constants of each arm in absolute link angles, kg m^2, the load counted with arm 2.
+
+        Columns: proximal (with rotor and distal mass at the elbow), distal about the elbow, coupling l1 m2 c2.
+        """
+        (l1, l2), (m1, m2), (c1, c2), (i1, i2) = (v.T for v in (self.lengths, self.masses, self.centers, self.inertias))
+        load = self._load_per_arm
+        return np.stack([
+            i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia,
+            i2 + m2 * c2**2 + load * l2**2,
+            l1 * (m2 * c2 + load * l2),
+        ], axis=-1)
+
+    @property
+    def arm_moments(self) -> np.ndarray:
+        """(N, 2) first mass moments of each arm along its proximal and distal link, kg m, the load counted with arm 2."""
+        (l1, l2), (m1, m2), (c1, c2) = (v.T for v in (self.lengths, self.masses, self.centers))
+        load = self._load_per_arm
+        return np.stack([m1 * c1 + (m2 + load) * l1, m2 * c2 + load * l2], axis=-1)
+
+    @property
+    def _load_per_arm(self) -> np.ndarray:
+        return self.load * (np.arange(self.n_arms) == 1)
+
+    def replace(self, **changes) -> Manipulator:
+        """A copy with some values changed, e.g. ``robot.replace(friction=0.0)``.
+
+        Inertias and centres of mass that were not given follow changed masses and lengths.
+        Raises ValueError for an unknown name.
+        """
+        for key in changes:
+            _known("argument", key, [f.name for f in dataclasses.fields(self)])
+        rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
+        middles = np.array_equal(self.centers, self.lengths / 2)
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        values |= {"inertias": None} if rods else {}
+        values |= {"centers": None} if middles else {}
+        return Manipulator(**(values | changes))
+
+    def same_kinematics(self, other: Manipulator) -> bool:
+        """True when both machines have the same joint motion for the same end-effector motion."""
+        return all(np.array_equal(getattr(self, k), getattr(other, k)) for k in ("base", "lengths", "mode"))
+
+    def __repr__(self):
+        mode = "".join("+" if s > 0 else "-" for s in self.mode)
+        lo, hi = self.lengths.min(), self.lengths.max()
+        links = f"{lo:g} m" if lo == hi else f"{lo:g} to {hi:g} m"
+        return f"Manipulator({self.name!r}: {self.n_arms} arms, links {links}, working mode {mode})"
+
+
+def _per_link(name: str, value, N: int) -> np.ndarray:
+    array = real_array(name, value)
+    if array.shape not in ((), (2,), (N, 2)):
+        raise ValueError(f"{name} has shape {array.shape}; allowed: one number, (2,) or ({N}, 2)")
+    return np.broadcast_to(array, (N, 2))
+
+
+def _per_drive(name: str, value, N: int) -> np.ndarray:
+    array = real_array(name, value)
+    if array.shape not in ((), (N,)):
+        raise ValueError(f"{name} has shape {array.shape}; allowed: one number or ({N},)")
+    return np.broadcast_to(array, (N,))
+
+
+def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
+    """Do N annuli share a point?  Then they share a crossing of two circles, or a whole circle."""
+    centers, radii = np.concatenate([base, base]), np.concatenate([inner, outer])
+    points = [centers + np.stack([radii, 0 * radii], axis=-1)]
+    for i in range(len(radii)):
+        for j in range(i):
+            gap = centers[j] - centers[i]
+            distance = np.hypot(*gap)
+            if distance > 0.0:
+                along = (distance**2 + radii[i] ** 2 - radii[j] ** 2) / (2 * distance)
+                # Touching circles keep their one common point in spite of rounding.
+                across = np.sqrt(max(radii[i] ** 2 - along**2, 0.0))
+                unit = gap / distance
+                side = np.array([-unit[1], unit[0]])
+                points.append(centers[i] + along * unit + across * np.array([[1.0], [-1.0]]) * side)
+    points = np.concatenate(points)
+    reach = np.linalg.norm(points[:, None, :] - base, axis=-1)
+    slack = 1e-12 * outer.max()
+    return bool(np.any(np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)))
+
+
+def _known(what: str, key: str, allowed) -> None:
+    if key not in allowed:
+        close = difflib.get_close_matches(key, allowed, n=1)
+        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        raise ValueError(f"unknown {what} {key!r}{hint}; allowed: {', '.join(sorted(allowed))}")
+
+
+def data_path(name: str) -> Path:
+    """Path of a data file shipped with the package, in an installed copy as well as in a checkout."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "data", here.parent / "data"):
+        if (folder / name).exists():
+            return folder / name
+    raise ValueError(f"there is no data file {name!r}; allowed: a file name from the folder data")
+
+
+def read_toml(source: str | Path) -> dict:
+    """Tables of a data file by name (``"testbed"``) or path, each value reduced from {value, unit, source} to its number.
+
+    Raises ValueError for an unreadable file or a unit other than SI.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = data_path(f"{source}.toml")
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"the file {str(path)!r} cannot be read ({error.strerror}); allowed: a TOML file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"the file {str(path)!r} is not valid TOML: {error}") from None
+    return {key: _plain(key, value) for key, value in tables.items()}
+
+
+def _plain(key: str, value):
+    if isinstance(value, dict) and "value" in value:
+        for part in value:
+            _known(f"entry of {key!r}", part, ["value", "unit", "source"])
+        if key in _UNITS and value.get("unit", _UNITS[key]) != _UNITS[key]:
+            raise ValueError(f"{key} has the unit {value['unit']!r}; allowed: {_UNITS[key]!r}")
+        return value["value"]
+    if isinstance(value, dict):
+        return {k: _plain(k, v) for k, v in value.items()}
+    return value
+
+
+def load(source: str | Path = "testbed") -> Manipulator:
+    """Read a machine from ``data/<source>.toml`` or from a path that ends in ``.toml``.
+
+    The file has a table ``[manipulator]`` with the arguments of `Manipulator`; a value may be plain or
+    ``{value = ..., unit = "...", source = "..."}``.  Tables ``[control]``, ``[path]`` and ``[sensor]`` are left to
+    `rapkm_lite.experiment`.
+
+    Raises ValueError for an unknown key, a missing value, a wrong unit or a value out of range.
+
+    >>> load()
+    Manipulator('testbed': 3 arms, links 0.2 m, working mode +++)
+    """
+    tables = read_toml(source)
+    for key in tables:
+        _known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
+    values = tables.get("manipulator", {})
+    for key in values:
+        _known("TOML key", key, list(_UNITS))
+    for key in ("base", "lengths", "masses"):
+        if key not in values:
+            raise ValueError(f"the table [manipulator] of {str(source)!r} lacks {key!r}; needed: base, lengths, masses")
+    return Manipulator(name=str(tables.get("name", Path(source).stem)), **values)

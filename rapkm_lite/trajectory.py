@@ -1,0 +1,131 @@
+"""End-effector paths, sampled at the control rate, and their joint motion (chapter, section 3.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arguments import matvec, positive_number, real_array
+from .control import Desired
+from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
+from .manipulator import Manipulator
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Desired):
+    """A desired motion: `Desired` with one row per sample, and the times t (k,) in s.
+
+    x, xd, xdd : (k, 2) in m, m/s, m/s^2.  q, qd, qdd : (k, 2N) in rad, rad/s, rad/s^2, continuous in time.
+    """
+
+    t: np.ndarray
+    robot: Manipulator
+
+    @property
+    def dt(self) -> float:
+        """Sampling time in s."""
+        return float(self.t[-1] / (len(self.t) - 1))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, k) -> Desired:
+        return Desired(self.n_arms, *(v[k] for v in (self.x, self.xd, self.xdd, self.q, self.qd, self.qdd)))
+
+    def for_robot(self, robot: Manipulator) -> Trajectory:
+        """The same end-effector motion for another machine (other joint angles)."""
+        return self if robot.same_kinematics(self.robot) else follow(robot, self.t, self.x, self.xd, self.xdd)
+
+    def __repr__(self):
+        return f"Trajectory({len(self)} samples, {self.t[-1]:g} s, {self.robot.name!r})"
+
+
+def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
+    """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
+
+    Raises ValueError when the path leaves the workspace or the times are not equidistant from zero.
+    """
+    t = real_array("t", t)
+    if t.ndim != 1 or len(t) < 2 or t[0] != 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6):
+        raise ValueError(f"t has shape {t.shape} and starts at {t.flat[0] if t.size else '-'}; allowed: equidistant from 0")
+    x, xd, xdd = (real_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
+    q = inverse_kinematics(robot, x)
+    q[:, : robot.n_arms] = np.unwrap(q[:, : robot.n_arms], axis=0)
+    F = ee_complement(robot, q)
+    qd = matvec(F, xd)
+    qdd = matvec(F, xdd) + matvec(ee_complement_dot(robot, q, qd), xd)
+    return Trajectory(robot.n_arms, x, xd, xdd, q, qd, qdd, t, robot)
+
+
+def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3, rest: float = 0.0) -> Trajectory:
+    """The closed polygon through `corners` (k, 2) in m, each edge quintic from rest to rest in the same time.
+
+    duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after.
+    Raises ValueError when the path leaves the workspace, or a time does not fit.
+    """
+    corners = real_array("corners", corners, 2)
+    if corners.ndim != 2 or len(corners) < 2:
+        raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
+    t = _samples(duration, dt)
+    rest = float(real_array("rest", rest))
+    if not 0.0 <= 2 * rest < duration:
+        raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
+    edges = len(corners)
+    edge_time = (duration - 2 * rest) / edges
+    phase = np.clip((t - rest) / edge_time, 0.0, edges)
+    edge = np.minimum(np.floor(phase).astype(int), edges - 1)
+    s = phase - edge
+    ends = np.roll(corners, -1, axis=0)
+    way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+    step = (ends - corners)[edge]
+    x = corners[edge] + way[:, None] * step
+    return follow(robot, t, x, rate[:, None] * step / edge_time, rate_dot[:, None] * step / edge_time**2)
+
+
+def triangle(robot: Manipulator, side: float = 0.24, duration: float = 5.0, dt: float = 1e-3,
+             centre=(0.0, 0.0), angle: float = 0.0, rest: float = 0.0) -> Trajectory:
+    """The chapter's path: an equilateral triangle, one corner up, from the lower left corner, counter-clockwise.
+
+    side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s, see `polygon`.
+
+    >>> from rapkm_lite import load
+    >>> triangle(load())
+    Trajectory(5001 samples, 5 s, 'testbed')
+    """
+    side = positive_number("side", side)
+    turned = real_array("angle", angle) + np.deg2rad([210.0, 330.0, 90.0])
+    corners = real_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    return polygon(robot, corners, duration, dt, rest)
+
+
+def circle(robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3,
+           centre=(0.0, 0.0), turns: int = 1) -> Trajectory:
+    """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s."""
+    radius = positive_number("radius", radius)
+    t = _samples(duration, dt)
+    s = t / duration
+    full = 2 * np.pi * positive_number("turns", turns)
+    angle = full * s**3 * (10 - 15 * s + 6 * s * s)
+    rate = full / duration * 30 * (s * (1 - s)) ** 2
+    rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
+    u = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
+    x = real_array("centre", centre, 2) + radius * u
+    xdd = radius * (rate_dot[:, None] * v - rate[:, None] ** 2 * u)
+    return follow(robot, t, x, radius * rate[:, None] * v, xdd)
+
+
+def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
+    """Stay at the point x (2,) in m."""
+    t = _samples(duration, dt)
+    still = np.zeros((len(t), 2))
+    return follow(robot, t, still + real_array("x", x, 2), still, still)
+
+
+def _samples(duration: float, dt: float) -> np.ndarray:
+    duration, dt = positive_number("duration", duration), positive_number("dt", dt)
+    steps = round(duration / dt)
+    if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
+        raise ValueError(f"dt = {dt:g} s does not divide duration = {duration:g} s; allowed: duration / dt a whole number")
+    return np.arange(steps + 1) * (duration / steps)
