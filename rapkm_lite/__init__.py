@@ -81,4 +81,3 @@ from .simulation import Experiment, Run, SimulationError, experiment, simulate
 from .trajectory import Trajectory, circle, follow, hold, polygon, triangle
 
 __version__ = "0.1.0"
-__all__ = [name for name in dir() if not name.startswith("_")]

@@ -1,0 +1,92 @@
+"""Make the lessons: student copies from the solutions, all executed from a clean kernel, outputs stored.
+
+    python notebooks/build.py                # everything
+    python notebooks/build.py 03 04          # the notebooks whose names begin so
+
+``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
+``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
+``NN_name.ipynb``.  Notebooks without a solution are executed as they are.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import nbformat
+
+HERE = Path(__file__).resolve().parent
+SOLUTIONS = HERE / "solutions"
+_SOLUTION = re.compile(r"^([ \t]*)### BEGIN SOLUTION *\n(.*?)^[ \t]*### END SOLUTION *\n?", re.M | re.S)
+
+
+def blank(source: str) -> str:
+    """A code cell with its solutions taken out."""
+
+    def stub(match: re.Match) -> str:
+        indent, body = match.groups()
+        if indent:
+            return f"{indent}raise NotImplementedError\n"
+        names = dict.fromkeys(re.findall(r"^(\w+) *=[^=]", body, re.M))
+        return "".join(f"{name} = ...\n" for name in names)
+
+    return _SOLUTION.sub(stub, source if source.endswith("\n") else source + "\n").rstrip("\n")
+
+
+def student(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """The student's copy of a solved lesson, without outputs."""
+    copy = nbformat.from_dict(notebook)
+    copy = nbformat.reads(nbformat.writes(copy), as_version=4)
+    for cell in copy.cells:
+        if cell.cell_type == "code":
+            cell.source, cell.outputs, cell.execution_count = blank(cell.source), [], None
+    return copy
+
+
+def tidy(notebook: nbformat.NotebookNode) -> None:
+    """Keep what a reader sees: no widget state, no time stamps, no versions of this machine."""
+    notebook.metadata = nbformat.from_dict({
+        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+        "language_info": {"name": "python"},
+    })
+    for number, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{number:02d}"
+        cell.metadata = nbformat.from_dict({"tags": cell.metadata["tags"]} if cell.metadata.get("tags") else {})
+        if cell.cell_type == "code":
+            cell.outputs = [o for o in cell.outputs if "application/vnd.jupyter.widget-view+json" not in o.get("data", {})]
+
+
+def execute(path: Path, strict: bool) -> None:
+    """Run a notebook from a clean kernel in its folder and store the outputs."""
+    from nbclient import NotebookClient
+
+    os.environ["RAPKM_LITE_STRICT"] = "1" if strict else "0"
+    notebook = nbformat.read(path, as_version=4)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(HERE)}}).execute()
+    tidy(notebook)
+    nbformat.write(notebook, path)
+
+
+def main(wanted: list[str]) -> None:
+    """Build the notebooks whose names begin with one of `wanted`, or all."""
+
+    def chosen(path: Path) -> bool:
+        return not wanted or any(path.name.startswith(w) for w in wanted)
+
+    solved = {path.name for path in SOLUTIONS.glob("*.ipynb")}
+    for path in sorted(filter(chosen, SOLUTIONS.glob("*.ipynb"))):
+        print(f"solutions/{path.name}", flush=True)
+        execute(path, strict=True)
+        nbformat.write(student(nbformat.read(path, as_version=4)), HERE / path.name)
+    for path in sorted(filter(chosen, HERE.glob("*.ipynb"))):
+        print(path.name, "" if path.name in solved else "(no exercises)", flush=True)
+        execute(path, strict=False)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,108 @@
+"""Self-checks of the exercises: a student's answer against the package at seeded random poses and against an invariant."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+LESSONS = ("lesson01", "lesson02", "lesson03", "lesson04", "lesson05", "lesson06")
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """One exercise.
+
+    reference : the package's answer, a function of the case, or of nothing when the answer is a value.
+    cases : rng -> list of argument tuples; empty for a value.
+    invariant : (answer, *case) -> (measured number, sentence); the number must stay below `tolerance`.
+    hint : one sentence that helps without giving the answer away.
+    unit : of the answer.  tolerance : largest deviation from the reference, absolute, and of the invariant.
+    """
+
+    reference: Callable
+    hint: str
+    unit: str
+    cases: Callable = lambda rng: [()]
+    invariant: Callable | None = None
+    tolerance: float = 1e-9
+
+
+def exercises() -> dict[str, Exercise]:
+    """All exercises by name, e.g. "01.loop_constraints"."""
+    found = {}
+    for lesson in LESSONS:
+        try:
+            module = importlib.import_module(f"{__name__}.{lesson}")
+        except ModuleNotFoundError as error:
+            if error.name != f"{__name__}.{lesson}":
+                raise
+            continue
+        found |= module.EXERCISES
+    return found
+
+
+def examine(name: str, answer) -> tuple[str, str]:
+    """Verdict ("ok", "todo" or "wrong") and a sentence with the measured number for an answer to one exercise.
+
+    Raises ValueError for an unknown exercise.
+    """
+    known = exercises()
+    if name not in known:
+        raise ValueError(f"name = {name!r}; allowed: {', '.join(sorted(known))}")
+    exercise = known[name]
+    if answer is Ellipsis or answer is None:
+        return "todo", f"not yet. Hint: {exercise.hint}"
+    cases = exercise.cases(np.random.default_rng(20_111_130))
+    worst = lawful = 0.0
+    sentence = ""
+    for case in cases:
+        try:
+            got = answer(*case) if callable(answer) else answer
+        except NotImplementedError:
+            return "todo", f"not yet. Hint: {exercise.hint}"
+        except Exception as error:
+            return "wrong", f"your code stops with {type(error).__name__}: {error}. Hint: {exercise.hint}"
+        if got is Ellipsis or got is None:
+            return "todo", f"not yet: no value is returned. Hint: {exercise.hint}"
+        want = np.asarray(exercise.reference(*case), dtype=float)
+        try:
+            got = np.asarray(got, dtype=float)
+        except (TypeError, ValueError):
+            return "wrong", f"the answer is not numeric. Hint: {exercise.hint}"
+        if got.shape != want.shape:
+            return "wrong", f"the answer has shape {got.shape}, expected {want.shape}. Hint: {exercise.hint}"
+        if not np.all(np.isfinite(got)):
+            return "wrong", f"the answer holds NaN or infinity. Hint: {exercise.hint}"
+        worst = max(worst, float(np.max(np.abs(got - want), initial=0.0)))
+        if exercise.invariant:
+            number, text = exercise.invariant(got, *case)
+            if number >= lawful:
+                lawful, sentence = float(number), text
+    limit = exercise.tolerance
+    if worst > limit:
+        return "wrong", f"it is off by up to {worst:.3g} {exercise.unit} (allowed {limit:.0e}). Hint: {exercise.hint}"
+    if exercise.invariant and lawful > limit:
+        return "wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e}). Hint: {exercise.hint}"
+    law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
+    return "ok", f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
+
+
+def check(name: str, answer):
+    """Check an answer, print one line, and return what the lesson goes on with: the answer if right, else the package's.
+
+    Prints OK, TODO or NOT YET RIGHT with the measured number and a hint.  Raises AssertionError instead when the
+    environment variable RAPKM_LITE_STRICT is 1 and the answer is not right.
+    """
+    verdict, sentence = examine(name, answer)
+    word = {"ok": "OK", "todo": "TODO", "wrong": "NOT YET RIGHT"}[verdict]
+    if verdict != "ok" and os.environ.get("RAPKM_LITE_STRICT") == "1":
+        raise AssertionError(f"{word} {name}: {sentence}")
+    print(f"{word} {name}: {sentence}")
+    if verdict == "ok":
+        return answer
+    reference = exercises()[name].reference
+    return reference if callable(answer) else reference()

@@ -1,0 +1,38 @@
+"""Colours and the style file.  One colour per arm everywhere, safe for colour-blind readers and apart in greyscale."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+
+STYLE = Path(__file__).with_name("rapkm.mplstyle")
+# P. Tol's high-contrast scheme first; from the fourth arm on, colours between them in lightness.
+ARM_COLOURS = ("#004488", "#BB5566", "#DDAA33", "#66AACC", "#997700", "#EE99AA")
+ARM_LINES = ("-", (0, (5, 1.2)), (0, (4, 1.2, 1, 1.2)), (0, (1.5, 1.2)), "-", "--")
+# Without / with filter, wrong / right, and what belongs to no arm.
+BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
+
+
+def use_style() -> None:
+    """Make the collection's look the default of this session; called by the first cell of a lesson."""
+    plt.style.use(STYLE)
+
+
+def arm_colour(i: int) -> str:
+    """Colour of arm i (0-based)."""
+    return ARM_COLOURS[i % len(ARM_COLOURS)]
+
+
+def arm_line(i: int) -> dict:
+    """Colour and dashes of arm i (0-based), as keywords for ``ax.plot``."""
+    return {"color": arm_colour(i), "linestyle": ARM_LINES[i % len(ARM_LINES)]}
+
+
+def axes_or_new(ax=None, **figure):
+    """The given axes, or the axes of a new figure in the collection's style."""
+    if ax is not None:
+        return ax
+    with mpl.style.context(STYLE):
+        return plt.subplots(**figure)[1]

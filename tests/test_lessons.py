@@ -1,0 +1,115 @@
+"""The lessons as files: built from their sources, with outputs, without errors, solved ones right, wrong answers caught."""
+
+import importlib.util
+import os
+import re
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+
+from rapkm_lite.checks import Exercise, check, examine, exercises
+
+NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
+SOLVED = sorted((NOTEBOOKS / "solutions").glob("*.ipynb"))
+NAMES = {"ids": lambda path: path.stem}
+
+_spec = importlib.util.spec_from_file_location("build", NOTEBOOKS / "build.py")
+build = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(build)
+
+
+def code_cells(path):
+    return [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+
+
+@pytest.mark.parametrize("path", SOLVED, **NAMES)
+def test_student_lesson_is_generated_from_its_solution(path):
+    made = build.student(nbformat.read(path, as_version=4))
+    kept = nbformat.read(NOTEBOOKS / path.name, as_version=4)
+    assert [c.source for c in made.cells] == [c.source for c in kept.cells], f"run: python notebooks/build.py {path.stem}"
+    text = "\n".join(c.source for c in kept.cells)
+    assert "SOLUTION" not in text and ("NotImplementedError" in text or "= ..." in text)
+
+
+@pytest.mark.parametrize("path", SOLVED, **NAMES)
+def test_solved_lesson_passes_every_check_in_strict_mode(path, monkeypatch):
+    from nbclient import NotebookClient
+
+    monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(NOTEBOOKS)}}).execute()
+    said = "".join(o.get("text", "") for c in notebook.cells if c.cell_type == "code" for o in c.outputs)
+    checks = sum(c.source.count("check(\"") for c in notebook.cells if c.cell_type == "code")
+    assert said.count("OK ") >= checks >= 3
+
+
+@pytest.mark.parametrize("path", LESSONS + SOLVED, ids=lambda p: f"{p.parent.name}/{p.stem}")
+def test_stored_outputs_are_clean(path):
+    cells = code_cells(path)
+    for number, cell in enumerate(cells):
+        assert cell.source.count("\n") < 25, f"cell {number} has more than 25 lines"
+        assert cell.execution_count is not None, f"cell {number} was never run"
+        for output in cell.outputs:
+            assert output.output_type != "error", f"cell {number} stores an error"
+            assert output.get("name") != "stderr", f"cell {number} stores a warning"
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"/(home|root|tmp|Users)/|[A-Z]:\\\\Users", text), "a path of a machine is stored"
+
+
+@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+def test_compared_cells_have_outputs(path):
+    compared = [c for c in code_cells(path) if "nbval-check-output" in c.metadata.get("tags", [])]
+    assert all(c.outputs for c in compared), "nbval passes a cell without stored outputs"
+    assert len(compared) >= (5 if path.stem[:2] != "00" else 1)
+
+
+@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+def test_prose_and_code_are_balanced(path):
+    cells = nbformat.read(path, as_version=4).cells
+    words = sum(len(c.source.split()) for c in cells if c.cell_type == "markdown")
+    lines = sum(1 for c in cells if c.cell_type == "code" for line in c.source.splitlines() if line.strip())
+    assert 7 <= words / lines <= 20, f"{words} words for {lines} lines of code: {words / lines:.1f} per line"
+
+
+def wrong_answers(exercise: Exercise):
+    """Sign flipped, off by a factor, transposed where that differs, not finite."""
+
+    def changed(change):
+        return lambda *case: change(np.asarray(exercise.reference(*case), dtype=float))
+
+    yield "sign flipped", changed(lambda v: -v)
+    yield "off by a factor", changed(lambda v: 1.1 * v)
+    yield "not finite", changed(lambda v: v * np.nan)
+    sample = np.asarray(exercise.reference(*exercise.cases(np.random.default_rng(1))[0]), dtype=float)
+    if sample.ndim >= 2 and not np.allclose(sample, sample.T if sample.ndim == 2 else sample.swapaxes(-1, -2)):
+        yield "transposed", changed(lambda v: v.swapaxes(-1, -2))
+
+
+@pytest.mark.parametrize("name", sorted(exercises()))
+def test_wrong_answers_fail_with_a_number_and_a_hint(name):
+    exercise = exercises()[name]
+    assert examine(name, exercise.reference)[0] == "ok"
+    for what, wrong in wrong_answers(exercise):
+        verdict, sentence = examine(name, wrong)
+        assert verdict == "wrong", f"{what} passes {name}"
+        assert exercise.hint in sentence
+
+
+@pytest.mark.parametrize("name", sorted(exercises()))
+def test_blank_answers_are_not_yet(name, capsys):
+    def stub(*case):
+        raise NotImplementedError
+
+    assert examine(name, stub)[0] == "todo" and examine(name, ...)[0] == "todo"
+    os.environ.pop("RAPKM_LITE_STRICT", None)
+    assert check(name, stub) is exercises()[name].reference
+    assert capsys.readouterr().out.startswith(f"TODO {name}: not yet")
+
+
+def test_blanking_keeps_the_signature_and_names():
+    source = 'def f(x):\n    """Double."""\n    ### BEGIN SOLUTION\n    return 2 * x\n    ### END SOLUTION\n'
+    assert build.blank(source) == 'def f(x):\n    """Double."""\n    raise NotImplementedError'
+    assert build.blank("### BEGIN SOLUTION\na = 1\nb = a\n### END SOLUTION\nprint(a)") == "a = ...\nb = ...\nprint(a)"
