@@ -78,6 +78,7 @@ from .kinematics import (
 )
 from .manipulator import Manipulator, data_path, load
 from .simulation import Experiment, Run, SimulationError, experiment, simulate
+from .studies import Sweep, sweep
 from .trajectory import Trajectory, circle, follow, hold, polygon, triangle
 
 __version__ = "0.1.0"

@@ -378,7 +378,7 @@ def torques(arms, env, row, law, form, x, y, vx, vy, q, qd, K_P, K_D, pair, hyst
     distribute(F, fx + out[4], fy + out[5], c)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def closed_loop(plant, plant_env, model, model_env, table, dt, law, form, pose, K_P, K_D, pair, hysteresis,
                 offset, quantum, velocity_filter, states, q_a, qd_a, c, pairs):
     """One sampled run; fills states (k, 4), q_a, qd_a, c (k, N), pairs (k, 2).  Returns (status, sample)."""

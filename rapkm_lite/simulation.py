@@ -27,11 +27,14 @@ from .trajectory import Trajectory, triangle
 
 
 class SimulationError(RuntimeError):
-    """A run that could not be finished; `time` in s says when, `reason` what went wrong."""
+    """A run that could not be finished; `time` in s says when, `reason` what went wrong, `run` which row of a sweep."""
 
-    def __init__(self, time: float, reason: str):
-        super().__init__(f"at t = {time:.4f} s {reason}")
-        self.time, self.reason = time, reason
+    def __init__(self, time: float, reason: str, run: int | None = None):
+        super().__init__(f"{'' if run is None else f'run {run}: '}at t = {time:.4f} s {reason}")
+        self.time, self.reason, self.run = float(time), reason, run
+
+    def __reduce__(self):
+        return SimulationError, (self.time, self.reason, self.run)
 
 
 @dataclass(frozen=True, eq=False)
