@@ -57,6 +57,7 @@ from .dynamics import (
 from .energy import (
     antagonistic_energy,
     antagonistic_torque,
+    antagonism_form,
     copper_loss,
     measured_energies,
     mechanical_work,

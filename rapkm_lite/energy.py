@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import matvec, real_array
-from .actuation import control_matrix, prestress_projector
+from .actuation import control_matrix, prestress_projector, steady_state_torque
 from .control import AntagonismFilter
-from .manipulator import data_path
+from .manipulator import Manipulator, data_path
 from .simulation import Run, experiment
+from .trajectory import Trajectory
 
 
 def copper_loss(robot, c, dt) -> np.ndarray:
@@ -32,6 +33,18 @@ def antagonistic_torque(run: Run) -> np.ndarray:
 def antagonistic_energy(run: Run) -> float:
     """(R / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives."""
     return float(copper_loss(run.robot, antagonistic_torque(run)[:-1], run.dt).sum())
+
+
+def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarray:
+    """Symmetric S (N, N) in J/rad^2: offsets dq (N,) in rad cost about dq^T S dq of antagonistic energy along the path.
+
+    S = integral of P^T (R / k_t^2) P dt, where P dq are the torques at rest of the corrected (14) at each point of the
+    path: quasi-static, to first order in the offsets, without friction.
+    """
+    A = control_matrix(robot, trajectory.q)
+    P = np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
+    weight = robot.resistance / robot.torque_constant**2
+    return np.einsum("kij,i,kil->jl", P[:-1], weight, P[:-1]) * trajectory.dt
 
 
 @dataclass(frozen=True, eq=False)

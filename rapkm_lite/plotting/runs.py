@@ -4,26 +4,75 @@ from __future__ import annotations
 
 import numpy as np
 
-from .style import arm_colour, arm_line, axes_or_new
+from ..actuation import null_vector
+from ..energy import antagonistic_torque
+from .style import AFTER, ALARM, BEFORE, arm_colour, arm_line, axes_or_new
+
+# Colour and dashes of runs that are compared on one axis: they belong to no arm.
+_RUN_LINES = (
+    {"color": BEFORE, "linestyle": "-"},
+    {"color": ALARM, "linestyle": (0, (5, 1.2))},
+    {"color": "#66AACC", "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": AFTER, "linestyle": "-"},
+    {"color": "#997700", "linestyle": (0, (1.5, 1.2))},
+)
 
 
 def plot_torques(run, ax=None, title: str = ""):
     """Drive torques over time."""
-    ax = axes_or_new(ax)
-    for i, torque in enumerate(run.c.T):
-        ax.plot(run.t, torque, label=f"drive {i + 1}", **arm_line(i))
-    ax.set(xlabel="time in s", ylabel="torque in N m", title=title, xlim=(0, run.t[-1]))
-    ax.legend(ncols=run.robot.n_arms, loc="upper right")
-    return ax
+    return _per_drive(run, run.c, ax, "torque in N m", title)
 
 
 def plot_errors(run, ax=None, title: str = ""):
     """Errors of the true base angles over time."""
+    return _per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
+
+
+def plot_antagonism(run, ax=None, title: str = ""):
+    """The part N_{A^T} c of the drive torques that moves nothing, over time."""
+    return _per_drive(run, antagonistic_torque(run), ax, "antagonism in N m", title)
+
+
+def _per_drive(run, values, ax, ylabel: str, title: str):
+    """One line per drive; the legend gets a strip of its own above the curves."""
     ax = axes_or_new(ax)
-    for i, error in enumerate(run.error.T):
-        ax.plot(run.t, 1e3 * error, label=f"drive {i + 1}", **arm_line(i))
-    ax.set(xlabel="time in s", ylabel="angle error in mrad", title=title, xlim=(0, run.t[-1]))
+    for i, line in enumerate(values.T):
+        ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))
+    low, high = ax.get_ylim()
+    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]), ylim=(low, high + 0.16 * (high - low)))
     ax.legend(ncols=run.robot.n_arms, loc="upper right")
+    return ax
+
+
+def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
+    """Norm of the drive torques over time, one line per run; `runs` maps a label to a run.
+
+    antagonism : show only the part that moves nothing.  log : logarithmic axis, cut off at 1e-9 N m.
+    """
+    ax = axes_or_new(ax)
+    for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
+        size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
+        ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
+    ax.set(xlabel="time in s", title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear",
+           ylabel="norm of the torques in " + ("N m" if log else "mN m"))
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return ax
+
+
+def plot_torque_plane(runs: dict, ax=None, title: str = ""):
+    """Every sample of a run as a point: the torque that moves against the torque along the null vector of A^T.
+
+    The squared distance from the origin times R / k_t^2 is the copper loss in W.  For three arms with equal drives.
+    """
+    ax = axes_or_new(ax, figsize=(6.4, 3.4))
+    for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
+        along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
+        moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
+        ax.plot(1e3 * moving[::20], 1e3 * along[::20], marker, color=colour, ms=4, label=label)
+    ax.set(xlabel="torque that moves, ‖c_eff‖, in mN m", ylabel="antagonism, nᵀc, in mN m", title=title)
+    ax.set_aspect("equal")
+    ax.axhline(0, color="#BBBBBB", lw=0.8, zorder=0)
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return ax
 
 
@@ -37,13 +86,19 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
         for i, energy in enumerate(energies):
             at = i + (k - (count - 1) / 2) * width
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
-            ax.text(at, energy, f"{energy:.2f}", ha="center", va="bottom", fontsize=9 if count < 3 else 7)
+            ax.text(at, max(energy, 0.0), f"{energy:.2f}", ha="center", va="bottom", fontsize=9 if count < 3 else 8)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
     ax.set_xticks(range(len(energies)), [f"drive {i + 1}" for i in range(len(energies))])
     ax.set(ylabel="electric energy in J", title=title)
-    ax.set_ylim(0, 1.25 * max(np.max(e) for e in rows.values()))
+    ax.set_ylim(min(0.0, 1.25 * min(np.min(e) for e in rows.values())), 1.3 * max(np.max(e) for e in rows.values()))
     ax.grid(axis="x", visible=False)
     ax.legend(ncols=2, loc="upper left")
     return ax
 
 
+def plot_table1(table, ax=None, title: str = "Table 1"):
+    """Measured and simulated energies of Table 1 side by side, without and with filter."""
+    rows = {}
+    for k, when in enumerate(("without filter", "with filter")):
+        rows |= {f"measured, {when}": table.measured[k], f"simulated, {when}": table.simulated[k]}
+    return plot_energies(rows, axes_or_new(ax, figsize=(9.0, 3.6)), title)

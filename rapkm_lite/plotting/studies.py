@@ -1,0 +1,96 @@
+"""Pictures of parameter studies: landscapes over offsets, gains and path placement, Monte-Carlo bands (lesson 06)."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .machine import plot_machine, plot_workspace
+from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
+
+
+def plot_landscape(values, cube, theory, axes=None):
+    """Slices of an energy over three offsets: `cube` and `theory` (k, k, k) in J over `values` (k,) in mrad.
+
+    One panel per slice of constant third offset (lowest, middle, highest): colours simulation, dashed lines theory.
+    """
+    if axes is None:
+        axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1]
+    levels = np.linspace(0, np.max(cube), 11)
+    for ax, k in zip(axes, (0, len(values) // 2, len(values) - 1), strict=True):
+        filled = ax.contourf(values, values, cube[:, :, k].T, levels=levels)
+        ax.contour(values, values, theory[:, :, k].T, levels=levels[1:], colors="white", linestyles="--", linewidths=1)
+        ax.set(title=f"offset 3 = {values[k]:.1f} mrad", xlabel="offset 1 in mrad", aspect="equal")
+        ax.grid(False)
+    axes[0].set_ylabel("offset 2 in mrad")
+    axes[0].figure.colorbar(filled, ax=axes, label="antagonistic energy in J")
+    return axes
+
+
+def plot_agreement(theory, simulated, ax=None):
+    """Simulated against predicted energies in J, with the line of agreement."""
+    ax = axes_or_new(ax, figsize=(4.6, 3.6))
+    ax.loglog(theory, simulated, ".", color=arm_colour(0), ms=2, alpha=0.4, rasterized=True)
+    ends = [np.min(theory), np.max(theory)]
+    ax.loglog(ends, ends, color=ALARM, lw=1.2, label="theory line")
+    ax.set(xlabel="predicted energy in J", ylabel="simulated energy in J")
+    ax.legend(loc="upper left")
+    return ax
+
+
+def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
+    """Total energies (k,) in J over the gain K_P (k,) in N m/rad, and the antagonistic part."""
+    ax = axes_or_new(ax, figsize=(6.2, 3.6))
+    ax.loglog(gains, without, "o-", color=BEFORE, label="without filter")
+    ax.loglog(gains, with_filter, "s-", color=AFTER, label="with filter")
+    ax.loglog(gains, antagonistic, "--", color=ALARM, label="antagonistic part")
+    ax.set(xlabel=r"gain $K_P$ in N m/rad", ylabel="total electric energy in J")
+    ax.legend()
+    return ax
+
+
+def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J"):
+    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace."""
+    ax = axes_or_new(ax, figsize=(5.6, 4.4))
+    plot_workspace(robot, ax, colour="#F7F7F7")
+    plot_machine(robot, np.zeros(robot.n_joints), ax, arms=[])
+    for i, point in enumerate(robot.base):
+        ax.plot(*point, "o", color=arm_colour(i), ms=10)
+        ax.annotate(f"drive {i + 1}", point, xytext=(0, 12 if point[1] > 0 else -16), textcoords="offset points",
+                    ha="center", color=arm_colour(i), fontweight="bold", fontsize=9)
+    marks = ax.scatter(*np.asarray(centres).T, c=values, marker="s", s=60, zorder=3)
+    ax.figure.colorbar(marks, ax=ax, label=label)
+    ax.grid(False)
+    ax.set(xlim=(-0.27, 0.27), ylim=(-0.2, 0.29))
+    return ax
+
+
+def plot_bands(samples: dict, ax=None, marks: dict | None = None):
+    """Histograms of energies in J; `samples` maps a label to (k,), `marks` a label to one number drawn as a line."""
+    ax = axes_or_new(ax, figsize=(6.6, 3.5))
+    every = np.concatenate([np.asarray(v) for v in samples.values()])
+    bins = np.linspace(0, np.quantile(every, 0.995), 60)
+    for (label, values), colour in zip(samples.items(), (BEFORE, AFTER), strict=False):
+        ax.hist(values, bins=bins, color=colour, alpha=0.75, label=label)
+    for (label, value), dash in zip((marks or {}).items(), ("-", "--", ":"), strict=False):
+        ax.axvline(value, color=ALARM, lw=1.5, ls=dash, label=label)
+    ax.set(xlabel="total electric energy in J", ylabel="runs per bin")
+    ax.legend(loc="upper right")
+    return ax
+
+
+def plot_readings(names, low, high, readings, reference=None, ax=None):
+    """Parameter sets (k, p) as dots in their search ranges low, high (p,), one row per parameter; one line per set."""
+    ax = axes_or_new(ax, figsize=(8.0, 3.8))
+    share = (np.asarray(readings) - low) / (np.asarray(high) - low)
+    rows = np.arange(len(names))
+    for line in share:
+        ax.plot(line, rows, "o-", color=NEUTRAL, ms=5, lw=0.6, alpha=0.6)
+    if reference is not None:
+        ax.plot((np.asarray(reference) - low) / (np.asarray(high) - low), rows, "D", color=ALARM, ms=7,
+                label="the reading of the data file")
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]" for n, a, b in zip(names, low, high, strict=True)])
+    ax.set(xlim=(-0.02, 1.02), xlabel="position in the search range, 0 … 1")
+    ax.invert_yaxis()
+    return ax
