@@ -133,7 +133,7 @@ class Manipulator:
 
     @property
     def arm_moments(self) -> np.ndarray:
-        """(N, 2) first mass moments of each arm along its proximal and distal link, kg m, the load counted with arm 2."""
+        """(N, 2) first mass moments of each arm along proximal and distal link, kg m, the load counted with arm 2."""
         (l1, l2), (m1, m2), (c1, c2) = (v.T for v in (self.lengths, self.masses, self.centers))
         load = self._load_per_arm
         return np.stack([m1 * c1 + (m2 + load) * l1, m2 * c2 + load * l2], axis=-1)
@@ -156,6 +156,23 @@ class Manipulator:
         values |= {"inertias": None} if rods else {}
         values |= {"centers": None} if middles else {}
         return Manipulator(**(values | changes))
+
+    def with_arms(self, arms) -> Manipulator:
+        """The machine that keeps only some arms (0-based); with two, an equivalent non-redundant five-bar (fig. 3).
+
+        The load goes to the second arm that is kept.
+        Raises ValueError for fewer than two arms, a repeated or an unknown one.
+
+        >>> from rapkm_lite import load
+        >>> load().with_arms((0, 2))
+        Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
+        """
+        arms = list(arms)
+        if len(arms) < 2 or len(set(arms)) < len(arms) or not set(arms) <= set(range(self.n_arms)):
+            raise ValueError(f"arms = {arms}; allowed: two or more different arms from 0 to {self.n_arms - 1}")
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        per_arm = {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
+        return Manipulator(**(values | per_arm))
 
     def same_kinematics(self, other: Manipulator) -> bool:
         """True when both machines have the same joint motion for the same end-effector motion."""
@@ -211,7 +228,10 @@ def _known(what: str, key: str, allowed) -> None:
 
 
 def data_path(name: str) -> Path:
-    """Path of a data file shipped with the package, in an installed copy as well as in a checkout."""
+    """Path of a data file shipped with the package, in an installed copy as well as in a checkout.
+
+    Raises ValueError when there is none of this name.
+    """
     here = Path(__file__).resolve().parent
     for folder in (here / "data", here.parent / "data"):
         if (folder / name).exists():
@@ -220,10 +240,12 @@ def data_path(name: str) -> Path:
 
 
 def read_toml(source: str | Path) -> dict:
-    """Tables of a data file by name (``"testbed"``) or path, each value reduced from {value, unit, source} to its number.
+    """Tables of a data file by name (``"testbed"``) or path, each {value, unit, source} reduced to its number.
 
     Raises ValueError for an unreadable file or a unit other than SI.
     """
+    if not isinstance(source, str | Path):
+        raise ValueError(f"source = {source!r}; allowed: a name such as 'testbed', or a path that ends in .toml")
     path = Path(source)
     if path.suffix != ".toml":
         path = data_path(f"{source}.toml")
@@ -231,7 +253,7 @@ def read_toml(source: str | Path) -> dict:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"the file {str(path)!r} cannot be read ({error.strerror}); allowed: a TOML file") from None
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"the file {str(path)!r} is not valid TOML: {error}") from None
     return {key: _plain(key, value) for key, value in tables.items()}
 
@@ -264,6 +286,8 @@ def load(source: str | Path = "testbed") -> Manipulator:
     for key in tables:
         _known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
     values = tables.get("manipulator", {})
+    if not isinstance(values, dict):
+        raise ValueError(f"manipulator = {values!r} in {str(source)!r}; allowed: a table [manipulator]")
     for key in values:
         _known("TOML key", key, list(_UNITS))
     for key in ("base", "lengths", "masses"):

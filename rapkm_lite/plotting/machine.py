@@ -75,7 +75,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     Left: both five-bars as their measured angles say, the offsets magnified.  Right: in mm about x, the end-effector
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
     """
-    axes = plt.subplots(1, 2, figsize=(9.4, 4.4), width_ratios=(1.25, 1))[1] if axes is None else axes
+    axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
     true = inverse_kinematics(robot, x)[: robot.n_arms]
     pairs = drive_pairs(robot)
@@ -91,9 +91,10 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
         axes[0].plot(*points[2], "s", mfc=face, mec=NEUTRAL, mew=1.8, ms=9, zorder=5,
                      label=f"seen by drives {pair[0] + 1} and {pair[1] + 1}")
     axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
-    axes[0].set_title(f"offsets magnified {magnify:g} times")
-    axes[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=1)
     plane_axes(robot, axes[0])
+    low, high = robot.base.min(axis=0) - 0.08, robot.base.max(axis=0) + 0.05
+    axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1] + 0.13), title=f"offsets magnified {magnify:g} times")
+    axes[0].legend(loc="upper left")
 
     seen = pair_poses(robot, true + offset, x)
     points = {pair: forward_kinematics(robot.with_arms(pair), q) for pair, q in seen.items()}

@@ -60,19 +60,21 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
 
 
 def plot_torque_plane(runs: dict, ax=None, title: str = ""):
-    """Every sample of a run as a point: the torque that moves against the torque along the null vector of A^T.
+    """Every sample of a run as a point: torque that moves over torque along the null vector of A^T.
 
     The squared distance from the origin times R / k_t^2 is the copper loss in W.  For three arms with equal drives.
     """
-    ax = axes_or_new(ax, figsize=(6.4, 3.4))
+    ax = axes_or_new(ax, figsize=(5.4, 3.4))
     for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
         along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
-        ax.plot(1e3 * moving[::20], 1e3 * along[::20], marker, color=colour, ms=4, label=label)
-    ax.set(xlabel="torque that moves, ‖c_eff‖, in mN m", ylabel="antagonism, nᵀc, in mN m", title=title)
-    ax.set_aspect("equal")
-    ax.axhline(0, color="#BBBBBB", lw=0.8, zorder=0)
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
+    ax.set(xlabel="antagonism, nᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
+    ax.set_aspect("equal", adjustable="datalim")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, 0.0), high + 0.3 * (high - low))
+    ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
+    ax.legend(loc="upper left", ncols=2)
     return ax
 
 
