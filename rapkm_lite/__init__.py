@@ -78,6 +78,7 @@ from .kinematics import (
     working_modes,
 )
 from .manipulator import Manipulator, data_path, load
+from .maps import actuation_map, sampling_box, switching_map, workspace_grid
 from .simulation import Experiment, Run, SimulationError, experiment, simulate
 from .studies import Sweep, sweep
 from .trajectory import Trajectory, circle, follow, hold, polygon, triangle

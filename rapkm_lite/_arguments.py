@@ -12,19 +12,64 @@ class ConvergenceError(RuntimeError, ValueError):
 def real_array(name: str, value, *last: int) -> np.ndarray:
     """Return `value` as a float array of finite numbers whose trailing axes have the lengths `last`.
 
-    Raises ValueError when `value` is not numeric, holds NaN or infinity, or has other trailing axes.
+    Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN or infinity, or
+    has other trailing axes.
     """
     try:
-        array = np.asarray(value, dtype=float)
+        array = np.asarray(value)
+        # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
+        if array.dtype.kind not in "iufO":
+            raise TypeError
+        array = array.astype(float, copy=False)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r} is not numeric; allowed: real numbers") from None
-    if last and array.shape[-len(last):] != last:
+        raise ValueError(f"{name} = {_short(value)} is not numeric; allowed: real numbers") from None
+    if last and array.shape[-len(last) :] != last:
         want = "(" + ", ".join(["...", *map(str, last)]) + ")"
         raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
     if not np.all(np.isfinite(array)):
         bad = np.argwhere(~np.isfinite(array))[0]
-        where = f"[{', '.join(map(str, bad))}]" if array.ndim else ""
-        raise ValueError(f"{name}{where} = {array[tuple(bad)]}; allowed: finite numbers")
+        raise ValueError(f"{name}{_at(bad)} = {array[tuple(bad)]}; allowed: finite numbers")
+    return array
+
+
+def exact_array(name: str, value, *shape: int) -> np.ndarray:
+    """`real_array` of exactly this shape, without leading axes."""
+    array = real_array(name, value)
+    if array.shape != shape:
+        want = "one number" if not shape else f"({shape[0]},)" if len(shape) == 1 else shape
+        raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
+    return array
+
+
+def joint_vectors(size: int, **vectors) -> list[np.ndarray]:
+    """Each vector as a finite (..., size) array, after a check that their leading axes fit together."""
+    arrays = [real_array(name, value, size) for name, value in vectors.items()]
+    check_leading(**{name: array.shape[:-1] for name, array in zip(vectors, arrays, strict=True)})
+    return arrays
+
+
+def check_leading(**leads: tuple[int, ...]) -> tuple[int, ...]:
+    """Broadcast leading axes, given by argument name; raises ValueError when they do not fit together."""
+    try:
+        return np.broadcast_shapes(*leads.values())
+    except ValueError:
+        given = ", ".join(f"{name} {lead}" for name, lead in leads.items())
+        raise ValueError(f"the leading axes do not fit together: {given}; allowed: equal ones, or none") from None
+
+
+def tall_matrix(name: str, value) -> np.ndarray:
+    """Return `value` as a finite (..., m, k) array with m >= k >= 1."""
+    array = real_array(name, value)
+    if array.ndim < 2 or not 1 <= array.shape[-1] <= array.shape[-2]:
+        raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, delta) with m >= delta")
+    return array
+
+
+def wide_matrix(name: str, value) -> np.ndarray:
+    """Return `value` as a finite (..., m, n) array of 2 <= m <= n rows."""
+    array = real_array(name, value)
+    if array.ndim < 2 or not 2 <= array.shape[-2] <= array.shape[-1]:
+        raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, n) with n >= m >= 2")
     return array
 
 
@@ -33,18 +78,22 @@ def bounded(name: str, array: np.ndarray, low: float, *, strict: bool) -> np.nda
     bad = array <= low if strict else array < low
     if np.any(bad):
         where = np.argwhere(bad)[0]
-        index = f"[{', '.join(map(str, where))}]" if array.ndim else ""
         sign = ">" if strict else ">="
-        raise ValueError(f"{name}{index} = {array[tuple(where)]:g}; allowed: {sign} {low:g}")
+        raise ValueError(f"{name}{_at(where)} = {array[tuple(where)]:g}; allowed: {sign} {low:g}")
     return array
 
 
 def positive_number(name: str, value) -> float:
     """Return `value` as a positive, finite float."""
-    array = real_array(name, value)
-    if array.ndim:
-        raise ValueError(f"{name} has shape {array.shape}; allowed: one number")
-    return float(bounded(name, array, 0.0, strict=True))
+    return float(bounded(name, exact_array(name, value), 0.0, strict=True))
+
+
+def whole_number(name: str, value, low: int) -> int:
+    """Return `value` as an int that is not below `low`."""
+    number = float(bounded(name, exact_array(name, value), low, strict=False))
+    if not number.is_integer():
+        raise ValueError(f"{name} = {number:g}; allowed: whole numbers >= {low}")
+    return int(number)
 
 
 def positive_definite(name: str, value, size: int) -> np.ndarray:
@@ -55,17 +104,15 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim == 0:
         array = np.full(size, float(array))
-    if array.ndim == 1:
-        if array.shape != (size,):
-            raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
-        return np.diag(bounded(name, array, 0.0, strict=True))
-    if array.shape[-2:] != (size, size):
+    if array.shape != (size,) and array.shape[-2:] != (size, size):
         raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
-    skew = np.max(np.abs(array - np.swapaxes(array, -1, -2)))
-    if skew > 1e-12 * np.max(np.abs(array)):
-        raise ValueError(f"{name} is not symmetric (largest difference {skew:.3g}); allowed: symmetric positive definite")
-    smallest = np.min(np.linalg.eigvalsh(array))
-    if smallest <= 0.0:
+    if array.ndim == 1:
+        return np.diag(bounded(name, array, 0.0, strict=True))
+    skew = np.abs(array - transpose(array)).max(initial=0.0)
+    if skew > 1e-12 * np.abs(array).max(initial=0.0):
+        raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
+    smallest = np.linalg.eigvalsh(array).min(initial=np.inf)
+    if smallest <= 1e-14 * np.abs(array).max(initial=0.0):
         raise ValueError(f"{name} has the eigenvalue {smallest:.3g}; allowed: symmetric positive definite")
     return array
 
@@ -74,12 +121,27 @@ def joint_indices(name: str, value, n: int, count: int = 2) -> tuple[int, ...]:
     """Return `value` as `count` different 0-based joint indices below `n`."""
     try:
         indices = tuple(int(i) for i in value)
-        exact = indices == tuple(value)
+        exact = indices == tuple(value) and not any(isinstance(i, bool | np.bool_) for i in value)
     except (TypeError, ValueError):
         indices, exact = (), False
     if not exact or len(indices) != count or len(set(indices)) != count or not all(0 <= i < n for i in indices):
-        raise ValueError(f"{name} = {value!r}; allowed: {count} different joint indices from 0 to {n - 1}")
+        raise ValueError(f"{name} = {_short(value)}; allowed: {count} different joint indices from 0 to {n - 1}")
     return indices
+
+
+def one_of(name: str, value, allowed) -> str:
+    """Return `value` when it is one of the names `allowed`."""
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(f"{name} = {_short(value)}; allowed: {', '.join(map(repr, allowed))}")
+    return value
+
+
+def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solution of matrix @ x = right, with a ValueError that says `what` is singular instead of LinAlgError."""
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        raise ValueError(f"{what} is singular; allowed: regular poses of a machine whose links have inertia") from None
 
 
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -90,3 +152,12 @@ def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def transpose(matrix: np.ndarray) -> np.ndarray:
     """Transpose of the last two axes."""
     return np.swapaxes(matrix, -1, -2)
+
+
+def _at(index) -> str:
+    return f"[{', '.join(map(str, index))}]" if len(index) else ""
+
+
+def _short(value) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -9,7 +9,20 @@ import itertools
 
 import numpy as np
 
-from ._arguments import joint_indices, matvec, positive_definite, real_array, transpose
+from ._arguments import (
+    check_leading,
+    joint_indices,
+    joint_vectors,
+    matvec,
+    one_of,
+    positive_definite,
+    positive_number,
+    real_array,
+    solve,
+    tall_matrix,
+    transpose,
+    wide_matrix,
+)
 from .dynamics import minimal_dynamics, nullspace_projector, orthogonal_complement
 from .kinematics import arm_vectors, cross, ee_complement_dot
 from .manipulator import Manipulator
@@ -34,22 +47,29 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 
     Counted as the rank of A~, whose entries need no scaling; alpha < 2 marks input singularities.
     """
+    tolerance = positive_number("tolerance", tolerance)
     sigma = np.linalg.svd(redundant_control_matrix(robot, q), compute_uv=False)
     return np.sum(sigma > tolerance, axis=-1)
 
 
-def actuation_type(robot: Manipulator, q) -> str:
-    """'underactuated', 'fully actuated' or 'redundantly actuated' at one pose q (2N,), from alpha, delta = 2 and m."""
-    alpha = int(degree_of_actuation(robot, real_array("q", q, robot.n_joints)))
-    if alpha < 2:
-        return "underactuated"
-    return "redundantly actuated" if robot.n_arms > alpha else "fully actuated"
+def actuation_type(robot: Manipulator, q):
+    """'underactuated' (alpha < delta = 2), 'fully actuated' or 'redundantly actuated' (m > alpha = delta), from (10).
+
+    A str for one pose q (2N,), an array (...,) of str for many.
+    """
+    full = "redundantly actuated" if robot.n_arms > 2 else "fully actuated"
+    kind = np.where(degree_of_actuation(robot, q) < 2, "underactuated", full)
+    return kind if kind.ndim else str(kind)
 
 
 def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray:
-    """Columns Gbar^-1 A^T of (8)-(9), (..., 2, m): the acceleration of q2 per unit torque of each drive."""
+    """Columns Gbar^-1 A^T of (8)-(9), (..., 2, m): the acceleration of q2 per unit torque of each drive.
+
+    The state (q2, q2d) moves along the drift field and the sum of these vector fields times the torques.
+    Raises ValueError where the choice of independent coordinates is singular.
+    """
     Gbar, _, _ = minimal_dynamics(robot, q, np.zeros(robot.n_joints), independent)
-    return np.linalg.solve(Gbar, transpose(control_matrix(robot, q, independent)))
+    return solve("Gbar", Gbar, transpose(control_matrix(robot, q, independent)))
 
 
 def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
@@ -69,7 +89,9 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 
 def singular_values(A) -> np.ndarray:
     """Both singular values of (..., m, 2), largest first, in closed form with full relative accuracy of the product."""
-    A = real_array("A", A)
+    A = tall_matrix("A", A)
+    if A.shape[-1] != 2:
+        raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
     u, v = A[..., 0], A[..., 1]
     uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
     largest = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
@@ -98,20 +120,19 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     W : symmetric positive definite, one number, (m,) or (..., m, m); default the identity.
     Raises ValueError when W is not, or at input singularities.
     """
-    A = real_array("A", A)
-    if A.ndim < 2:
-        raise ValueError(f"A has shape {A.shape}; allowed: (..., m, delta)")
+    A = tall_matrix("A", A)
     if W is None:
         Q, R = _full_rank_qr("A", A)
         return Q @ np.linalg.inv(transpose(R))
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
+    check_leading(A=A.shape[:-2], W=L.shape[:-2])
     Q, R = _full_rank_qr("A", np.linalg.solve(L, A))
     return np.linalg.solve(transpose(L), Q) @ np.linalg.inv(transpose(R))
 
 
 def prestress_projector(A, W=None) -> np.ndarray:
     """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing."""
-    A = real_array("A", A)
+    A = tall_matrix("A", A)
     return np.eye(A.shape[-2]) - weighted_pseudoinverse(A, W) @ transpose(A)
 
 
@@ -120,7 +141,7 @@ def antagonism_filter(A) -> np.ndarray:
 
     Raises ValueError at input singularities.
     """
-    Q, _ = _full_rank_qr("A", real_array("A", A))
+    Q, _ = _full_rank_qr("A", tall_matrix("A", A))
     return Q @ transpose(Q)
 
 
@@ -129,8 +150,10 @@ def command_filter(A, K) -> np.ndarray:
 
     -K R_K e has the same end-effector force as the filtered -R K e, and the same torques only for K = k I.
     """
-    A = real_array("A", A)
-    return antagonism_filter(positive_definite("K", K, A.shape[-2]) @ A)
+    A = tall_matrix("A", A)
+    K = positive_definite("K", K, A.shape[-2])
+    check_leading(A=A.shape[:-2], K=K.shape[:-2])
+    return antagonism_filter(K @ A)
 
 
 def null_vector(robot: Manipulator, q) -> np.ndarray:
@@ -138,15 +161,23 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
 
     Raises ValueError for another number of arms, and at input singularities, where the null space has two dimensions.
     """
-    if robot.n_arms != 3:
-        raise ValueError(f"null_vector is for 3 arms, this machine has {robot.n_arms}; use prestress_projector")
-    a, d = arm_vectors(robot, q)
-    d = d / robot.lengths[:, 1:]
-    n = cross(a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
+    n = null_direction(robot, q)
     size = np.linalg.norm(n, axis=-1, keepdims=True)
     if np.any(size < 1e-12 * robot.lengths[:, 0].max()):
-        raise ValueError("q is an input singularity (all distal links parallel): the null space of A^T is a plane there")
+        raise ValueError(
+            "q is an input singularity (all distal links parallel), where the null space of A^T is a plane; allowed: "
+            "poses with degree of actuation 2"
+        )
     return n / size
+
+
+def null_direction(robot: Manipulator, q) -> np.ndarray:
+    """The numerators (a_i x d_i) (d_j x d_k) of `null_vector`, (..., 3) in m, d of unit length; zero where it fails."""
+    if robot.n_arms != 3:
+        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (prestress_projector takes any number)")
+    a, d = arm_vectors(robot, q)
+    d = d / robot.lengths[:, 1:]
+    return cross(a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
 
 
 def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> np.ndarray:
@@ -156,10 +187,14 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters.
     """
-    A = control_matrix(robot, q)
-    c = matvec(weighted_pseudoinverse(A, W), required_wrench(robot, q, qd, qdd))
+    A, wrench = control_matrix(robot, q), required_wrench(robot, q, qd, qdd)
+    pinv = weighted_pseudoinverse(A, W)
+    check_leading(motion=wrench.shape[:-1], W=pinv.shape[:-2])
+    c = matvec(pinv, wrench)
     if prestress is not None:
-        c = c + matvec(prestress_projector(A, W), real_array("prestress", prestress, robot.n_arms))
+        c0 = real_array("prestress", prestress, robot.n_arms)
+        check_leading(motion=c.shape[:-1], prestress=c0.shape[:-1])
+        c = c + matvec(prestress_projector(A, W), c0)
     return c
 
 
@@ -168,7 +203,7 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 
     The left-hand side Gbar q2dd + Cbar q2d + Qbar of (5) with the end-effector position as q2.
     """
-    qd, qdd = real_array("qd", qd, robot.n_joints), real_array("qdd", qdd, robot.n_joints)
+    q, qd, qdd = joint_vectors(robot.n_joints, q=q, qd=qd, qdd=qdd)
     Gbar, Cbar, Qbar = minimal_dynamics(robot, q, qd)
     F, F_dot = orthogonal_complement(robot, q), ee_complement_dot(robot, q, qd)
     xd = matvec(np.linalg.pinv(F), qd)
@@ -179,35 +214,39 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     """Error e_a = q_a - q_a^d (..., m) in rad at rest under PD with offsets, (14) corrected:
 
-    e_a = -A (A^T K_P A)^-1 (A^T K_P offset + wrench).  The chapter's formula has shapes that do not fit.
+    e_a = -A (A^T K_P A)^-1 (A^T K_P offset + wrench).  The chapter's formula has shapes that do not fit.  It solves the
+    equilibrium (13), A^T K_P (e_a + offset) + wrench = 0, for small errors e_a = A e_x.
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
     wrench : static control force A^T c (..., 2) that gravity and load demand (Qbar at rest); default none.
     """
-    A = real_array("A", A)
+    A = tall_matrix("A", A)
+    _full_rank_qr("A", A)
     offset = real_array("offset", offset, A.shape[-2])
     K = positive_definite("K_P", K_P, A.shape[-2])
-    force = matvec(transpose(A) @ K, offset)
-    if wrench is not None:
-        force = force + real_array("wrench", wrench, A.shape[-1])
-    stiffness = transpose(A) @ K @ A
-    return -matvec(A, np.linalg.solve(stiffness, np.broadcast_to(force, stiffness.shape[:-1])[..., None])[..., 0])
+    wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
+    check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
+    force = matvec(transpose(A) @ K, offset) + wrench
+    return -matvec(A, solve("A^T K_P A", transpose(A) @ K @ A, force[..., None])[..., 0])
 
 
 def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
-    """Torques c = -K_P (e_a + offset) (..., m) in N m at rest, from (12)-(14); without wrench all of it is antagonism."""
-    K = positive_definite("K_P", K_P, np.shape(A)[-2])
-    return -matvec(K, steady_state_error(A, K_P, offset, wrench) + np.asarray(offset, dtype=float))
+    """Torques c = -K_P (e_a + offset) (..., m) in N m at rest, from (12)-(14); all antagonism without wrench.
+
+    Arguments and errors: see `steady_state_error`.  The text after (14) prints the opposite sign.
+    """
+    e_a = steady_state_error(A, K_P, offset, wrench)
+    return -matvec(positive_definite("K_P", K_P, e_a.shape[-1]), e_a + np.asarray(offset, dtype=float))
 
 
 def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
-    """(A~^T)^+ of (27), (..., m, n), from the partition of A~ (..., m, n) into A~_1 (`rows`) and the rest A~_2 = B A~_1:
+    """(A~^T)^+ of (27), (..., m, n), from the partition (26) of A~ into the rows A~_1 and the others, A~_2 = B A~_1:
 
     (A~^T)^+ = [I; B] (I + B^T B)^-1 (A~_1^T)^+, the same for every partition with regular A~_1.
-    rows : delta = 2 row indices of A~_1, a pair or (..., 2).
+    A_tilde : (..., m, n).  rows : the delta = 2 row indices of A~_1, a pair or (..., 2).
     Raises ValueError where A~_1 has lost rank.
     """
-    A_tilde = real_array("A_tilde", A_tilde)
+    A_tilde = wide_matrix("A_tilde", A_tilde)
     rows = _row_choice(rows, A_tilde)
     A1 = np.take_along_axis(A_tilde, rows[..., None], axis=-2)
     Q, R = _full_rank_qr("A~_1 of this partition", transpose(A1))
@@ -217,10 +256,16 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
 
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
+    m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
+    if np.ndim(rows) < 2:
+        return np.broadcast_to(joint_indices("rows", rows, m), (*lead, 2))
     rows = np.asarray(rows)
-    if rows.ndim == 1:
-        rows = np.asarray(joint_indices("rows", rows, A_tilde.shape[-2]))
-    return np.broadcast_to(rows, A_tilde.shape[:-2] + (2,))
+    if rows.dtype.kind not in "iu" or rows.shape != (*lead, 2):
+        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: a pair of indices or {(*lead, 2)}")
+    bad = np.any((rows < 0) | (rows >= m), axis=-1) | (rows[..., 0] == rows[..., 1])
+    if np.any(bad):
+        raise ValueError(f"rows holds the pair {rows[bad][0].tolist()}; allowed: two different ones from 0 to {m - 1}")
+    return rows
 
 
 def _inverse_condition(A: np.ndarray) -> np.ndarray:
@@ -228,7 +273,7 @@ def _inverse_condition(A: np.ndarray) -> np.ndarray:
     return sigma[..., 1] / np.maximum(sigma[..., 0], 1e-300)
 
 
-_RULES = {
+PARTITION_RULES = {
     "sigma_min": lambda A1: singular_values(transpose(A1))[..., 1],
     "condition": lambda A1: _inverse_condition(transpose(A1)),
     "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
@@ -241,9 +286,8 @@ def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the chapter's smallest row-sum norm, for study only: it is the wrong way round.
     """
-    A_tilde = real_array("A_tilde", A_tilde)
-    if rule not in _RULES:
-        raise ValueError(f"rule = {rule!r}; allowed: {', '.join(_RULES)}")
+    A_tilde = wide_matrix("A_tilde", A_tilde)
+    one_of("rule", rule, PARTITION_RULES)
     pairs = np.array(list(itertools.combinations(range(A_tilde.shape[-2]), 2)))
-    merit = np.stack([_RULES[rule](A_tilde[..., pair, :]) for pair in pairs], axis=-1)
+    merit = np.stack([PARTITION_RULES[rule](A_tilde[..., pair, :]) for pair in pairs], axis=-1)
     return pairs[np.argmax(merit, axis=-1)]

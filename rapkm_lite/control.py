@@ -11,8 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import bounded, joint_indices, matvec, positive_definite, real_array, transpose
+from ._arguments import (
+    bounded,
+    check_leading,
+    exact_array,
+    joint_indices,
+    joint_vectors,
+    matvec,
+    one_of,
+    positive_definite,
+    real_array,
+    solve,
+    tall_matrix,
+    transpose,
+    wide_matrix,
+)
 from .actuation import (
+    PARTITION_RULES,
     antagonism_filter,
     command_filter,
     control_matrix,
@@ -28,8 +43,6 @@ from .dynamics import (
     generalized_forces,
     mass_matrix,
     minimal_dynamics,
-    orthogonal_complement,
-    orthogonal_complement_dot,
     redundant_dynamics,
 )
 from .kinematics import ee_complement, estimate_pose, forward_kinematics, inverse_kinematics
@@ -67,6 +80,8 @@ class Desired:
 def _gain(name: str, value) -> np.ndarray:
     """A positive number, diagonal or matrix of whatever size; the size is checked where the machine is known."""
     K = real_array(name, value)
+    if K.size == 0:
+        raise ValueError(f"{name} has shape {K.shape}; allowed: one number, one per coordinate, or a matrix")
     return bounded(name, K, 0.0, strict=True) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
 
 
@@ -83,8 +98,7 @@ class Law:
         raise NotImplementedError
 
     def _check_pose(self) -> None:
-        if self.pose not in ("measured", "true"):
-            raise ValueError(f"pose = {self.pose!r}; allowed: 'measured' or 'true'")
+        one_of("pose", self.pose, ("measured", "true"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +122,7 @@ class PD(Law):
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         K_P, K_D = self.gains(model.n_arms)
+        q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
         return -matvec(K_P, q_a - desired.q_a) - matvec(K_D, qd_a - desired.qd_a)
 
 
@@ -146,6 +161,7 @@ class CommandFilter(Law):
     def commands(self, model, q, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
         """The filtered commands (18) for angles and rates, each (..., N), formed with the *measured* angles."""
         A = control_matrix(model, q)
+        q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
         e, ed = q_a - desired.q_a, qd_a - desired.qd_a
         return q_a - matvec(command_filter(A, self.law.K_P), e), qd_a - matvec(command_filter(A, self.law.K_D), ed)
 
@@ -174,11 +190,13 @@ class APD(Law):
         self._check_pose()
         object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
         object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+        if self.W is not None:
+            object.__setattr__(self, "W", _gain("W", self.W))
         if self.independent is not None:
             object.__setattr__(self, "independent", joint_indices("independent", self.independent, 2**31))
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
-        """Errors and desired motion of q2, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
+        """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
         state = _joint_state(model, q, qd, q_a, qd_a)
         if self.independent is None:
             xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
@@ -199,7 +217,7 @@ class APD(Law):
 class CTC(APD):
     """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
 
-    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; gains in 1/s^2 and 1/s.
+    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; K_P in 1/s^2, K_D in 1/s.
     """
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
@@ -212,7 +230,7 @@ class CTC(APD):
 
 @dataclass(frozen=True, eq=False)
 class SwitchedCTC(Law):
-    """CTC (20) that switches its pair of independent base joints (chapter, section 4.5), in 1/s^2 and 1/s.
+    """CTC (20) that switches its pair of independent base joints (section 4.5); K_P in 1/s^2, K_D in 1/s.
 
     It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1.
     """
@@ -226,22 +244,27 @@ class SwitchedCTC(Law):
         self._check_pose()
         object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
         object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
-        bounded("hysteresis", real_array("hysteresis", self.hysteresis), 1.0, strict=False)
+        bounded("hysteresis", exact_array("hysteresis", self.hysteresis), 1.0, strict=False)
 
     def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
         """The pair to use at one pose q (2N,), given the current one."""
-        measure = np.abs(distal_cross_products(model, q))
+        measure = np.abs(distal_cross_products(model, exact_array("q", q, model.n_joints)))
         pairs, best = drive_pairs(model), int(np.argmax(measure))
-        if current is not None and measure[best] <= self.hysteresis * measure[pairs.index(current)]:
-            return current
+        if current is not None:
+            current = tuple(sorted(joint_indices("current", current, model.n_arms)))
+            if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
+                return current
         return pairs[best]
 
     def pairs(self, model: Manipulator, q) -> np.ndarray:
-        """The pairs (k, 2) used along the poses q (k, 2N)."""
-        chosen = [self.choose(model, q[0])]
-        for pose in q[1:]:
-            chosen.append(self.choose(model, pose, chosen[-1]))
-        return np.array(chosen)
+        """The pairs (k, 2) used along the poses q (k, 2N); `Run.switches` counts the changes."""
+        q, current, chosen = real_array("q", q, model.n_joints), None, []
+        if q.ndim != 2:
+            raise ValueError(f"q has shape {q.shape}; allowed: (k, {model.n_joints}), poses in the order of time")
+        for pose in q:
+            current = self.choose(model, pose, current)
+            chosen.append(current)
+        return np.array(chosen, dtype=int).reshape(-1, 2)
 
     def fixed(self, pair) -> CTC:
         """The CTC law in force while `pair` is used."""
@@ -265,6 +288,8 @@ class SwitchedCTC(Law):
 class RedundantAPD(Law):
     """Augmented PD in redundant coordinates (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
 
+    The errors then obey (29)-(30), G~ edd + (C~ + D K_D) ed + D K_P e = 0 with D of `closed_loop_projector`.
+
     K_P, K_D : one number for all 2N joints, (N,) for the driven joints only, (2N,) or (2N, 2N); N m/rad, N m s/rad.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     """
@@ -278,6 +303,7 @@ class RedundantAPD(Law):
         self._check_pose()
         object.__setattr__(self, "K_P", _gain("K_P", self.K_P))
         object.__setattr__(self, "K_D", _gain("K_D", self.K_D))
+        one_of("rule", self.rule, PARTITION_RULES)
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """K_P e + K_D ed in all joints, and (A~^T)^+."""
@@ -295,7 +321,10 @@ class RedundantAPD(Law):
 
 @dataclass(frozen=True, eq=False)
 class RedundantCTC(RedundantAPD):
-    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; gains in 1/s^2 and 1/s.
+    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; K_P in 1/s^2, K_D in 1/s.
+
+    Line 1 leads to G~ (edd + K_D ed + K_P e) = 0 (33); with tangential errors, ed = F e2d (34), that is (35): see
+    `effective_gain`.
 
     projected : True reads line 1, c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
     c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
@@ -317,7 +346,9 @@ class RedundantCTC(RedundantAPD):
 def _joint_state(model, q, qd, q_a, qd_a) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles and rates as known: driven joints as measured, elbows from the pose."""
     N = model.n_arms
-    elbows, rates = np.asarray(q)[..., N:], np.asarray(qd)[..., N:]
+    q, qd = joint_vectors(model.n_joints, q=q, qd=qd)
+    q_a, qd_a = joint_vectors(N, q_a=q_a, qd_a=qd_a)
+    elbows, rates = q[..., N:], qd[..., N:]
     return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
 
 
@@ -357,24 +388,41 @@ class Controller:
         else:
             q = estimate_pose(model, q_a, desired.x if self.x is None else self.x)
             A = control_matrix(model, q)
-            xd = np.linalg.solve(transpose(A) @ A, matvec(transpose(A), np.asarray(qd_a, dtype=float))[..., None])[..., 0]
+            projected = matvec(transpose(A), np.asarray(qd_a, dtype=float))
+            xd = solve("A^T A (an input singularity)", transpose(A) @ A, projected[..., None])[..., 0]
             self.x = forward_kinematics(model, q)
         return q, matvec(ee_complement(model, q), xd)
 
 
 def closed_loop_projector(A_tilde) -> np.ndarray:
-    """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta."""
+    """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta.
+
+    A_tilde : (..., m, 2N).  Raises ValueError at input singularities.
+    """
+    A_tilde = wide_matrix("A_tilde", A_tilde)
     return transpose(A_tilde) @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
 
 
 def effective_gain(F, K) -> np.ndarray:
-    """(F^T F)^-1 F^T K F of (35) corrected, (..., 2, 2): the gain that the error e2 feels under `RedundantCTC`."""
-    F = real_array("F", F)
-    return np.linalg.solve(transpose(F) @ F, transpose(F) @ real_array("K", K, F.shape[-2], F.shape[-2]) @ F)
+    """(F^T F)^-1 F^T K F of (35) corrected, (..., 2, 2): the gain that the error e2 feels under `RedundantCTC`.
+
+    F : (..., 2N, 2).  K : one number, or a matrix (..., 2N, 2N), which may be singular (drives only: diag(k, 0)).
+    Raises ValueError where F has lost rank.
+    """
+    F = tall_matrix("F", F)
+    n = F.shape[-2]
+    K = real_array("K", K)
+    K = K * np.eye(n) if K.ndim == 0 else real_array("K", K, n, n)
+    check_leading(F=F.shape[:-2], K=K.shape[:-2])
+    return solve("F^T F", transpose(F) @ F, transpose(F) @ K @ F)
 
 
 def lyapunov_function(robot: Manipulator, q, e, ed, K_P) -> np.ndarray:
-    """V = (ed^T G~ ed + e^T K_P e) / 2 of (31), (...,) in J, for errors e, ed (..., 2N) in redundant coordinates."""
+    """V = (ed^T G~ ed + e^T K_P e) / 2 of (31), (...,) in J, for errors e, ed (..., 2N) in redundant coordinates.
+
+    At a fixed desired pose it falls under `RedundantAPD` at the rate -ed^T K_D ed.
+    """
+    q, e, ed = joint_vectors(robot.n_joints, q=q, e=e, ed=ed)
     Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
     K = joint_gain("K_P", K_P, robot.n_arms)
     kinetic = np.einsum("...i,...ij,...j->...", ed, Gt, ed)

@@ -7,7 +7,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import joint_indices, matvec, real_array, transpose
+from ._arguments import (
+    check_leading,
+    joint_indices,
+    joint_vectors,
+    matvec,
+    positive_number,
+    real_array,
+    solve,
+    transpose,
+)
 from .kinematics import (
     arm_vectors,
     constraint_jacobian,
@@ -28,7 +37,7 @@ def mass_matrix(robot: Manipulator, q) -> np.ndarray:
 
 def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
     """C(q, qd) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric."""
-    q, qd = real_array("q", q, robot.n_joints), real_array("qd", qd, robot.n_joints)
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     N = robot.n_arms
     sine = robot.arm_inertias[:, 2] * np.sin(q[..., N:])
     base, elbow = qd[..., :N], qd[..., N:]
@@ -38,7 +47,7 @@ def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
 def _arm_blocks(b11, b12, b21, b22) -> np.ndarray:
     """(..., 2N, 2N) with one 2 x 2 block per arm at the rows and columns (i, N + i)."""
     N = b11.shape[-1]
-    M = np.zeros(b11.shape[:-1] + (2 * N, 2 * N))
+    M = np.zeros((*b11.shape[:-1], 2 * N, 2 * N))
     i = np.arange(N)
     M[..., i, i], M[..., i, N + i], M[..., N + i, i], M[..., N + i, N + i] = b11, b12, b21, b22
     return M
@@ -49,8 +58,8 @@ def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
 
     Zero for the horizontal plane without friction.
     """
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     a, d = arm_vectors(robot, q)
-    qd = real_array("qd", qd, robot.n_joints)
     N = robot.n_arms
     moments = robot.arm_moments / robot.lengths
     gx, gy = robot.gravity
@@ -75,7 +84,7 @@ def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray
     J = constraint_jacobian(robot, q)
     J1, J2 = J[..., dependent], J[..., independent]
     _regular(J, J1, independent)
-    F = np.zeros(J.shape[:-2] + (robot.n_joints, 2))
+    F = np.zeros((*J.shape[:-2], robot.n_joints, 2))
     F[..., independent, [0, 1]] = 1.0
     F[..., dependent, :] = -np.linalg.solve(J1, J2)
     return F
@@ -85,10 +94,11 @@ def orthogonal_complement_dot(robot: Manipulator, q, qd, independent=None) -> np
     """dF/dt along qd, (..., 2N, 2); from J F = 0 the dependent rows are -J1^-1 Jdot F."""
     if independent is None:
         return ee_complement_dot(robot, q, qd)
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     F = orthogonal_complement(robot, q, independent)
     _, dependent = _partition(robot, independent)
     J1 = constraint_jacobian(robot, q)[..., dependent]
-    F_dot = np.zeros(np.broadcast_shapes(F.shape, np.shape(qd)[:-1] + F.shape[-2:]))
+    F_dot = np.zeros(np.broadcast_shapes(F.shape, (*qd.shape[:-1], 1, 1)))
     F_dot[..., dependent, :] = -np.linalg.solve(J1, constraint_jacobian_dot(robot, q, qd) @ F)
     return F_dot
 
@@ -113,21 +123,23 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
     Gbar = F^T G F, Cbar = F^T (C F + G Fdot), both (..., 2, 2); Qbar = F^T Q, (..., 2).
     Raises ValueError where the choice of independent coordinates is singular.
     """
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     F, F_dot = orthogonal_complement(robot, q, independent), orthogonal_complement_dot(robot, q, qd, independent)
     G, C, Q = mass_matrix(robot, q), coriolis_matrix(robot, q, qd), generalized_forces(robot, q, qd)
     return transpose(F) @ G @ F, transpose(F) @ (C @ F + G @ F_dot), matvec(transpose(F), Q)
 
 
 def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
-    """Rank of J(q), (...,): singular values above `tolerance` times the longest link count."""
-    sigma = np.linalg.svd(constraint_jacobian(robot, q), compute_uv=False)
-    return np.sum(sigma > tolerance * robot.lengths.max(), axis=-1)
+    """Rank of J(q) of (3), (...,): how many singular values are above `tolerance` times the longest link."""
+    limit = positive_number("tolerance", tolerance) * robot.lengths.max()
+    return np.sum(np.linalg.svd(constraint_jacobian(robot, q), compute_uv=False) > limit, axis=-1)
 
 
 def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
     """Differential degree of freedom n - rank J(q), (...,); delta = n - r = 2 where q is regular.
 
-    The chapter prints delta = n - m.  Larger values mark c-space singularities.
+    The text after (7) prints delta = n - m.  Larger values than 2 mark c-space singularities, where J loses rank: on
+    the testbed the three corners of the workspace, where one arm is folded and turns freely while two are stretched.
     """
     return robot.n_joints - constraint_rank(robot, q, tolerance)
 
@@ -139,7 +151,7 @@ def _row_space(robot: Manipulator, J: np.ndarray) -> tuple[np.ndarray, np.ndarra
     if np.any(size < 1e-12):
         raise ValueError(
             f"q is a c-space singularity: J has lost rank (relative pivot {np.min(size):.3g}); allowed: configurations "
-            "with rank J = r"
+            f"with rank J = r = {robot.n_constraints}"
         )
     return Q, R
 
@@ -155,6 +167,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
 
 def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., 2N, 2N) in 1/s.  The chapter prints B for J."""
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     Q, R = _row_space(robot, constraint_jacobian(robot, q))
     N = np.eye(robot.n_joints) - Q @ transpose(Q)
     half = Q @ np.linalg.solve(transpose(R), constraint_jacobian_dot(robot, q, qd) @ N)
@@ -166,38 +179,39 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
 
     G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), both (..., 2N, 2N); Q~ = N_J Q, (..., 2N).
     """
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     N, N_dot = nullspace_projector(robot, q), nullspace_projector_dot(robot, q, qd)
     G, C, Q = mass_matrix(robot, q), coriolis_matrix(robot, q, qd), generalized_forces(robot, q, qd)
     return N @ G @ N, N @ (C @ N + G @ N_dot), matvec(N, Q)
 
 
 def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations qdd (..., 2N) in rad/s^2 and multipliers lambda (..., 2(N-1)) in N from (2) with J qdd + Jdot qd = 0.
+    """Accelerations qdd (..., 2N) in rad/s^2 and multipliers lambda (..., 2(N-1)) in N: (2) with J qdd + Jdot qd = 0.
 
     The multipliers are the cut-joint reactions: -lambda_i is the force in N that the end-effector exerts on the tip of
-    the cut arm i.
+    the cut arm i (1, 3, ..., N; arm 2 is not cut and carries the load).
     Raises ValueError at c-space singularities.
     """
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     c = real_array("c", c, robot.n_arms)
+    lead = check_leading(q=q.shape[:-1], qd=qd.shape[:-1], c=c.shape[:-1])
     J, J_dot = constraint_jacobian(robot, q), constraint_jacobian_dot(robot, q, qd)
     _row_space(robot, J)
     G, C, Q = mass_matrix(robot, q), coriolis_matrix(robot, q, qd), generalized_forces(robot, q, qd)
-    qd = real_array("qd", qd, robot.n_joints)
     u = np.concatenate([c, np.zeros_like(c)], axis=-1)
     rhs = u - matvec(C, qd) - Q
     n, r = robot.n_joints, robot.n_constraints
-    lead = np.broadcast_shapes(rhs.shape[:-1], J_dot.shape[:-2])
-    saddle = np.zeros(lead + (n + r, n + r))
+    saddle = np.zeros((*lead, n + r, n + r))
     saddle[..., :n, :n], saddle[..., :n, n:], saddle[..., n:, :n] = G, transpose(J), J
-    right = np.zeros(lead + (n + r,))
+    right = np.zeros((*lead, n + r))
     right[..., :n], right[..., n:] = rhs, -matvec(J_dot, qd)
-    solution = np.linalg.solve(saddle, right[..., None])[..., 0]
+    solution = solve("the mass matrix on the tangent space of V", saddle, right[..., None])[..., 0]
     return solution[..., :n], solution[..., n:]
 
 
 def kinetic_energy(robot: Manipulator, q, qd) -> np.ndarray:
     """qd^T G qd / 2, (...,) in J."""
-    qd = real_array("qd", qd, robot.n_joints)
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     return np.einsum("...i,...ij,...j->...", qd, mass_matrix(robot, q), qd) / 2
 
 

@@ -10,7 +10,17 @@ import itertools
 
 import numpy as np
 
-from ._arguments import ConvergenceError, matvec, real_array, transpose
+from ._arguments import (
+    ConvergenceError,
+    check_leading,
+    joint_vectors,
+    matvec,
+    positive_number,
+    real_array,
+    solve,
+    transpose,
+    whole_number,
+)
 from .manipulator import Manipulator
 
 
@@ -73,7 +83,7 @@ def tip_jacobians(robot: Manipulator, q) -> np.ndarray:
 def _cut(robot: Manipulator, blocks: np.ndarray) -> np.ndarray:
     """Rows tip_i - tip_2 of the constraint Jacobian from the blocks of the single arms."""
     N = robot.n_arms
-    J = np.zeros(blocks.shape[:-3] + (N - 1, 2, 2 * N))
+    J = np.zeros((*blocks.shape[:-3], N - 1, 2, 2 * N))
     for row, arm in enumerate(i for i in range(N) if i != 1):
         J[..., row, :, [arm, N + arm]] += np.moveaxis(blocks[..., arm, :, :], -1, 0)
         J[..., row, :, [1, N + 1]] -= np.moveaxis(blocks[..., 1, :, :], -1, 0)
@@ -87,8 +97,8 @@ def constraint_jacobian(robot: Manipulator, q) -> np.ndarray:
 
 def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dJ/dt along qd, (..., 2(N-1), 2N) in m/(rad s), so that d2h/dt2 = J qdd + Jdot qd."""
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     a, d = arm_vectors(robot, q)
-    qd = real_array("qd", qd, robot.n_joints)
     base_rate = qd[..., : robot.n_arms, None]
     link_rate = base_rate + qd[..., robot.n_arms :, None]
     return _cut(robot, -np.stack([base_rate * a + link_rate * d, link_rate * d], axis=-1))
@@ -110,7 +120,8 @@ def working_modes(robot: Manipulator) -> np.ndarray:
 def working_mode(robot: Manipulator, q) -> np.ndarray:
     """s_i = sign(sin(elbow angle i)), (..., N); 0 where an arm is stretched or folded."""
     q = real_array("q", q, robot.n_joints)
-    return np.sign(np.sin(q[..., robot.n_arms :])).astype(int)
+    sine = np.sin(q[..., robot.n_arms :])
+    return np.where(np.abs(sine) < 1e-12, 0, np.sign(sine)).astype(int)
 
 
 def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
@@ -121,12 +132,13 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
 
     >>> from rapkm_lite import load
     >>> inverse_kinematics(load(), [0.0, 0.0]).round(4)
-    array([-0.4319,  1.6624, -2.5263,  1.9106,  1.9106,  1.9106])
+    array([-0.4317,  1.6627, -2.5261,  1.9106,  1.9106,  1.9106])
     """
     x = real_array("x", x, 2)
     mode = robot.mode if mode is None else real_array("mode", mode, robot.n_arms)
     if not np.all(np.abs(mode) == 1.0):
         raise ValueError(f"mode = {mode}; allowed: +1 or -1 for each of the {robot.n_arms} arms")
+    check_leading(x=x.shape[:-1], mode=mode.shape[:-1])
     l1, l2 = robot.lengths.T
     D = x[..., None, :] - robot.base
     reach = np.linalg.norm(D, axis=-1)
@@ -165,8 +177,8 @@ def ee_complement(robot: Manipulator, q) -> np.ndarray:
 
 def ee_complement_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dF/dt of `ee_complement` along qd, (..., 2N, 2) in rad/(m s)."""
+    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     a, d = arm_vectors(robot, q)
-    qd = real_array("qd", qd, robot.n_joints)
     den = _driving_lever(robot, a, d)
     base_rate = qd[..., : robot.n_arms, None]
     link_rate = base_rate + qd[..., robot.n_arms :, None]
@@ -194,17 +206,18 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     """The configuration in V nearest to a rough q, (..., 2N) in rad.
 
     Minimizes ||q' - q||^2 / 2 subject to h(q') = 0 by sequential quadratic programming with the exact Hessian of the
-    Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.
+    Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
+    a local one: from a q more than half a radian off, another configuration may be nearer.
+
     tolerance : largest closure error relative to the link length, and largest tangential remainder in rad.
     Raises ConvergenceError with the residual and the pose.
     """
     q0 = real_array("q", q, robot.n_joints)
-    q, n = q0.copy(), robot.n_joints
-    scale = robot.lengths.max()
-    for _ in range(iterations):
+    q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
+    scale, tolerance = robot.lengths.max(), positive_number("tolerance", tolerance)
+    for _ in range(whole_number("iterations", iterations, 1)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
         Q, R = np.linalg.qr(transpose(J), mode="complete")
-        r = robot.n_constraints
         if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
             break
         range_, tangent = Q[..., :r], Q[..., r:]
@@ -217,8 +230,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
         reduced = np.where(convex[..., None, None], reduced, np.eye(2))
         remainder = matvec(transpose(tangent), gradient)
         rhs = remainder + np.where(convex[..., None], matvec(transpose(tangent), matvec(hessian, back)), 0.0)
-        done = max(np.abs(h).max() / scale, np.abs(remainder).max())
-        if done < tolerance:
+        if max(np.abs(h).max(initial=0.0) / scale, np.abs(remainder).max(initial=0.0)) < tolerance:
             return q
         step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
         size = np.linalg.norm(step, axis=-1, keepdims=True)
@@ -238,7 +250,7 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
     force = multiplier.reshape(*multiplier.shape[:-1], N - 1, 2)
     force = np.insert(force, 1, -force.sum(axis=-2), axis=-2)
     base, link = -(force * (a + d)).sum(axis=-1), -(force * d).sum(axis=-1)
-    H = np.zeros(q.shape[:-1] + (2 * N, 2 * N))
+    H = np.zeros((*q.shape[:-1], 2 * N, 2 * N))
     i = np.arange(N)
     H[..., i, i] = base
     H[..., i, N + i] = H[..., N + i, i] = H[..., N + i, N + i] = link
@@ -252,24 +264,28 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     other.  The pose taken is the least-squares one, min_x sum_i (q_i(x) - q_a,i)^2, found by Gauss-Newton steps with
     the control matrix A = d q_a / d x from the end-effector position `guess` (..., 2) in m; its working mode is
     ``robot.mode``.  For N = 2 this is the forward kinematics of the five-bar.
-    Raises ConvergenceError with the residual and the pose.
+    Raises ConvergenceError with the residual and the pose, also where the iteration leaves the workspace.
     """
-    q_a = real_array("q_a", q_a, robot.n_arms)
-    x = np.broadcast_to(real_array("guess", guess, 2), q_a.shape[:-1] + (2,)).copy()
-    scale, step = robot.lengths.max(), np.inf
-    for _ in range(iterations):
+    q_a, guess = real_array("q_a", q_a, robot.n_arms), real_array("guess", guess, 2)
+    lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
+    q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
+    step, limit = np.full(x.shape, np.inf), positive_number("tolerance", tolerance) * robot.lengths.max()
+    for _ in range(whole_number("iterations", iterations, 1)):
         if not np.all(reachable(robot, x)):
             break
         q = inverse_kinematics(robot, x)
         A = ee_complement(robot, q)[..., : robot.n_arms, :]
         residual = wrap(q_a - q[..., : robot.n_arms])
         gradient = matvec(transpose(A), residual)
-        step = np.linalg.solve(transpose(A) @ A, gradient[..., None])[..., 0]
-        if np.abs(step).max() < tolerance * scale:
+        step = solve("A^T A (an input singularity)", transpose(A) @ A, gradient[..., None])[..., 0]
+        if np.abs(step).max(initial=0.0) < limit:
             return q
         x = x + step
-    worst = np.unravel_index(np.argmax(np.abs(step).max(axis=-1)) if np.ndim(step) else 0, q_a.shape[:-1])
+    bad = np.where(reachable(robot, x), np.abs(step).max(axis=-1), np.inf)
+    worst = np.unravel_index(np.argmax(bad), lead)
+    where = "inside" if reachable(robot, x[worst]) else "outside"
     raise ConvergenceError(
-        f"estimate_pose found no pose for q_a = {q_a[worst].round(6).tolist()} in working mode {robot.mode.tolist()}: the "
-        f"last step was {np.abs(step).max():.3g} m at x = {x[worst].round(6).tolist()}; allowed: angles near a closed pose"
+        f"estimate_pose found no pose for q_a = {q_a[worst].round(6).tolist()} in working mode {robot.mode.tolist()}: "
+        f"a step of {np.abs(step[worst]).max():.3g} m led to x = {x[worst].round(6).tolist()} {where} the workspace; "
+        "allowed: angles near a closed pose, and a guess near it"
     )

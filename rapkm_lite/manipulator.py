@@ -167,7 +167,7 @@ class Manipulator:
         >>> load().with_arms((0, 2))
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
-        arms = list(arms)
+        arms = list(arms) if np.iterable(arms) else [arms]
         if len(arms) < 2 or len(set(arms)) < len(arms) or not set(arms) <= set(range(self.n_arms)):
             raise ValueError(f"arms = {arms}; allowed: two or more different arms from 0 to {self.n_arms - 1}")
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}

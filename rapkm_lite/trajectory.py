@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import matvec, positive_number, real_array
+from ._arguments import exact_array, matvec, positive_number, real_array
 from .control import Desired
 from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
 from .manipulator import Manipulator
@@ -47,9 +47,11 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     Raises ValueError when the path leaves the workspace or the times are not equidistant from zero.
     """
     t = real_array("t", t)
-    if t.ndim != 1 or len(t) < 2 or t[0] != 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6):
-        raise ValueError(f"t has shape {t.shape} and starts at {t.flat[0] if t.size else '-'}; allowed: equidistant from 0")
-    x, xd, xdd = (real_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
+    if t.ndim != 1 or len(t) < 2:
+        raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
+    if t[0] != 0.0 or t[-1] <= 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6, atol=0.0):
+        raise ValueError(f"t = {t[0]:g}, {t[1]:g}, ..., {t[-1]:g}; allowed: rising, equidistant times that start at 0")
+    x, xd, xdd = (exact_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
     q = inverse_kinematics(robot, x)
     q[:, : robot.n_arms] = np.unwrap(q[:, : robot.n_arms], axis=0)
     F = ee_complement(robot, q)
@@ -68,7 +70,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     if corners.ndim != 2 or len(corners) < 2:
         raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
     t = _samples(duration, dt)
-    rest = float(real_array("rest", rest))
+    rest = float(exact_array("rest", rest))
     if not 0.0 <= 2 * rest < duration:
         raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
     edges = len(corners)
@@ -94,8 +96,8 @@ def triangle(robot: Manipulator, side: float = 0.24, duration: float = 5.0, dt: 
     Trajectory(5001 samples, 5 s, 'testbed')
     """
     side = positive_number("side", side)
-    turned = real_array("angle", angle) + np.deg2rad([210.0, 330.0, 90.0])
-    corners = real_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    turned = exact_array("angle", angle) + np.deg2rad([210.0, 330.0, 90.0])
+    corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
     return polygon(robot, corners, duration, dt, rest)
 
 
@@ -111,7 +113,7 @@ def circle(robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: f
     rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
     u = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
-    x = real_array("centre", centre, 2) + radius * u
+    x = exact_array("centre", centre, 2) + radius * u
     xdd = radius * (rate_dot[:, None] * v - rate[:, None] ** 2 * u)
     return follow(robot, t, x, radius * rate[:, None] * v, xdd)
 
@@ -120,12 +122,12 @@ def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Traj
     """Stay at the point x (2,) in m."""
     t = _samples(duration, dt)
     still = np.zeros((len(t), 2))
-    return follow(robot, t, still + real_array("x", x, 2), still, still)
+    return follow(robot, t, still + exact_array("x", x, 2), still, still)
 
 
 def _samples(duration: float, dt: float) -> np.ndarray:
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
     steps = round(duration / dt)
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
-        raise ValueError(f"dt = {dt:g} s does not divide duration = {duration:g} s; allowed: duration / dt a whole number")
+        raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
     return np.arange(steps + 1) * (duration / steps)

@@ -1,0 +1,140 @@
+"""Maps over the workspace: actuation measures, and the pair of drives that is best where (sections 2.3 and 4.5).
+
+Every map samples the end-effector position on a rectangular grid; points that not all arms reach are masked.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._arguments import exact_array, joint_indices, one_of, real_array, whole_number
+from .actuation import PARTITION_RULES, distal_cross_products, drive_pairs, null_direction, singular_values
+from .kinematics import ee_complement, inverse_kinematics
+from .manipulator import Manipulator
+
+
+def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:
+    """The rectangle (x_min, x_max, y_min, y_max) in m inside which all points lie that every arm can reach."""
+    outer = robot.lengths.sum(axis=1)[:, None]
+    low, high = (robot.base - outer).max(axis=0), (robot.base + outer).min(axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sample positions x (n,), y (n,) in m, and inside (n, n): True where every arm reaches (x[j], y[i]) with a bend.
+
+    box : (x_min, x_max, y_min, y_max) in m; default `sampling_box`.
+    Raises ValueError for an empty box or fewer than two samples.
+    """
+    n = whole_number("n", n, 2)
+    left, right, low, high = sampling_box(robot) if box is None else exact_array("box", box, 4)
+    if not (left < right and low < high):
+        raise ValueError(f"box = {(left, right, low, high)}; allowed: (x_min, x_max, y_min, y_max) with min < max")
+    x, y = np.linspace(left, right, n), np.linspace(low, high, n)
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    reach = np.linalg.norm(points[..., None, :] - robot.base, axis=-1)
+    l1, l2 = robot.lengths.T
+    # A hair inside the boundary, where an arm is stretched or folded and the end-effector is no coordinate.
+    slack = 1e-9 * (l1 + l2)
+    return x, y, np.all((reach < l1 + l2 - slack) & (reach > np.abs(l1 - l2) + slack), axis=-1)
+
+
+def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: int = 200, box=None, pair=None):
+    """An actuation measure over the workspace: x (n,), y (n,) in m and a masked array (..., n, n), rows along y.
+
+    measure : "sigma_min", the smallest singular value of A~ (10), between 0 and 1, zero at input singularities;
+        "condition", the condition number of A in end-effector coordinates, 1 where the drives act alike in all
+        directions, masked where it exceeds 1e12; "cross", the largest |d_j x d_k| of all pairs; "prestress", for three
+        arms, the components |n_i| of the null vector of A^T on a leading axis of length 3.
+    mode : working mode (..., N), e.g. ``working_modes(robot)`` for all at once; default ``robot.mode``.
+    pair : two 0-based drives that alone are to act, for the first three measures; default all drives.  The zeros are
+        then the parameterization singularities of the pair.
+    Raises ValueError for an unknown measure, pair, mode or box.
+
+    >>> from rapkm_lite import load, working_modes
+    >>> x, y, sigma = actuation_map(load(), mode=working_modes(load()), n=20)
+    >>> sigma.shape
+    (8, 20, 20)
+    """
+    one_of("measure", measure, _MEASURES)
+    drives = list(range(robot.n_arms)) if pair is None else list(joint_indices("pair", pair, robot.n_arms))
+    x, y, inside = workspace_grid(robot, n, box)
+    values = _MEASURES[measure](robot, _poses(robot, x, y, inside, mode), drives)
+    return x, y, _on_grid(values, inside, limit=1e12)
+
+
+def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 200, box=None):
+    """The best pair of drives as independent coordinates: x (n,), y (n,) in m and a masked integer array (..., n, n).
+
+    Its entries index `drive_pairs`; `SwitchedCTC` switches on the lines between the regions (without hysteresis).
+
+    rule : "cross" takes the largest |d_j x d_k|, as `SwitchedCTC` does; "sigma_min", "condition" and "printed" are the
+        partition rules of `select_independent`.
+    mode, n, box : see `actuation_map`.
+    """
+    one_of("rule", rule, ("cross", *PARTITION_RULES))
+    x, y, inside = workspace_grid(robot, n, box)
+    q = _poses(robot, x, y, inside, mode)
+    if rule == "cross":
+        merit = np.abs(distal_cross_products(robot, q))
+    else:
+        A_tilde = _redundant_rows(robot, q)
+        merit = [PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)]
+        merit = np.stack(merit, axis=-1)
+    return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
+
+
+def _poses(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode) -> np.ndarray:
+    """Joint angles (..., points inside, 2N)."""
+    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    mode = robot.mode if mode is None else real_array("mode", mode, robot.n_arms)
+    return inverse_kinematics(robot, points, mode[..., None, :])
+
+
+def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.MaskedArray:
+    """Scatter values (..., points inside) to the grid; what lies outside or beyond the limit is masked."""
+    grid = np.zeros(values.shape[:-1] + inside.shape, dtype=values.dtype)
+    mask = np.ones(grid.shape, dtype=bool)
+    bad = ~(values <= limit)
+    grid[..., inside], mask[..., inside] = np.where(bad, 0, values), bad
+    return np.ma.array(grid, mask=mask)
+
+
+def _redundant_rows(robot: Manipulator, q: np.ndarray) -> np.ndarray:
+    """A~ = A (F^T F)^-1 F^T without a decomposition of J, (..., m, 2N)."""
+    F = ee_complement(robot, q)
+    return F[..., : robot.n_arms, :] @ np.linalg.inv(np.swapaxes(F, -1, -2) @ F) @ np.swapaxes(F, -1, -2)
+
+
+def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
+    """Smallest singular value of the rows of A~, which are those of A L^-T with the Cholesky factor F^T F = L L^T."""
+    F = ee_complement(robot, q)
+    f, g = F[..., 0], F[..., 1]
+    l11 = np.sqrt((f * f).sum(-1))
+    l21 = (f * g).sum(-1) / l11
+    u = F[..., drives, 0] / l11[..., None]
+    rest = g - f * (l21 / l11)[..., None]
+    l22 = np.sqrt((rest * rest).sum(-1))
+    v = rest[..., drives] / l22[..., None]
+    return singular_values(np.stack([u, v], axis=-1))[..., 1]
+
+
+def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
+    sigma = singular_values(ee_complement(robot, q)[..., drives, :])
+    return np.divide(sigma[..., 0], sigma[..., 1], out=np.full(sigma.shape[:-1], np.inf), where=sigma[..., 1] > 0)
+
+
+def _cross(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
+    chosen = [k for k, pair in enumerate(drive_pairs(robot)) if set(pair) <= set(drives)]
+    return np.abs(distal_cross_products(robot, q)[..., chosen]).max(axis=-1)
+
+
+def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
+    n = np.abs(null_direction(robot, q))
+    size = np.linalg.norm(n, axis=-1, keepdims=True)
+    # At an input singularity every prestress is free: no direction, so the point is masked.
+    n = np.divide(n, size, out=np.full_like(n, np.inf), where=size > 1e-12 * robot.lengths[:, 0].max())
+    return np.moveaxis(n, -1, 0)
+
+
+_MEASURES = {"sigma_min": _sigma_min, "condition": _condition, "cross": _cross, "prestress": _prestress}
