@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import matvec, real_array
+from ._arguments import matvec, positive_number, real_array
 from .actuation import control_matrix, prestress_projector, steady_state_torque
 from .control import AntagonismFilter
 from .manipulator import Manipulator, data_path
@@ -16,12 +16,18 @@ from .trajectory import Trajectory
 
 
 def copper_loss(robot, c, dt) -> np.ndarray:
-    """Joule heat R (c / k_t)^2 dt of torques c (k, N) in N m, each held for dt seconds: (N,) in J per drive."""
-    return dt * np.sum(robot.resistance * (real_array("c", c, robot.n_arms) / robot.torque_constant) ** 2, axis=0)
+    """Joule heat R (c / k_t)^2 dt of torques c (..., k, N) in N m, each held for dt in s: (..., N) in J per drive."""
+    c = real_array("c", c, robot.n_arms)
+    if c.ndim < 2:
+        raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
+    return positive_number("dt", dt) * np.sum(robot.resistance * (c / robot.torque_constant) ** 2, axis=-2)
 
 
 def mechanical_work(run: Run) -> np.ndarray:
-    """Work of the drives on the mechanism (N,) in J; without friction it sums to zero on a closed path from rest to rest."""
+    """Work of the drives on the mechanism (N,) in J.
+
+    Without friction it sums to zero over the drives on a closed path from rest to rest.
+    """
     return np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=0)
 
 
