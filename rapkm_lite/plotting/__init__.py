@@ -1,5 +1,17 @@
 """Figures: ``plot_x(..., ax=None) -> ax``, one style file, one colour per arm everywhere."""
 
+from .actuation import (
+    curve_crossings,
+    plot_available_forces,
+    plot_control_fields,
+    plot_grid_search,
+    plot_map,
+    plot_mode_maps,
+    plot_pair_curves,
+    plot_pair_measures,
+    plot_parameterization_singularities,
+    plot_prestress_maps,
+)
 from .machine import (
     pair_poses,
     plane_axes,

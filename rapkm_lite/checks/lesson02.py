@@ -1,0 +1,88 @@
+"""Exercises of lesson 02: the control matrix, the guaranteed force, the input singularities of the mixed working modes."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ..actuation import control_matrix, distal_cross_products
+from ..kinematics import arm_vectors, cross, inverse_kinematics, reachable, turn, working_modes
+from ..manipulator import load
+from . import Exercise
+
+
+def _arms(rng) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Arm vectors of seeded poses of the testbed in all working modes."""
+    robot = load()
+    x = rng.uniform(-0.1, 0.1, (8, 2))
+    return [arm_vectors(robot, inverse_kinematics(robot, p, s)) for p, s in zip(x, working_modes(robot), strict=True)]
+
+
+def _control_matrix(a, d) -> np.ndarray:
+    return d / cross(a, d)[:, None]
+
+
+def _stretching(A, a, d) -> tuple[float, str]:
+    """The elbow moves with E a qd_i, the tip with xd: a rigid distal link allows no difference along d."""
+    x_rate = np.array([0.6, -0.8])
+    stretch = np.abs((d * (x_rate - turn(a) * (A @ x_rate)[:, None])).sum(axis=1)) / np.linalg.norm(d, axis=1)
+    return stretch.max(), "moving the end-effector at 1 m/s stretches a distal link, in m/s, by"
+
+
+def _control_matrices(rng) -> list[tuple[np.ndarray, float]]:
+    robot = load()
+    q = inverse_kinematics(robot, rng.uniform(-0.1, 0.1, (6, 2)))
+    return [(A, c) for A, c in zip(control_matrix(robot, q), rng.uniform(0.05, 0.2, 6), strict=True)]
+
+
+def guaranteed_force(A, torque: float) -> float:
+    """Largest force (N) that torques |c_i| <= torque (N m) produce in every direction: the zonotope's inner radius.
+
+    A : (m, 2) in rad/m.  The edge of the zonotope along row A_i has the distance sum_j |A_j x A_i| / |A_i| from zero.
+    """
+    A = np.asarray(A, dtype=float)
+    return torque * min(np.abs(cross(A, row)).sum() / np.linalg.norm(row) for row in A)
+
+
+def _overpromise(force, A, torque: float) -> tuple[float, str]:
+    angle = np.linspace(0.0, np.pi, 4001)
+    reach = torque * np.abs(A @ np.stack([np.cos(angle), np.sin(angle)])).sum(axis=0)
+    return max(0.0, float(force) - reach.min()), "in one direction the drives fall short of the promised force, in N, by"
+
+
+def input_singularity(mode) -> np.ndarray:
+    """Input singularity (2,) in m of the testbed in a mixed working mode (3,): between the bases of the two equal arms."""
+    equal = next(pair for pair in itertools.combinations(range(3), 2) if mode[pair[0]] == mode[pair[1]])
+    return load().base[list(equal)].mean(axis=0)
+
+
+def _mixed_modes(rng) -> list[tuple[np.ndarray]]:
+    return [(mode,) for mode in working_modes(load()) if abs(mode.sum()) == 1]
+
+
+def _spread(x, mode) -> tuple[float, str]:
+    robot = load()
+    if not reachable(robot, x):
+        return np.inf, "the point lies outside the workspace"
+    crossed = distal_cross_products(robot, inverse_kinematics(robot, x, mode))
+    return robot.lengths.max() * np.abs(crossed).max(), "the distal links miss being parallel, over their length in m, by"
+
+
+EXERCISES = {
+    "02.control_matrix": Exercise(
+        reference=_control_matrix, cases=_arms, invariant=_stretching, unit="rad/m", tolerance=1e-10,
+        hint="the tip velocity xd and the elbow velocity qd_i E a_i have the same component along d_i, and d_i . E a_i is "
+             "the cross product a_i x d_i; solve for qd_i, one row per arm",
+    ),
+    "02.guaranteed_force": Exercise(
+        reference=guaranteed_force, cases=_control_matrices, invariant=_overpromise, unit="N", tolerance=1e-9,
+        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across a row A_i "
+             "every drive j adds at most torque times |A_j x A_i| / |A_i|",
+    ),
+    "02.input_singularity": Exercise(
+        reference=input_singularity, cases=_mixed_modes, invariant=_spread, unit="m", tolerance=1e-6,
+        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest point of "
+             "the map, or ask where two of the three curves cross",
+    ),
+}

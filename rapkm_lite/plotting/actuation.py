@@ -1,0 +1,209 @@
+"""Actuation over the workspace: control vector fields, working modes, parameterization singularities (fig. 8), prestress."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib import patheffects
+
+from ..actuation import (
+    control_matrix,
+    control_vector_fields,
+    distal_cross_products,
+    drive_pairs,
+    redundant_control_matrix,
+    singular_values,
+)
+from ..kinematics import arm_vectors, inverse_kinematics, working_modes
+from ..manipulator import Manipulator
+from ..maps import workspace_grid
+from .machine import plot_machine, plot_path, plot_workspace
+from .style import ALARM, NEUTRAL, arm_line, axes_or_new
+
+_OUTLINED = [patheffects.withStroke(linewidth=3.2, foreground="#222222")]
+
+
+def pair_name(pair: tuple[int, int]) -> str:
+    """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
+    return f"({pair[0] + 1},{pair[1] + 1})"
+
+
+def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
+    """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
+    left_out = [i for i in range(robot.n_arms) if i not in pair]
+    return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
+
+
+def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
+    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y, with its colour bar."""
+    ax = axes_or_new(ax, figsize=(4.6, 3.9))
+    mesh = ax.pcolormesh(x, y, values, cmap="cividis", vmin=vmin, vmax=vmax, shading="nearest", rasterized=True)
+    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
+    ax.grid(False)
+    if bar:
+        ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
+    return ax
+
+
+def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = False, n: int = 300, **line):
+    """Curves where the two distal links of a pair are parallel: its parameterization singularities.
+
+    on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
+    """
+    ax = axes_or_new(ax, figsize=(4.2, 4.2))
+    x, y, inside = workspace_grid(robot, n)
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    cross = np.zeros((*inside.shape, len(drive_pairs(robot))))
+    cross[inside] = distal_cross_products(robot, inverse_kinematics(robot, points[inside], mode))
+    for k, pair in enumerate(drive_pairs(robot)):
+        if pairs is not None and pair not in pairs:
+            continue
+        look = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
+        value = np.ma.array(cross[..., k], mask=~inside)
+        drawn = ax.contour(x, y, value, levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
+                           linewidths=look.get("linewidth", 1.6), zorder=3)
+        if on_map:
+            drawn.set_path_effects(_OUTLINED)
+        else:
+            ax.plot([], [], **look, label=f"links {pair[0] + 1} and {pair[1] + 1} parallel")
+    return ax
+
+
+def plot_control_fields(robot, axes=None, n: int = 15):
+    """Control vector fields (8)-(9), one panel per drive: acceleration of the end-effector per unit torque, m/s^2 per N m."""
+    if axes is None:
+        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True)[1]
+    # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
+    x, y, inside = workspace_grid(robot.replace(lengths=0.985 * robot.lengths), n)
+    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    field = control_vector_fields(robot, inverse_kinematics(robot, points))
+    for i, ax in enumerate(axes):
+        plot_workspace(robot, ax)
+        arrows = ax.quiver(*points.T, *field[:, :, i].T, color=arm_line(i)["color"], angles="xy", pivot="tail",
+                           scale=6e3, scale_units="width", width=0.008, zorder=3)
+        ax.plot(*robot.base[i], "o", color=arm_line(i)["color"], ms=8, zorder=4)
+        ax.quiverkey(arrows, 0.80, 0.93, 1000, "1000", labelpos="N", coordinates="axes")
+        ax.set(title=f"drive {i + 1}", xlim=(-0.25, 0.25), ylim=(-0.21, 0.29))
+        if i:
+            ax.set_ylabel("")
+    return axes
+
+
+def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
+    """Maps sigma (2^N, n, n) of an actuation measure for all working modes, with the curves of all pairs on top.
+
+    x, y : samples (n,) in m.  marks : a point (2,) in m to mark, or None, for each mode.
+    """
+    modes = working_modes(robot)
+    if axes is None:
+        axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1]
+    for k, (ax, mode) in enumerate(zip(np.ravel(axes), modes, strict=True)):
+        plot_map(x, y, sigma[k], ax, vmin=0.0, vmax=sigma.max(), bar=False)
+        plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
+        if marks is not None and marks[k] is not None:
+            ax.plot(*marks[k], "o", mfc="none", mec=ALARM, mew=2.2, ms=14, zorder=5)
+        ax.set_title("(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")")
+        ax.label_outer()
+    mesh = np.ravel(axes)[0].collections[0]
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of all drives", shrink=0.8)
+    return axes
+
+
+def plot_grid_search(spacings, minima, ax=None):
+    """Smallest measure found on a grid against its spacing in m; `minima` maps a label to values of the same length."""
+    ax = axes_or_new(ax, figsize=(6.4, 3.4))
+    for k, (label, values) in enumerate(minima.items()):
+        ax.loglog(spacings, values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
+    ax.set(xlabel="grid spacing in m", ylabel="smallest σ_min on the grid")
+    ax.legend(loc="center left")
+    return ax
+
+
+def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
+    """Fig. 8: the five-bar of one pair with its distal links parallel at the point x (2,), and the curves of all pairs."""
+    robot = trajectory.robot
+    if axes is None:
+        axes = plt.subplots(1, 2, figsize=(9.6, 4.4))[1]
+    q = inverse_kinematics(robot, x)
+    plot_workspace(robot, axes[0])
+    plot_pair_curves(robot, axes[0], pairs=[pair])
+    plot_machine(robot, q, axes[0], arms=pair)
+    _, d = arm_vectors(robot, q)
+    axes[0].axline(x, np.add(x, d[pair[0]]), color=ALARM, lw=1.0, ls=":", zorder=2)
+    plot_workspace(robot, axes[1])
+    plot_path(trajectory, axes[1])
+    plot_pair_curves(robot, axes[1])
+    for k, left_out in ((k, pair_line(robot, p)) for k, p in enumerate(drive_pairs(robot))):
+        at = curve_crossings(trajectory)[k]
+        axes[1].plot(*trajectory.x[at].T, "o", mfc="white", mec=left_out["color"], mew=1.8, ms=7, ls="", zorder=5)
+    axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
+    axes[1].set_title("all three pairs and the path")
+    axes[1].legend(loc="upper right", fontsize=8.5)
+    return axes
+
+
+def curve_crossings(trajectory) -> list[np.ndarray]:
+    """For each pair of drives the samples just before the path crosses the curve of this pair."""
+    cross = distal_cross_products(trajectory.robot, trajectory.q)
+    return [np.flatnonzero(np.diff(np.sign(c)) != 0) for c in cross.T]
+
+
+def plot_prestress_maps(robot, axes=None, n: int = 161):
+    """Share |n_i| of each drive in the null vector of A^T, from a singular value decomposition, under the pair curves."""
+    if axes is None:
+        axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
+    x, y, inside = workspace_grid(robot, n)
+    A = control_matrix(robot, inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside]))
+    share = np.ma.masked_all((3, *inside.shape))
+    share[:, inside] = np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]).T
+    for i, ax in enumerate(axes):
+        plot_map(x, y, share[i], ax, vmin=0.0, vmax=1.0, bar=False)
+        pair = tuple(j for j in range(3) if j != i)
+        plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
+        ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
+        ax.label_outer()
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |n_i| of the prestress", shrink=0.85)
+    return axes
+
+
+def force_polygon(A, torque: float) -> np.ndarray:
+    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise."""
+    edges = 2 * torque * np.asarray(A, dtype=float)
+    edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
+    edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]
+    half = -edges.sum(axis=0) / 2 + np.cumsum(np.vstack([np.zeros(2), edges[:-1]]), axis=0)
+    return np.vstack([half, -half])
+
+
+def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=None, drives=True):
+    """Forces at the end-effector that torques up to `torque` N m can produce at one pose q, and each drive's own share.
+
+    guaranteed : radius in N of a disc to draw, the force that is available in every direction.
+    """
+    ax = axes_or_new(ax, figsize=(3.6, 3.6))
+    A = control_matrix(robot, q)
+    corners = force_polygon(A, torque)
+    ax.fill(*corners.T, color="#DCE3EA", zorder=1)
+    ax.plot(*np.vstack([corners, corners[:1]]).T, color=NEUTRAL, lw=1.4, zorder=2)
+    for i in range(robot.n_arms) if drives else ():
+        ax.plot(*np.outer([-torque, torque], A[i]).T, **arm_line(i), zorder=3, label=f"drive {i + 1}")
+    if guaranteed is not None:
+        ax.add_patch(plt.Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
+    room = 1.12 * np.abs(corners).max()
+    ax.set(aspect="equal", xlabel="force in x in N", ylabel="force in y in N", xlim=(-room, room), ylim=(-room, room))
+    return ax
+
+
+def plot_pair_measures(trajectory, ax=None):
+    """sigma_min of the rows of A~ of every pair, and of all drives, along the path; ticks mark the crossed curves."""
+    ax = axes_or_new(ax, figsize=(8.4, 3.4))
+    robot, A = trajectory.robot, redundant_control_matrix(trajectory.robot, trajectory.q)
+    for pair, at in zip(drive_pairs(robot), curve_crossings(trajectory), strict=True):
+        look = pair_line(robot, pair)
+        sigma = np.linalg.svd(A[:, list(pair)], compute_uv=False)[:, -1]
+        ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **look)
+        ax.plot(trajectory.t[at], np.full(len(at), 2e-3), "|", color=look["color"], ms=12, mew=2)
+    ax.semilogy(trajectory.t, np.linalg.svd(A, compute_uv=False)[:, 1], color="black", lw=2.2, label="all drives")
+    ax.set(xlabel="time in s", ylabel="σ_min of the rows of Ã", xlim=(0, trajectory.t[-1]), ylim=(1.5e-3, 1.5))
+    ax.legend(loc="lower right", ncols=4)
+    return ax
