@@ -1,4 +1,4 @@
-"""Exercises of lesson 02: the control matrix, the guaranteed force, the input singularities of the mixed working modes."""
+"""Exercises of lesson 02: the control matrix, the guaranteed force, the input singularities of the mixed modes."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ def guaranteed_force(A, torque: float) -> float:
 def _overpromise(force, A, torque: float) -> tuple[float, str]:
     angle = np.linspace(0.0, np.pi, 4001)
     reach = torque * np.abs(A @ np.stack([np.cos(angle), np.sin(angle)])).sum(axis=0)
-    return max(0.0, float(force) - reach.min()), "in one direction the drives fall short of the promised force, in N, by"
+    return max(0.0, float(force) - reach.min()), "in one direction the drives fall short of this force, in N, by"
 
 
 def input_singularity(mode) -> np.ndarray:
-    """Input singularity (2,) in m of the testbed in a mixed working mode (3,): between the bases of the two equal arms."""
+    """Input singularity (2,) in m of the testbed in a mixed mode (3,): midway between the bases of the equal arms."""
     equal = next(pair for pair in itertools.combinations(range(3), 2) if mode[pair[0]] == mode[pair[1]])
     return load().base[list(equal)].mean(axis=0)
 
@@ -66,23 +66,23 @@ def _spread(x, mode) -> tuple[float, str]:
     if not reachable(robot, x):
         return np.inf, "the point lies outside the workspace"
     crossed = distal_cross_products(robot, inverse_kinematics(robot, x, mode))
-    return robot.lengths.max() * np.abs(crossed).max(), "the distal links miss being parallel, over their length in m, by"
+    return 0.2 * np.abs(crossed).max(), "over their length of 0.2 m the distal links miss being parallel, in m, by"
 
 
 EXERCISES = {
     "02.control_matrix": Exercise(
         reference=_control_matrix, cases=_arms, invariant=_stretching, unit="rad/m", tolerance=1e-10,
-        hint="the tip velocity xd and the elbow velocity qd_i E a_i have the same component along d_i, and d_i . E a_i is "
-             "the cross product a_i x d_i; solve for qd_i, one row per arm",
+        hint="the tip velocity xd and the elbow velocity qd_i E a_i have the same component along d_i, and d_i . E a_i "
+             "is the cross product a_i x d_i; solve for qd_i, one row per arm",
     ),
     "02.guaranteed_force": Exercise(
         reference=guaranteed_force, cases=_control_matrices, invariant=_overpromise, unit="N", tolerance=1e-9,
-        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across a row A_i "
-             "every drive j adds at most torque times |A_j x A_i| / |A_i|",
+        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across a row "
+             "A_i every drive j adds at most torque times |A_j x A_i| / |A_i|",
     ),
     "02.input_singularity": Exercise(
         reference=input_singularity, cases=_mixed_modes, invariant=_spread, unit="m", tolerance=1e-6,
-        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest point of "
-             "the map, or ask where two of the three curves cross",
+        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest point "
+             "of the map, or ask where two of the three curves cross",
     ),
 }

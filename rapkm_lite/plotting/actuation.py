@@ -1,4 +1,4 @@
-"""Actuation over the workspace: control vector fields, working modes, parameterization singularities (fig. 8), prestress."""
+"""Actuation over the workspace: control vector fields, mode maps, parameterization singularities (fig. 8), prestress."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from ..actuation import (
     distal_cross_products,
     drive_pairs,
     redundant_control_matrix,
-    singular_values,
 )
 from ..kinematics import arm_vectors, inverse_kinematics, working_modes
 from ..manipulator import Manipulator
@@ -35,7 +34,7 @@ def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
 
 
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
-    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y, with its colour bar."""
+    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y."""
     ax = axes_or_new(ax, figsize=(4.6, 3.9))
     mesh = ax.pcolormesh(x, y, values, cmap="cividis", vmin=vmin, vmax=vmax, shading="nearest", rasterized=True)
     ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
@@ -70,7 +69,7 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
 
 
 def plot_control_fields(robot, axes=None, n: int = 15):
-    """Control vector fields (8)-(9), one panel per drive: acceleration of the end-effector per unit torque, m/s^2 per N m."""
+    """Control vector fields (8)-(9), one panel per drive: end-effector acceleration per torque, m/s^2 per N m."""
     if axes is None:
         axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True)[1]
     # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
@@ -120,7 +119,7 @@ def plot_grid_search(spacings, minima, ax=None):
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
-    """Fig. 8: the five-bar of one pair with its distal links parallel at the point x (2,), and the curves of all pairs."""
+    """Fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
     robot = trajectory.robot
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 4.4))[1]
@@ -149,7 +148,7 @@ def curve_crossings(trajectory) -> list[np.ndarray]:
 
 
 def plot_prestress_maps(robot, axes=None, n: int = 161):
-    """Share |n_i| of each drive in the null vector of A^T, from a singular value decomposition, under the pair curves."""
+    """Share |n_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
     x, y, inside = workspace_grid(robot, n)
