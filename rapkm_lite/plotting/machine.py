@@ -114,7 +114,7 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
     ax.annotate("true", (0, 0), xytext=(10, -4), textcoords="offset points", fontsize=9.5)
     ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.3)
+    ax.margins(0.35)
     ax.set(xlabel="x − true x in mm", ylabel="y − true y in mm", title="the same, true size, close up")
 
 

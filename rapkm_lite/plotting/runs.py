@@ -70,9 +70,8 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
         ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
     ax.set(xlabel="antagonism, nᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
-    ax.set_aspect("equal", adjustable="datalim")
-    low, high = ax.get_ylim()
-    ax.set_ylim(min(low, 0.0), high + 0.3 * (high - low))
+    ax.set_aspect("equal")
+    ax.set_ylim(0, 1.25 * ax.get_ylim()[1])
     ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
     ax.legend(loc="upper left", ncols=2)
     return ax
