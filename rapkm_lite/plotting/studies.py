@@ -16,21 +16,21 @@ def plot_landscape(values, cube, theory, axes=None):
     """
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1]
-    levels = np.linspace(0, np.max(cube), 11)
+    levels = np.max(cube) * np.linspace(0, 1, 9) ** 2  # evenly spaced ellipses of a quadratic form
     for ax, k in zip(axes, (0, len(values) // 2, len(values) - 1), strict=True):
         filled = ax.contourf(values, values, cube[:, :, k].T, levels=levels)
         ax.contour(values, values, theory[:, :, k].T, levels=levels[1:], colors="white", linestyles="--", linewidths=1)
         ax.set(title=f"offset 3 = {values[k]:.1f} mrad", xlabel="offset 1 in mrad", aspect="equal")
         ax.grid(False)
     axes[0].set_ylabel("offset 2 in mrad")
-    axes[0].figure.colorbar(filled, ax=axes, label="antagonistic energy in J")
+    axes[0].figure.colorbar(filled, ax=axes, label="antagonistic energy in J", format="%.1f")
     return axes
 
 
 def plot_agreement(theory, simulated, ax=None):
     """Simulated against predicted energies in J, with the line of agreement."""
     ax = axes_or_new(ax, figsize=(4.6, 3.6))
-    ax.loglog(theory, simulated, ".", color=arm_colour(0), ms=2, alpha=0.4, rasterized=True)
+    ax.loglog(theory, simulated, ".", color=arm_colour(0), ms=3, alpha=0.5)
     ends = [np.min(theory), np.max(theory)]
     ax.loglog(ends, ends, color=ALARM, lw=1.2, label="theory line")
     ax.set(xlabel="predicted energy in J", ylabel="simulated energy in J")
@@ -45,6 +45,9 @@ def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
     ax.loglog(gains, with_filter, "s-", color=AFTER, label="with filter")
     ax.loglog(gains, antagonistic, "--", color=ALARM, label="antagonistic part")
     ax.set(xlabel=r"gain $K_P$ in N m/rad", ylabel="total electric energy in J")
+    ticks = [t for t in (1, 2, 5, 10, 20, 50, 100) if min(gains) <= t <= max(gains)]
+    ax.set_xticks(ticks, [f"{t}" for t in ticks])
+    ax.set_xticks([], minor=True)
     ax.legend()
     return ax
 
@@ -65,17 +68,16 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     return ax
 
 
-def plot_bands(samples: dict, ax=None, marks: dict | None = None):
-    """Histograms of energies in J; `samples` maps a label to (k,), `marks` a label to one number drawn as a line."""
+def plot_bands(samples: dict, ax=None):
+    """Distribution functions of energies in J with their means; `samples` maps a label to (k,)."""
     ax = axes_or_new(ax, figsize=(6.6, 3.5))
-    every = np.concatenate([np.asarray(v) for v in samples.values()])
-    bins = np.linspace(0, np.quantile(every, 0.995), 60)
     for (label, values), colour in zip(samples.items(), (BEFORE, AFTER), strict=False):
-        ax.hist(values, bins=bins, color=colour, alpha=0.75, label=label)
-    for (label, value), dash in zip((marks or {}).items(), ("-", "--", ":"), strict=False):
-        ax.axvline(value, color=ALARM, lw=1.5, ls=dash, label=label)
-    ax.set(xlabel="total electric energy in J", ylabel="runs per bin")
-    ax.legend(loc="upper right")
+        values = np.sort(values)
+        ax.step(values, 100 * np.arange(1, len(values) + 1) / len(values), color=colour, lw=2.2, label=label)
+        ax.plot(values.mean(), 100 * np.mean(values <= values.mean()), "D", color=ALARM, ms=7)
+    ax.plot([], [], "D", color=ALARM, label="mean")
+    ax.set(xlabel="total electric energy in J", ylabel="share of runs below, %", xlim=(0, None), ylim=(0, 101))
+    ax.legend(loc="lower right")
     return ax
 
 
