@@ -12,6 +12,24 @@ from .actuation import (
     plot_parameterization_singularities,
     plot_prestress_maps,
 )
+from .antagonism import (
+    plot_chatter,
+    plot_disagreement,
+    plot_fight_map,
+    plot_gain_ratio,
+    plot_log,
+    plot_rest_torques,
+    plot_torque_steps,
+)
+from .constraints import (
+    plot_complement_size,
+    plot_configuration_space,
+    plot_cut_tree,
+    plot_joint_angles,
+    plot_loop_gaps,
+    plot_pin_forces,
+    plot_topology,
+)
 from .machine import (
     pair_poses,
     plane_axes,

@@ -1,0 +1,175 @@
+"""The tree and its cut loops, the configuration space, loop gaps and joint reactions (figs. 1 and 2, lesson 01)."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..dynamics import orthogonal_complement
+from ..kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
+from .machine import plot_machine
+from .style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
+
+
+def plot_joint_angles(robot, q, ax=None):
+    """Fig. 1: the closed machine at q (2N,) with its joint angles: base angles from the x axis, elbow relative."""
+    ax = plot_machine(robot, q, ax, labels=False)
+    N, size = robot.n_arms, 0.28 * robot.lengths.max()
+    for i in range(N):
+        base, elbow = q[i], q[N + i]
+        at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
+        _angle(ax, robot.base[i], 0.0, base, size, f"$q_{{{i + 1}}}$", arm_colour(i))
+        _angle(ax, at, base, base + elbow, size, f"$q_{{{N + i + 1}}}$", arm_colour(i))
+    return ax
+
+
+def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: str) -> None:
+    """An arc with a head from the dotted direction `start` to the direction `stop`, and its name."""
+    arc = at + size * unit_vector(np.linspace(start, stop, 40))
+    ax.plot(*np.stack([at, at + 1.35 * size * unit_vector(start)]).T, ":", color=NEUTRAL, lw=1.1, zorder=2)
+    ax.plot(*arc.T, color=colour, lw=1.1, zorder=2)
+    ax.annotate("", arc[-1], arc[-4], arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.1}, zorder=2)
+    middle = at + 1.55 * size * unit_vector(np.asarray((start + stop) / 2))
+    ax.text(*middle, text, color=colour, ha="center", va="center", fontsize=11, zorder=6,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8})
+
+
+def plot_cut_tree(robot, q, ax=None, title: str = ""):
+    """Fig. 2: the tree of N free arms at any q (2N,), and the gaps h_i from the tip of arm 2 to the other tips."""
+    ax = plot_machine(robot, q, ax, labels=False)
+    p = tips(robot, q)
+    for i in range(robot.n_arms):
+        gap = np.hypot(*(p[i] - p[1]))
+        if gap > 1e-3:
+            ax.annotate("", p[i], p[1], arrowprops={"arrowstyle": "-|>", "color": ALARM, "lw": 1.8, "shrinkA": 4,
+                                                    "shrinkB": 4}, zorder=7)
+        if i != 1:
+            ax.plot([], [], color=ALARM, label=f"arm 2 to arm {i + 1}: {1e3 * gap:.1f} mm")
+    ax.legend(loc="upper left", handlelength=0, title="gaps")
+    ax.set_title(title)
+    return ax
+
+
+def plot_topology(robot, ax=None):
+    """Bodies (boxes) and revolute joints (lines) of the machine; dashed lines are the joints that are cut."""
+    ax = axes_or_new(ax, figsize=(4.2, 4.2))
+    N = robot.n_arms
+    ax.plot([-0.25, N - 0.75], [0, 0], color="#DDDDDD", lw=20, solid_capstyle="round")
+    ax.text((N - 1) / 2, 0, "ground", ha="center", va="center", zorder=6)
+    for i in range(N):
+        ax.plot([i, i], [0.1, 2], color=arm_colour(i), lw=3)
+        for y, name in ((0.55, f"$q_{{{i + 1}}}$ driven"), (1.5, f"$q_{{{N + i + 1}}}$")):
+            ax.text(i + 0.07, y, name, color=arm_colour(i), va="center")
+        for y, link in ((1, i + 1), (2, N + i + 1)):
+            ax.text(i, y, f"link {link}", ha="center", va="center", zorder=5,
+                    bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": arm_colour(i), "linewidth": 1.5})
+        if i != 1:
+            bow = f"arc3,rad={-0.5 * np.sign(i - 1)}"
+            ax.annotate("", (i, 2.1), (1, 2.1), zorder=1, arrowprops={
+                "arrowstyle": "-", "color": ALARM, "ls": "--", "lw": 2, "connectionstyle": bow})
+            ax.text((1 + i) / 2, 2.55, "cut", color=ALARM, ha="center", va="center")
+    ax.set(xlim=(-0.5, N - 0.3), ylim=(-0.4, 2.8))
+    ax.set_axis_off()
+    return ax
+
+
+def configuration_sheet(robot, mode, n: int = 41) -> np.ndarray:
+    """Base angles (n, 4 n, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi.
+
+    The workspace is taken to be star-shaped about the mean of the base points.
+    """
+    centre = robot.base.mean(axis=0)
+    way = unit_vector(np.linspace(0, 2 * np.pi, 4 * n))
+    low, high = np.zeros(len(way)), np.full(len(way), robot.lengths.sum(axis=1).max())
+    for _ in range(50):
+        middle = (low + high) / 2
+        inside = reachable(robot, centre + middle[:, None] * way)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    # Rings close together at the rim, where the angles change like a square root.
+    ring = np.sin(np.linspace(0, np.pi / 2, n))
+    q = inverse_kinematics(robot, centre + ring[:, None, None] * low[:, None] * way, mode)
+    start = np.arctan2(*(centre - robot.base).T[::-1])
+    return start + wrap(q[..., : robot.n_arms] - start)
+
+
+def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=None):
+    """The c-space V in the space of the first three base angles, in degrees: one sheet per working mode in `modes`.
+
+    q (2N,) marks a configuration, F (2N, 2) a patch of the tangent plane there, `trajectory` draws its path on V.
+    """
+    if ax is None:
+        with mpl.style.context(STYLE):
+            ax = plt.figure(figsize=(6.4, 5.4)).add_subplot(projection="3d", computed_zorder=False)
+    rims = []
+    shades = mpl.colormaps["cividis"](np.linspace(0.9, 0.3, len(modes)))
+    for shade, mode in zip(shades, modes, strict=True):
+        sheet = np.rad2deg(configuration_sheet(robot, mode))
+        name = "".join("+" if s > 0 else "−" for s in mode)
+        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.75, lw=0, rcount=41, ccount=80, label=f"mode {name}")
+        ax.plot(*sheet[-1, :, :3].T, color=NEUTRAL, lw=0.8)
+        rims.append(sheet[-1])
+    if len(rims) == 2:
+        seam = np.where((np.abs(rims[0] - rims[1]) < 0.1).all(axis=-1, keepdims=True), rims[0], np.nan)
+        ax.plot(*seam[:, :3].T, color=ALARM, lw=2.5, label="common rim", zorder=8)
+    if trajectory is not None:
+        ax.plot(*np.rad2deg(trajectory.q[:, :3]).T, color="black", lw=1.6, label="triangle path", zorder=8)
+    if q is not None:
+        point = np.rad2deg(q[:3])
+        ax.plot(*point[:, None], "o", color=ALARM, ms=6, zorder=9)
+        if F is not None:
+            # An orthonormal basis of the plane keeps the patch a square, whatever the independent coordinates.
+            basis = 35 * np.linalg.qr(F[:3])[0].T
+            corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1]]) @ basis
+            ax.plot(*(point + corners).T, color=ALARM, lw=1.6, label="tangent plane, columns of F", zorder=9)
+    ax.set(xlabel="base angle 1 in °", ylabel="base angle 2 in °", zlabel="base angle 3 in °")
+    ax.set_aspect("equal")
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(mpl.ticker.MultipleLocator(90 if len(modes) > 2 else 45))
+        axis.labelpad = 7
+    ax.view_init(elev=22, azim=-52)
+    ax.set_box_aspect(None, zoom=0.85)
+    ax.legend(loc="upper left", fontsize=9)
+    return ax
+
+
+def plot_complement_size(trajectory, pairs, ax=None):
+    """Largest singular value of F along a path for pairs of base joints (0-based) as independent coordinates, rad/rad.
+
+    With three arms a pair has the colour of the arm it leaves out.
+    """
+    ax = axes_or_new(ax)
+    for pair in pairs:
+        size = np.linalg.norm(orthogonal_complement(trajectory.robot, trajectory.q, pair), ord=2, axis=(-2, -1))
+        (out, *_) = [i for i in range(trajectory.robot.n_arms) if i not in pair]
+        names = f"$q_{{{pair[0] + 1}}}$, $q_{{{pair[1] + 1}}}$ independent"
+        ax.semilogy(trajectory.t, size, label=names, **arm_line(out))
+    ax.axhline(1.0, color=NEUTRAL, lw=1.0, label="$N_J$: size 1 everywhere")
+    ax.set(xlabel="time in s", ylabel="largest singular value of F", xlim=(0, trajectory.t[-1]))
+    ax.set_ylim(0.5, 1e6)
+    ax.legend(loc="upper center", ncols=2)
+    return ax
+
+
+def plot_loop_gaps(t, gaps: dict, ax=None):
+    """Largest loop gap over time on a logarithmic axis; `gaps` maps a label to (k,) gaps in m."""
+    ax = axes_or_new(ax)
+    for k, (label, gap) in enumerate(gaps.items()):
+        colour, dash = (ALARM, BEFORE, AFTER)[k % 3], ("-", "--", "-.")[k % 3]
+        ax.semilogy(t, 1e3 * np.maximum(gap, 1e-16), color=colour, ls=dash, label=label)
+    ax.set(xlabel="time in s", ylabel="largest loop gap in mm", xlim=(t[0], t[-1]))
+    ax.legend(loc="center right")
+    return ax
+
+
+def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, title: str = ""):
+    """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, as arrows from the pin."""
+    ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
+    x = forward_kinematics(robot, q)
+    for i, force in enumerate(forces):
+        ax.annotate("", x + force / newton_per_metre, x, zorder=7,
+                    arrowprops={"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0})
+        ax.plot([], [], color=arm_colour(i), lw=2.4, label=f"on arm {i + 1}: {np.hypot(*force):.2f} N")
+    ax.legend(loc="upper left")
+    ax.set_title(title)
+    return ax
