@@ -40,6 +40,19 @@ from .machine import (
     plot_working_modes,
     plot_workspace,
 )
+from .robust import (
+    feedback_norm,
+    plot_ee_errors,
+    plot_ee_paths,
+    plot_effective_gain,
+    plot_feedback_along,
+    plot_feedback_map,
+    plot_lyapunov,
+    plot_pairs,
+    plot_partition_rules,
+    plot_step_response,
+    plot_torques_and_errors,
+)
 from .runs import (
     plot_antagonism,
     plot_energies,

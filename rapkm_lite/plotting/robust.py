@@ -1,0 +1,202 @@
+"""Computed torque near parameterization singularities and in redundant coordinates (figs. 8 to 10)."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .._arguments import transpose
+from ..actuation import (
+    control_matrix,
+    drive_pairs,
+    explicit_pseudoinverse,
+    redundant_control_matrix,
+    select_independent,
+    singular_values,
+    weighted_pseudoinverse,
+)
+from ..control import effective_gain
+from ..dynamics import minimal_dynamics, orthogonal_complement, redundant_dynamics
+from ..kinematics import inverse_kinematics
+from ..maps import workspace_grid
+from .actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
+from .machine import plot_path, plot_workspace
+from .runs import plot_errors, plot_torques
+from .style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+
+# Wrong, makeshift, right: the same look in every figure of the lesson.
+_LAW_LINES = {
+    "fixed pair": {"color": ALARM, "linestyle": "--"},
+    "switched": {"color": BEFORE, "linestyle": "-"},
+    "redundant": {"color": AFTER, "linestyle": "-"},
+}
+
+
+def _law_line(label: str) -> dict:
+    return next((line for name, line in _LAW_LINES.items() if name in label), {})
+
+
+def _frame(ax):
+    """Fill the axes with the workspace of the testbed's size."""
+    ax.set(xlim=(-0.21, 0.21), ylim=(-0.19, 0.25))
+    return ax
+
+
+def _grid_poses(robot, n: int):
+    x, y, inside = workspace_grid(robot, n)
+    return x, y, inside, inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
+
+
+def _field(inside, values):
+    field = np.ma.masked_all(inside.shape)
+    field[inside] = values
+    return field
+
+
+def feedback_norm(robot, q, pair=None) -> np.ndarray:
+    """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
+
+    pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
+    (A~^T)^+ G~.
+    """
+    still = np.zeros(robot.n_joints)
+    if pair is None:
+        A = redundant_control_matrix(robot, q)
+        M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
+    else:
+        # In end-effector coordinates first, so that a grid point on the curve is no special case.
+        A = control_matrix(robot, q)
+        a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
+        det = a * d - b * c
+        det = np.where(np.abs(det) < 1e-9, 1e-9, det)
+        to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
+        M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
+    return np.linalg.norm(M, 2, axis=(-2, -1))
+
+
+def plot_feedback_map(robot, pair, ax=None, n: int = 220):
+    """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic (fig. 8)."""
+    x, y, inside, q = _grid_poses(robot, n)
+    level = _field(inside, np.log10(feedback_norm(robot, q, pair)))
+    ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
+    plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
+    return _frame(ax)
+
+
+def plot_feedback_along(trajectory, ax=None):
+    """Norm of the feedback map along a path, for each fixed pair and for redundant coordinates."""
+    ax = axes_or_new(ax)
+    robot = trajectory.robot
+    for pair in drive_pairs(robot):
+        ax.semilogy(trajectory.t, feedback_norm(robot, trajectory.q, pair), label=f"pair {pair_name(pair)}",
+                    **pair_line(robot, pair))
+    ax.semilogy(trajectory.t, feedback_norm(robot, trajectory.q), label="redundant", color=AFTER, lw=2.4)
+    ax.set(xlabel="time in s", ylabel="norm in N m per rad/s²", xlim=(0, trajectory.t[-1]))
+    ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return ax
+
+
+def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
+    """Torques and angle errors of one run (figs. 9 and 10); thin lines where the path crosses the pair's curve."""
+    if axes is None:
+        axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
+    plot_torques(run, axes[0], title)
+    plot_errors(run, axes[1])
+    at = [] if pair is None else curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
+    for ax in axes:
+        for t in run.t[at]:
+            ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
+    return axes
+
+
+def plot_ee_errors(runs: dict, ax=None):
+    """Distance of the end-effector from its desired position over time, one line per run; keys are labels."""
+    ax = axes_or_new(ax)
+    for label, run in runs.items():
+        distance = np.linalg.norm(run.x - run.trajectory.x, axis=-1)
+        ax.semilogy(run.t[1:], 1e3 * distance[1:], label=label, **_law_line(label))
+    ax.set(xlabel="time in s", ylabel="end-effector error in mm")
+    ax.legend(ncols=len(runs), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return ax
+
+
+def plot_ee_paths(runs: dict, ax=None, pair=None):
+    """True end-effector paths of several runs over their desired path and the curve of a pair; keys are labels."""
+    ax = axes_or_new(ax, figsize=(4.6, 4.4))
+    longest = max(runs.values(), key=lambda run: len(run.t))
+    plot_workspace(longest.robot, ax)
+    plot_path(longest.trajectory, ax, color="#AAAAAA", lw=3.5)
+    plot_pair_curves(longest.robot, ax, pairs=None if pair is None else [pair])
+    for label, run in runs.items():
+        ax.plot(*run.x.T, lw=1.6, label=label, zorder=4, **_law_line(label))
+        ax.plot(*run.x[-1], "x" if run is not longest else "", color=_law_line(label).get("color"), ms=9, mew=2.5)
+    ax.legend(loc="upper left", fontsize=8.5)
+    return _frame(ax)
+
+
+def plot_pairs(run, ax=None):
+    """The pair of independent joints in use over time, one bar per pair."""
+    ax = axes_or_new(ax, figsize=(8.0, 1.6))
+    pairs = drive_pairs(run.robot)
+    for k, pair in enumerate(pairs):
+        used = np.where(np.all(run.pairs == pair, axis=-1), float(k), np.nan)
+        ax.plot(run.t, used, lw=6, solid_capstyle="butt", color=pair_line(run.robot, pair)["color"])
+    ax.set_yticks(range(len(pairs)), [f"pair {pair_name(p)}" for p in pairs])
+    ax.set(xlabel="time in s", xlim=(0, run.t[-1]), ylim=(-0.6, len(pairs) - 0.4))
+    return ax
+
+
+def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: int = 200):
+    """Smallest singular value of the block A~_1 that each partition rule of (27) picks, over the workspace."""
+    if axes is None:
+        axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1]
+    x, y, inside, q = _grid_poses(robot, n)
+    A = redundant_control_matrix(robot, q)
+    for ax, rule in zip(axes, rules, strict=True):
+        block = np.take_along_axis(A, select_independent(A, rule)[..., None], axis=-2)
+        sigma = singular_values(transpose(block))[:, 1]
+        plot_map(x, y, _field(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
+        plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
+        _frame(ax).label_outer()
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="σ_min of the block Ã₁", shrink=0.85)
+    return axes
+
+
+def plot_effective_gain(trajectory, K, ax=None):
+    """Both eigenvalues of the effective gain (F^T F)^-1 F^T K F of (35) along a path; K (2N, 2N) without unit."""
+    ax = axes_or_new(ax)
+    values = np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)).real
+    low, high = np.sort(values, axis=-1).T
+    ax.plot(trajectory.t, high, color=NEUTRAL, ls="--", label="fast direction")
+    ax.plot(trajectory.t, low, color=AFTER, label="slow direction")
+    ax.fill_between(trajectory.t, low, high, color="#DDDDDD", alpha=0.6, lw=0)
+    ax.set(xlabel="time in s", ylabel="effective / nominal gain", xlim=(0, trajectory.t[-1]), ylim=(0, 1.05))
+    ax.legend(ncols=2, loc="upper right")
+    return ax
+
+
+def plot_step_response(t, measured: dict, predicted: dict, ax=None):
+    """Simulated lines and predicted points (every 25th sample) of a deviation in mm, by label."""
+    ax = axes_or_new(ax)
+    marks = (("o", AFTER), ("s", AFTER), ("x", ALARM))
+    for (label, y), line in zip(measured.items(), ("-", "--", ":"), strict=False):
+        ax.plot(t, 1e3 * y, line, color=AFTER, label=f"simulated, {label}")
+    for (label, y), (marker, colour) in zip(predicted.items(), marks, strict=False):
+        ax.plot(t[::25], 1e3 * y[::25], marker, color=colour, mfc="white", ms=5, label=f"predicted, {label}")
+    ax.axhline(0.0, color=NEUTRAL, lw=0.8)
+    ax.set(xlabel="time in s", ylabel="deviation in mm", xlim=(0, t[-1]))
+    ax.legend(loc="upper right")
+    return ax
+
+
+def plot_lyapunov(t, V, dissipated, ax=None):
+    """Lyapunov function and what damping has not yet taken of its first value, both in J, on a logarithmic axis."""
+    ax = axes_or_new(ax)
+    ax.semilogy(t, V, color=AFTER, label="V from the simulated state")
+    left = V[0] - dissipated
+    show = slice(None, None, max(1, len(t) // 40))
+    ax.semilogy(t[show], np.where(left[show] > 0, left[show], np.nan), "o", color=ALARM, mfc="white", ms=5,
+                label="V(0) minus the work of the damping")
+    ax.set(xlabel="time in s", ylabel="V in J", xlim=(0, t[-1]))
+    ax.legend(loc="upper right")
+    return ax
