@@ -16,6 +16,7 @@ from .actuation import (
     prestress_projector,
     redundant_control_matrix,
     required_wrench,
+    rest_exists,
     select_independent,
     singular_values,
     steady_state_error,
@@ -77,6 +78,7 @@ from .kinematics import (
     working_mode,
     working_modes,
 )
+from .logs import Log, mystery_run
 from .manipulator import Manipulator, data_path, load
 from .maps import actuation_map, sampling_box, switching_map, workspace_grid
 from .simulation import Experiment, Run, SimulationError, experiment, simulate

@@ -239,6 +239,23 @@ def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
     return -matvec(positive_definite("K_P", K_P, e_a.shape[-1]), e_a + np.asarray(offset, dtype=float))
 
 
+def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: float) -> bool:
+    """Can PD drives with stepped angles rest near the desired pose q (2N,) of three arms, held by Coulomb friction?
+
+    True when counts exist that a pose of the closed loops reads, and whose torques differ from a prestress by no more
+    than the friction of each drive; certain for K_P quantum <= 2 friction.  First order about q.
+    K_P : number or (3,), N m/rad.  offset : (3,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
+    """
+    n, desired = null_vector(robot, q), real_array("q", q, robot.n_joints)[:3]
+    ideal = desired + steady_state_error(control_matrix(robot, q), K_P, offset) + offset
+    counts = np.rint(ideal / quantum) + np.array(list(itertools.product(range(-4, 5), repeat=3)))
+    read = np.abs((quantum * counts - desired - offset) @ n) <= quantum / 2 * np.abs(n).sum()
+    c = -real_array("K_P", K_P) * (quantum * counts[read] - desired)
+    with np.errstate(divide="ignore"):
+        ends = np.sort([(c - friction) / n, (c + friction) / n], axis=0)  # levels of prestress that each drive can hold
+    return bool(np.any(ends[0].max(axis=-1) <= ends[1].min(axis=-1)))
+
+
 def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     """(A~^T)^+ of (27), (..., m, n), from the partition (26) of A~ into the rows A~_1 and the others, A~_2 = B A~_1:
 

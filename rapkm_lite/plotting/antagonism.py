@@ -1,0 +1,137 @@
+"""Steady state under PD control with offsets: disagreeing drives, rest torques, gains, encoder steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..actuation import control_matrix, null_vector, steady_state_error, steady_state_torque
+from ..kinematics import inverse_kinematics, reachable
+from .machine import plane_axes, plane_grid, plot_path
+from .runs import plot_torques
+from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+
+
+def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
+    """Where each drive wants the end-effector, and where it comes to rest, in mm about the desired point.
+
+    A line per drive: the points where its measured angle would be right.  Thick bars: how far the rest point misses
+    each line, with the torque that this costs.
+    """
+    ax = axes_or_new(ax, figsize=(4.6, 4.4))
+    A, offset = control_matrix(robot, q), np.asarray(offset, dtype=float)
+    rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset), rcond=None)[0]
+    torque = 1e3 * steady_state_torque(A, K_P, offset)
+    size = np.linalg.norm(A, axis=1)
+    normal, level = A / size[:, None], -1e3 * offset / size
+    corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(len(A)) for k in range(j)]
+    corners = np.array([*corners, [0.0, 0.0], rest])
+    centre, half = (corners.min(axis=0) + corners.max(axis=0)) / 2, 0.72 * np.ptp(corners, axis=0).max() + 1e-3
+    for i in range(len(A)):
+        along = np.array([-normal[i, 1], normal[i, 0]])
+        foot = centre + (level[i] - normal[i] @ centre) * normal[i]
+        label = f"drive {i + 1}: {torque[i]:+.1f} mN m"
+        ax.plot(*(foot + np.outer([-4 * half, 4 * half], along)).T, label=label, **arm_line(i))
+        target = rest + (level[i] - normal[i] @ rest) * normal[i]
+        ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)
+    ax.plot(0, 0, "+", color=NEUTRAL, ms=13, mew=2, zorder=5)
+    ax.plot(*rest, "s", mfc="white", mec=NEUTRAL, mew=1.8, ms=8, zorder=6)
+    ax.set(xlim=centre[0] + half * np.array([-1, 1]), ylim=centre[1] + half * np.array([-1, 1]), aspect="equal",
+           xlabel="x − desired x in mm", ylabel="y − desired y in mm", title=title)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=1)
+    return ax
+
+
+def plot_rest_torques(run, theory, ax=None, title: str = ""):
+    """Drive torques over time, and in thin black the static theory (N,) or (k, N) in N m."""
+    ax = plot_torques(run, ax, title)
+    lines = np.broadcast_to(theory, run.c.shape)
+    for i in range(run.robot.n_arms):
+        ax.plot(run.t, lines[:, i], color=AFTER, lw=0.9, zorder=4)
+    return ax
+
+
+def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
+    """Rest torque in N m against a ratio of gains: dots for runs, a line for each theory (label -> values)."""
+    ax = axes_or_new(ax)
+    looks = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
+    for look, (label, values) in zip(looks, theories.items(), strict=True):
+        ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
+    ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
+    ax.set(xscale="log", xlabel="gain of drive 3 / gain of drives 1 and 2", ylabel="largest rest torque in mN m",
+           title=title)
+    ax.legend()
+    return ax
+
+
+def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 161, title: str = ""):
+    """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all."""
+    ax = axes_or_new(ax, figsize=(5.2, 4.4))
+    x, y = plane_grid(robot, n)
+    points = np.stack([x, y], axis=-1)
+    inside = reachable(robot, points) & (np.hypot(*np.gradient(reachable(robot, points).astype(float))) == 0.0)
+    q = inverse_kinematics(robot, points[inside])
+    torque = np.full(x.shape, np.nan)
+    signed = np.full(x.shape, np.nan)
+    torque[inside] = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
+    signed[inside] = null_vector(robot, q) @ np.asarray(offset, dtype=float)
+    image = ax.pcolormesh(x, y, torque, shading="gouraud", rasterized=True, vmin=0.0)
+    ax.contour(x, y, signed, levels=[0.0], colors="white", linewidths=1.6)
+    ax.figure.colorbar(image, ax=ax, label="norm of the rest torques in mN m", shrink=0.9)
+    if trajectory is not None:
+        plot_path(trajectory, ax, color="white", ls="--")
+    plane_axes(robot, ax)
+    ax.set(xlim=(np.nanmin(x), np.nanmax(x)), ylim=(np.nanmin(y), np.nanmax(y)), title=title)
+    ax.grid(visible=False)
+    return ax
+
+
+def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = ""):
+    """Torque of one drive with a stepped angle against its true angle, and the band that friction can hold.
+
+    K_P in N m/rad, quantum in rad, friction in N m; `target` is where the desired angle lies between two counts.
+    """
+    ax = axes_or_new(ax, figsize=(4.4, 3.4))
+    angle = np.linspace(-2.0, 3.0, 4001)
+    torque = -1e3 * K_P * quantum * (np.floor(angle + 0.5) - target)
+    held = np.abs(torque) <= 1e3 * friction
+    ax.axhspan(-1e3 * friction, 1e3 * friction, color="#DDE3EA", label="friction holds")
+    ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
+    for mask, look in ((~held, {"color": ALARM}), (held, {"color": AFTER, "lw": 3.5})):
+        label = "measured, rests here" if look["color"] == AFTER else "measured, is driven on"
+        steps = np.where(mask & (np.abs(np.gradient(torque)) == 0.0), torque, np.nan)
+        ax.plot(angle, steps, label=label if mask.any() else None, **look)
+    ax.axvline(target, color=NEUTRAL, lw=0.8)
+    ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
+    return ax
+
+
+def plot_chatter(ratio, chatter, can_rest, ax=None, title: str = ""):
+    """Torque ripple of many runs against K_P quantum / (2 f_c); open dots: a place of rest exists, crosses: none does.
+
+    ratio, can_rest : (k,) ; chatter : (k,) standard deviation of the torque over half its step.
+    """
+    ax = axes_or_new(ax)
+    ratio, chatter, can_rest = np.asarray(ratio), np.asarray(chatter), np.asarray(can_rest)
+    ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
+    ax.axvline(1.0, color=NEUTRAL, lw=1.0)
+    dots, crosses = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}, {"color": ALARM, "mew": 1.8, "ms": 7}
+    ax.plot(ratio[can_rest], chatter[can_rest], "o", label="a place of rest exists", **dots)
+    ax.plot(ratio[~can_rest], chatter[~can_rest], "x", label="no place of rest", **crosses)
+    ax.set(xscale="log", xlim=(ratio.min() / 1.15, ratio.max() * 1.15), ylim=(-0.06, 1.16), title=title,
+           xlabel="step of the torque over width of the friction band, K$_P$ quantum / (2 f$_c$)",
+           ylabel="torque ripple / half a step")
+    ax.legend(loc="center left")
+    return ax
+
+
+def plot_log(log, axes=None):
+    """A log: measured minus desired angles above, drive torques below, over time; returns both axes."""
+    if axes is None:
+        axes = axes_or_new(figsize=(8.0, 4.4), nrows=2, sharex=True)
+    for i in range(log.c.shape[1]):
+        axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
+        axes[1].plot(log.t, log.c[:, i], **arm_line(i))
+    axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=(0, log.t[-1]))
+    axes[1].set(xlabel="time in s", ylabel="torque in N m")
+    axes[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    return axes

@@ -1,0 +1,67 @@
+"""Rest under PD control with offsets and stepped angles, and the logs made for the exercises."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite.checks.mystery import K_P, hidden
+
+ROOT = Path(__file__).parents[1]
+QUANTUM = 2 * np.pi / 2000
+
+_spec = importlib.util.spec_from_file_location("make_mystery_runs", ROOT / "data" / "make_mystery_runs.py")
+script = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(script)
+
+
+def random_rests(seed, count):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield rng.uniform(-0.06, 0.06, 2), rng.uniform(-5e-3, 5e-3, 3)
+
+
+def test_rest_always_exists_below_the_threshold():
+    """K_P quantum <= 2 f_c: the friction of each drive alone covers the rounding of its own angle."""
+    robot = rk.load()
+    for x, offset in random_rests(1, 40):
+        q = rk.inverse_kinematics(robot, x)
+        assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, offset, QUANTUM, 4.2e-3)
+        assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
+
+
+def test_runs_without_a_place_of_rest_keep_moving():
+    """Independent route: the simulated machine with sharp Coulomb friction, at three times the threshold."""
+    robot = rk.load().replace(friction_velocity=3e-5)
+    gain = 3 * 2 * 4.2e-3 / QUANTUM
+    lively = 0
+    for x, offset in random_rests(2, 12):
+        path = rk.hold(robot, x, 1.2, 1e-4)
+        run = rk.simulate(robot, rk.PD(gain, 0.24), path, offset, encoder=2000)
+        if not rk.rest_exists(robot, path.q[0], gain, offset, QUANTUM, 4.2e-3):
+            lively += 1
+            assert run.c[-4000:].std(axis=0).max() > 0.5 * gain * QUANTUM / 2
+    assert lively >= 4
+
+
+@pytest.mark.parametrize("name", script.SIDES)
+def test_log_in_the_repository_is_the_one_the_script_makes(name):
+    log = rk.mystery_run(name)
+    stored = np.column_stack([log.t, log.q_a, log.q_a_desired, log.c])
+    np.testing.assert_allclose(stored, script.record(name), atol=6e-5)  # rounding of the last printed digit
+    assert (ROOT / "data" / "mystery_runs" / f"{name}.csv").stat().st_size < 150_000
+
+
+def test_rest_at_one_place_tells_the_offset_along_the_null_vector_only():
+    log, robot = rk.mystery_run("offset_c"), rk.load()
+    n = rk.null_vector(robot, rk.inverse_kinematics(robot, [0.04, -0.05]))
+    offset, _ = hidden("offset_c")
+    found = -n @ log.c[log.t > 1.0].mean(axis=0) / K_P
+    assert abs(found - n @ offset) < 1e-4 and np.linalg.norm(offset - n * found) > 3e-3
+
+
+def test_unknown_log_names_what_is_allowed():
+    with pytest.raises(ValueError, match=r"name = 'offset_x'; allowed: offset_a, offset_b, offset_c, gain"):
+        rk.mystery_run("offset_x")
