@@ -1,0 +1,196 @@
+"""Constraints, Jacobians, inverse kinematics, closing of the loops: identities, finite differences, facts of geometry."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import MODES, TESTBED, along, machines, modes, norm, random_motion, random_points
+from scipy.optimize import least_squares, minimize
+
+import rapkm_lite as rk
+
+
+# Identities on V.
+@machines
+def test_inverse_kinematics_closes_the_loops_and_forward_kinematics_inverts_it(robot):
+    x = random_points(robot, 500)
+    for mode in rk.working_modes(robot):
+        q = rk.inverse_kinematics(robot, x, mode)
+        assert np.abs(rk.loop_constraints(robot, q)).max() < 1e-15
+        assert_allclose(rk.forward_kinematics(robot, q), x, atol=1e-15)
+        assert np.array_equal(rk.working_mode(robot, q), np.broadcast_to(mode, (500, robot.n_arms)))
+        assert np.abs(q).max() <= np.pi
+
+
+def test_constraints_are_ordered_tip1_tip3_minus_tip2():
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    l, B = 0.2, TESTBED.base
+    tips = [B[i] + l * np.array([np.cos(q[i]) + np.cos(q[i] + q[3 + i]), np.sin(q[i]) + np.sin(q[i] + q[3 + i])])
+            for i in range(3)]
+    assert_allclose(rk.loop_constraints(TESTBED, q), np.concatenate([tips[0] - tips[1], tips[2] - tips[1]]), atol=1e-16)
+    assert_allclose(rk.tips(TESTBED, q), tips, atol=1e-16)
+
+
+def test_centroid_pose_from_trigonometry():
+    # Distance 0.4/sqrt(3) from each base, two equal links: cos(elbow) = D^2 / (2 l^2) - 1 = -1/3.
+    q = rk.inverse_kinematics(TESTBED, [0.0, 0.0])
+    assert_allclose(np.cos(q[3:]), -1 / 3, atol=1e-15)
+    towards = np.arctan2(*(-TESTBED.base).T[::-1])
+    assert_allclose(rk.working_mode(TESTBED, q), 1)
+    assert_allclose(np.cos(q[:3] - (towards - q[3:] / 2)), 1.0, atol=1e-15)
+
+
+# Derivatives against finite differences.
+@machines
+def test_jacobian_is_the_derivative_of_the_constraints(robot):
+    q = np.random.default_rng(1).uniform(-3, 3, (200, robot.n_joints))
+    J = np.stack([along(lambda p: rk.loop_constraints(robot, p), q, e, 1e-2) for e in np.eye(robot.n_joints)], axis=-1)
+    assert_allclose(rk.constraint_jacobian(robot, q), J, atol=1e-12)
+
+
+@machines
+def test_jacobian_rate_is_the_derivative_of_the_jacobian(robot):
+    q, qd = np.random.default_rng(2).uniform(-3, 3, (2, 200, robot.n_joints))
+    fd = along(lambda p: rk.constraint_jacobian(robot, p), q, qd, 1e-3)
+    assert_allclose(rk.constraint_jacobian_dot(robot, q, qd), fd, atol=1e-11)
+
+
+@modes
+def test_end_effector_complement_and_rate_per_mode(mode):
+    q, qd, _, (x, xd, _) = random_motion(TESTBED, 1000, mode, bend=0.2)
+    pose = lambda p: rk.inverse_kinematics(TESTBED, p, mode)  # noqa: E731
+    F = rk.orthogonal_complement(TESTBED, q)
+    assert (norm(rk.constraint_jacobian(TESTBED, q) @ F) / norm(F)).max() < 1e-15
+    # The angles themselves wrap, their sines and cosines do not.
+    rate = along(lambda p: np.stack([np.cos(pose(p)), np.sin(pose(p))]), x, xd, 5e-5)
+    assert_allclose(np.cos(q) * rate[1] - np.sin(q) * rate[0], qd, atol=1e-8)
+    fd = along(lambda p: rk.orthogonal_complement(TESTBED, pose(p)), x, xd, 5e-5)
+    F_dot = rk.orthogonal_complement_dot(TESTBED, q, qd)
+    assert (norm(F_dot - fd) / np.maximum(norm(F_dot), 1)).max() < 1e-7
+
+
+# Degree of freedom and singularities of V.
+@machines
+def test_degree_of_freedom_is_two_at_regular_poses(robot):
+    q = rk.inverse_kinematics(robot, random_points(robot, 200))
+    assert np.all(rk.constraint_rank(robot, q) == robot.n_constraints)
+    assert np.all(rk.degree_of_freedom(robot, q) == 2)
+
+
+def test_corners_of_the_workspace_are_c_space_singularities():
+    # At B1 arm 1 is folded and arms 2 and 3 are stretched: forces along the three arms balance, so rows of J depend.
+    q = rk.inverse_kinematics(TESTBED, TESTBED.base[0])
+    free = q + np.array([0.7, 0, 0, 0, 0, 0])
+    for pose in (q, free):
+        assert np.abs(rk.loop_constraints(TESTBED, pose)).max() < 1e-15
+        assert rk.degree_of_freedom(TESTBED, pose) == 3
+        assert np.array_equal(rk.working_mode(TESTBED, pose), [0, 0, 0])
+        with pytest.raises(ValueError, match="c-space singularity"):
+            rk.nullspace_projector(TESTBED, pose)
+    # One arm stretched alone is the boundary of the workspace, but a regular point of V.
+    edge = TESTBED.base[0] + 0.4 * np.array([np.cos(0.5), np.sin(0.5)])
+    assert rk.degree_of_freedom(TESTBED, rk.inverse_kinematics(TESTBED, edge)) == 2
+
+
+# Closing the loops.
+@machines
+def test_close_loops_finds_the_nearest_configuration(robot):
+    rng = np.random.default_rng(3)
+    rough = rk.inverse_kinematics(robot, random_points(robot, 20, bend=0.3)) + rng.normal(0, 0.1, (20, robot.n_joints))
+    q = rk.close_loops(robot, rough)
+    assert np.abs(rk.loop_constraints(robot, q)).max() < 1e-13
+    # Stationary: the way to the rough pose is normal to V.
+    assert np.abs(np.einsum("kij,ki->kj", rk.nullspace_projector(robot, q), q - rough)).max() < 1e-12
+    for found, start in zip(q[:5], rough[:5], strict=True):
+        peer = minimize(lambda p, s=start: ((p - s) ** 2).sum(), start, method="SLSQP", tol=1e-14,
+                        constraints={"type": "eq", "fun": lambda p: rk.loop_constraints(robot, p)})
+        assert_allclose(found, peer.x, atol=1e-6)
+
+
+def test_close_loops_is_a_projection():
+    q = rk.inverse_kinematics(TESTBED, random_points(TESTBED, 100))
+    assert_allclose(rk.close_loops(TESTBED, q), q, atol=1e-13)
+    rough = q + np.random.default_rng(4).normal(0, 0.2, q.shape)
+    once = rk.close_loops(TESTBED, rough)
+    assert_allclose(rk.close_loops(TESTBED, once), once, atol=1e-13)
+
+
+def test_close_loops_from_half_a_radian_off():
+    rng = np.random.default_rng(5)
+    x = random_points(TESTBED, 200, seed=5)
+    q = rk.inverse_kinematics(TESTBED, x, rng.choice([-1, 1], (200, 3)))
+    for start in q + rng.uniform(-0.3, 0.3, q.shape):
+        assert np.abs(rk.loop_constraints(TESTBED, rk.close_loops(TESTBED, start))).max() < 1e-13
+
+
+def test_close_loops_says_where_it_gave_up():
+    with pytest.raises(rk.ConvergenceError, match=r"closure error is .* m"):
+        rk.close_loops(TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]))
+
+
+# Pose from over-determined base angles.
+@machines
+def test_pose_of_consistent_angles_is_exact(robot):
+    x = random_points(robot, 50, bend=0.3)
+    A_tilde = rk.redundant_control_matrix(robot, rk.inverse_kinematics(robot, x))
+    x = x[np.linalg.svd(A_tilde, compute_uv=False)[:, 1] > 0.1]
+    q = rk.inverse_kinematics(robot, x)
+    assert_allclose(rk.estimate_pose(robot, q[:, : robot.n_arms] + 2 * np.pi, x + 0.002), q, atol=1e-11)
+
+
+def test_pose_of_contradicting_angles_is_the_least_squares_one():
+    x, offset = np.array([0.03, -0.02]), np.array([0.02, -0.01, 0.03])
+    q_a = rk.inverse_kinematics(TESTBED, x)[:3] + offset
+    q = rk.estimate_pose(TESTBED, q_a, x)
+    peer = least_squares(lambda p: rk.inverse_kinematics(TESTBED, p)[:3] - q_a, x, jac="3-point", xtol=1e-15, gtol=1e-14)
+    assert_allclose(rk.forward_kinematics(TESTBED, q), peer.x, atol=1e-9)
+    # To first order the error is that of the filter: R offset.
+    R = rk.antagonism_filter(rk.control_matrix(TESTBED, q))
+    assert_allclose(R @ (q_a - q[:3]), 0, atol=1e-12)
+
+
+def test_pose_fails_loudly():
+    with pytest.raises(rk.ConvergenceError, match="outside the workspace"):
+        rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [0.0, 0.0])
+    with pytest.raises(rk.ConvergenceError, match="outside the workspace"):
+        rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [1.0, 0.0])
+
+
+# Facts of reference: the shape of the workspace.
+def test_workspace_is_the_reuleaux_triangle_on_the_base_points():
+    x, y, inside = rk.workspace_grid(TESTBED, 1000)
+    cell = (x[1] - x[0]) * (y[1] - y[0])
+    assert_allclose(inside.sum() * cell, (np.pi - np.sqrt(3)) / 2 * 0.4**2, rtol=2e-3)
+    angle = np.linspace(0, np.pi / 3, 50)
+    for i in range(3):
+        start = np.arctan2(*(TESTBED.base[(i + 1) % 3] - TESTBED.base[i])[::-1])
+        rim = TESTBED.base[i] + 0.4 * np.stack([np.cos(start + angle), np.sin(start + angle)], axis=-1)
+        centre = TESTBED.base.mean(axis=0)
+        assert np.all(rk.reachable(TESTBED, centre + 0.999999 * (rim - centre)))
+        assert not np.any(rk.reachable(TESTBED, centre + 1.000001 * (rim - centre)))
+
+
+def test_turning_the_machine_by_a_third_permutes_the_arms():
+    turn = np.array([[-0.5, -np.sqrt(0.75)], [np.sqrt(0.75), -0.5]])
+    x = random_points(TESTBED, 100)
+    q, turned = rk.inverse_kinematics(TESTBED, x), rk.inverse_kinematics(TESTBED, x @ turn.T)
+    for i in range(3):  # arm i takes the place of arm i + 1
+        j = (i + 1) % 3
+        assert_allclose(np.cos(turned[:, j] - q[:, i] - 2 * np.pi / 3), 1, atol=1e-14)
+        assert_allclose(turned[:, 3 + j], q[:, 3 + i], atol=1e-12)
+
+
+# Leading axes.
+def test_one_pose_and_a_trajectory_are_the_same_call():
+    q, qd, _, (x, _, _) = random_motion(TESTBED, 12)
+    for f, *args in ((rk.loop_constraints, q), (rk.constraint_jacobian, q), (rk.constraint_jacobian_dot, q, qd),
+                     (rk.forward_kinematics, q), (rk.tips, q), (rk.working_mode, q), (rk.inverse_kinematics, x),
+                     (rk.reachable, x), (rk.constraint_rank, q), (rk.degree_of_freedom, q), (rk.close_loops, q + 0.01),
+                     (rk.estimate_pose, q[:, :3] + [0.01, 0, -0.01], x)):
+        whole = f(TESTBED, *args)
+        single = np.stack([f(TESTBED, *(a[k] for a in args)) for k in range(12)])
+        block = f(TESTBED, *(a.reshape(3, 4, -1) for a in args))
+        assert_allclose(whole, single, atol=1e-13, err_msg=f.__name__)
+        assert_allclose(block.reshape(whole.shape), single, atol=1e-13, err_msg=f.__name__)
+        assert f(TESTBED, *(a[:0] for a in args)).shape == (0, *whole.shape[1:])
+    assert rk.inverse_kinematics(TESTBED, x[0], MODES).shape == (8, 6)
+    assert rk.arm_vectors(TESTBED, q)[0].shape == (12, 3, 2)
