@@ -141,7 +141,7 @@ def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     try:
         return np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
-        raise ValueError(f"{what} is singular; allowed: regular poses of a machine whose links have inertia") from None
+        raise ValueError(f"{what} is singular; allowed: a regular matrix, so another pose") from None
 
 
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:

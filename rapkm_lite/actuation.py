@@ -18,7 +18,6 @@ from ._arguments import (
     positive_definite,
     positive_number,
     real_array,
-    solve,
     tall_matrix,
     transpose,
     wide_matrix,
@@ -69,7 +68,7 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
     Raises ValueError where the choice of independent coordinates is singular.
     """
     Gbar, _, _ = minimal_dynamics(robot, q, np.zeros(robot.n_joints), independent)
-    return solve("Gbar", Gbar, transpose(control_matrix(robot, q, independent)))
+    return np.linalg.solve(Gbar, transpose(control_matrix(robot, q, independent)))
 
 
 def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
@@ -227,7 +226,7 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
     check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
     force = matvec(transpose(A) @ K, offset) + wrench
-    return -matvec(A, solve("A^T K_P A", transpose(A) @ K @ A, force[..., None])[..., 0])
+    return -matvec(A, np.linalg.solve(transpose(A) @ K @ A, force[..., None])[..., 0])
 
 
 def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:

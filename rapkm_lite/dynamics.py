@@ -14,7 +14,6 @@ from ._arguments import (
     matvec,
     positive_number,
     real_array,
-    solve,
     transpose,
 )
 from .kinematics import (
@@ -205,7 +204,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
     saddle[..., :n, :n], saddle[..., :n, n:], saddle[..., n:, :n] = G, transpose(J), J
     right = np.zeros((*lead, n + r))
     right[..., :n], right[..., n:] = rhs, -matvec(J_dot, qd)
-    solution = solve("the mass matrix on the tangent space of V", saddle, right[..., None])[..., 0]
+    solution = np.linalg.solve(saddle, right[..., None])[..., 0]
     return solution[..., :n], solution[..., n:]
 
 

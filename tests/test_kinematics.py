@@ -1,4 +1,4 @@
-"""Constraints, Jacobians, inverse kinematics, closing of the loops: identities, finite differences, facts of geometry."""
+"""Constraints, Jacobians, inverse kinematics, closing the loops: identities, finite differences, geometry."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ def test_inverse_kinematics_closes_the_loops_and_forward_kinematics_inverts_it(r
 
 def test_constraints_are_ordered_tip1_tip3_minus_tip2():
     q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    l, B = 0.2, TESTBED.base
-    tips = [B[i] + l * np.array([np.cos(q[i]) + np.cos(q[i] + q[3 + i]), np.sin(q[i]) + np.sin(q[i] + q[3 + i])])
+    length, B = 0.2, TESTBED.base
+    tips = [B[i] + length * np.array([np.cos(q[i]) + np.cos(q[i] + q[3 + i]), np.sin(q[i]) + np.sin(q[i] + q[3 + i])])
             for i in range(3)]
     assert_allclose(rk.loop_constraints(TESTBED, q), np.concatenate([tips[0] - tips[1], tips[2] - tips[1]]), atol=1e-16)
     assert_allclose(rk.tips(TESTBED, q), tips, atol=1e-16)
@@ -141,7 +141,8 @@ def test_pose_of_contradicting_angles_is_the_least_squares_one():
     x, offset = np.array([0.03, -0.02]), np.array([0.02, -0.01, 0.03])
     q_a = rk.inverse_kinematics(TESTBED, x)[:3] + offset
     q = rk.estimate_pose(TESTBED, q_a, x)
-    peer = least_squares(lambda p: rk.inverse_kinematics(TESTBED, p)[:3] - q_a, x, jac="3-point", xtol=1e-15, gtol=1e-14)
+    misfit = lambda p: rk.inverse_kinematics(TESTBED, p)[:3] - q_a  # noqa: E731
+    peer = least_squares(misfit, x, jac="3-point", xtol=1e-15, gtol=1e-14)
     assert_allclose(rk.forward_kinematics(TESTBED, q), peer.x, atol=1e-9)
     # To first order the error is that of the filter: R offset.
     R = rk.antagonism_filter(rk.control_matrix(TESTBED, q))
