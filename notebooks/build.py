@@ -20,6 +20,7 @@ import nbformat
 
 HERE = Path(__file__).resolve().parent
 SOLUTIONS = HERE / "solutions"
+WIDGET = "application/vnd.jupyter.widget-view+json"
 _SOLUTION = re.compile(r"^([ \t]*)### BEGIN SOLUTION *\n(.*?)^[ \t]*### END SOLUTION *\n?", re.M | re.S)
 
 
@@ -46,6 +47,12 @@ def student(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return copy
 
 
+def bare_widget(output: nbformat.NotebookNode) -> bool:
+    """True for a widget with nothing but its repr beside it, of which nothing is left without a kernel."""
+    data = output.get("data", {})
+    return WIDGET in data and set(data) <= {WIDGET, "text/plain"}
+
+
 def tidy(notebook: nbformat.NotebookNode) -> None:
     """Keep what a reader sees: no widget state, no time stamps, no versions of this machine."""
     notebook.metadata = nbformat.from_dict({
@@ -56,7 +63,9 @@ def tidy(notebook: nbformat.NotebookNode) -> None:
         cell.id = f"cell-{number:02d}"
         cell.metadata = nbformat.from_dict({"tags": cell.metadata["tags"]} if cell.metadata.get("tags") else {})
         if cell.cell_type == "code":
-            cell.outputs = [o for o in cell.outputs if "application/vnd.jupyter.widget-view+json" not in o.get("data", {})]
+            cell.outputs = [o for o in cell.outputs if not bare_widget(o)]
+            for output in cell.outputs:
+                output.get("data", {}).pop(WIDGET, None)
 
 
 def execute(path: Path, strict: bool) -> None:

@@ -1,0 +1,229 @@
+"""Explorers without a simulation: the machine, the degree of actuation along a path, prestress."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from .. import actuation as act
+from .._arguments import matvec
+from ..kinematics import inverse_kinematics, reachable, working_modes
+from ..manipulator import Manipulator
+from ..plotting.machine import plane_grid, plot_workspace
+from ..plotting.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
+from ..trajectory import circle, triangle
+from .builder import Explorer, choice, explorer, slider
+from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive, plane_limits
+
+# Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
+WEAK = 1.5
+
+
+def mode_word(mode) -> str:
+    """A working mode as signs."""
+    return " ".join("+" if s > 0 else "−" for s in mode)
+
+
+def pair_word(pair) -> str:
+    """A pair of drives (0-based) as printed, counted from 1."""
+    return f"({pair[0] + 1},{pair[1] + 1})"
+
+
+def pair_style(robot: Manipulator, pair) -> dict:
+    """Line of a pair: that of the arm left out, because that drive carries no prestress where the pair is singular."""
+    left_out = [i for i in range(robot.n_arms) if i not in pair]
+    return arm_line(left_out[0] if left_out else 0)
+
+
+def pair_legend(ax, robot: Manipulator) -> None:
+    """A legend of the first pairs' lines."""
+    pairs = act.drive_pairs(robot)[:4]
+    legend(ax, [("pair " * (i == 0) + pair_word(p), pair_style(robot, p)) for i, p in enumerate(pairs)])
+
+
+def sigma_pairs(robot: Manipulator, q) -> np.ndarray:
+    """Smallest singular value of A for each pair of drives alone, (..., pairs) in rad/m."""
+    A = act.control_matrix(robot, q)
+    return np.stack([act.singular_values(A[..., list(p), :])[..., 1] for p in act.drive_pairs(robot)], axis=-1)
+
+
+def machine(robot: Manipulator | None = None) -> Explorer:
+    """The end-effector by two sliders in every working mode, a map of sigma_min, and the five-bar of each pair."""
+    robot = frictionless(robot)
+    pairs = act.drive_pairs(robot)[:3]
+    modes = {mode_word(m): m for m in working_modes(robot)}
+    which = ["all drives", *(f"pair {pair_word(p)}" for p in pairs)]
+    gx, gy = plane_grid(robot, 121)
+    grid = np.stack([gx, gy], axis=-1)
+    extent = gx[0, 0], gx[0, -1], gy[0, 0], gy[-1, 0]
+    inside = reachable(robot, grid)
+
+    @lru_cache(maxsize=64)
+    def sigma_map(mode: str, drives: str) -> np.ma.MaskedArray:
+        A = act.control_matrix(robot, inverse_kinematics(robot, grid[inside], modes[mode]))
+        rows = slice(None) if drives == which[0] else list(pairs[which.index(drives) - 1])
+        values = np.ma.masked_all(gx.shape)
+        values[inside] = np.minimum(np.floor(act.singular_values(A[:, rows])[:, 1] / 0.75) * 0.75, 7.5)
+        return values
+
+    def draw(picture, x, y, mode, drives):
+        sigma = sigma_map(mode, drives)
+        picture.image("machine", sigma, extent, cmap="cividis", clim=(0.0, 7.5), alpha=0.75)
+        point = 1e-3 * np.array([x, y])
+        picture.line("machine", *point, color=ALARM, marker="x", markersize=9, zorder=6)
+        q = inverse_kinematics(robot, point, modes[mode])
+        all_drives = act.singular_values(act.control_matrix(robot, q))[1]
+        draw_machine(picture, "machine", robot, q)
+        numbers = {"degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
+                   "σ_min of all drives": f"{all_drives:.2f} rad/m"}
+        for pair, name, value in zip(pairs, "abc", sigma_pairs(robot, q), strict=False):
+            weak = value < WEAK
+            draw_machine(picture, name, robot, q, arms=pair)
+            picture.text(name, 0.5, 1.02, f"pair {pair_word(pair)}: {value:.2f} rad/m", inside=True, ha="center",
+                         fontsize=10, fontweight="bold" if weak else "normal", color=ALARM if weak else AFTER)
+            numbers[f"σ_min of {pair_word(pair)}"] = f"{value:.2f} rad/m"
+        return numbers
+
+    plane = plane_limits(robot)
+    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {"xticks": [], "yticks": [], "title": " "}
+    panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
+
+    def setup(axes):
+        colours = axes["machine"].figure.colorbar(mappable(0.0, 7.5), ax=axes["machine"], shrink=0.85, pad=0.02)
+        colours.set_label("σ_min in rad/m")
+
+    controls = {"x": slider("x in mm", -200, 200, 2, 20), "y": slider("y in mm", -200, 230, 2, 30),
+                "mode": choice("working mode", modes), "drives": choice("map for", which)}
+    rows = [["machine", name] for name in "abc"[: len(pairs)]]
+    return explorer(draw, controls, panels, layout=rows, widths=[3.2, 1], size=(7.6, 5.4), setup=setup, live=True)
+
+
+def mappable(low: float, high: float):
+    """Colours for a colour bar."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(low, high), "cividis")
+
+
+def zonotope(generators: np.ndarray) -> np.ndarray:
+    """Corners (2m, 2) of the set of all sums of t_i g_i with |t_i| <= 1, for generators g (m, 2), counter-clockwise."""
+    x, y = generators[:, :1], generators[:, 1:]
+    up = np.where((y < 0) | ((y == 0) & (x < 0)), -generators, generators)
+    up = up[np.argsort(np.arctan2(up[:, 1], up[:, 0]))]
+    half = -up.sum(axis=0) + 2 * np.cumsum(up, axis=0)
+    return np.concatenate([half, -half])
+
+
+def actuation(robot: Manipulator | None = None) -> Explorer:
+    """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce."""
+    robot = frictionless(robot)
+    pairs = act.drive_pairs(robot)
+    paths = {"triangle": triangle, "circle": circle}
+
+    @lru_cache(maxsize=8)
+    def along(path: str, size: int):
+        size = 1e-3 * size
+        t = triangle(robot, size, dt=0.01) if path == "triangle" else circle(robot, size / 2, dt=0.01)
+        A = act.control_matrix(robot, t.q)
+        projector = act.prestress_projector(A)
+        null = act.null_vector(robot, t.q) if robot.n_arms == 3 else np.sqrt(np.diagonal(projector, axis1=-2, axis2=-1))
+        return t, A, sigma_pairs(robot, t.q), null
+
+    def draw(picture, place, path, size, torque):
+        t, A, sigma, null = along(path, size)
+        k = round(place / 100 * (len(t) - 1))
+        share = np.linspace(0, 100, len(t))
+        picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
+        draw_machine(picture, "plane", robot, t.q[k])
+        for i, pair in enumerate(pairs):
+            style = pair_style(robot, pair)
+            picture.line("sigma", share, sigma[:, i], **style)
+            picture.line("sigma", place, sigma[k, i], marker="o", markersize=6, color=style["color"], zorder=4)
+        for i in range(robot.n_arms):
+            picture.line("null", share, null[:, i], **arm_line(i))
+            picture.line("null", place, null[k, i], marker="o", markersize=6, color=arm_colour(i), zorder=4)
+        for panel in ("sigma", "null"):
+            picture.line(panel, [place, place], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.8, zorder=1)
+        corners = zonotope(torque * 1e-3 * A[k])
+        for pair in pairs:
+            picture.polygon("force", zonotope(torque * 1e-3 * A[k][list(pair)]), fill=False, linewidth=1.5,
+                            edgecolor=pair_style(robot, pair)["color"], linestyle=pair_style(robot, pair)["linestyle"])
+        picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
+        bound = np.abs(corners).max()
+        picture.fit("force", bound)
+        picture.limits("force", x=picture.axes["force"].get_ylim())
+        worst = np.unravel_index(np.argmin(sigma), sigma.shape)
+        return {"point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
+                "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
+                "σ_min of the pairs": per_drive(sigma[k], 2) + " rad/m",
+                "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_word(pairs[worst[1]])}",
+                "null vector": per_drive(null[k], 2)}
+
+    def setup(axes):
+        plot_workspace(robot, axes["plane"])
+        pair_legend(axes["sigma"], robot)
+        drive_legend(axes["null"], robot)
+        legend(axes["force"], [("all drives", {"color": AFTER})])
+
+    way = "place on the path in %"
+    panels = {"plane": plane_limits(robot) | {"title": "Machine"},
+              "sigma": {"title": "Pairs", "xlabel": way, "ylabel": "σ_min in rad/m", "xlim": (0, 100), "ylim": (0, 8)},
+              "null": {"title": "Null vector", "xlabel": way, "ylabel": "component", "xlim": (0, 100),
+                       "ylim": (-1.05, 1.05)},
+              "force": {"title": "Forces", "xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal",
+                        "xlim": (-2, 2), "ylim": (-2, 2)}}
+    controls = {"place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0), "path": choice("path", paths.keys()),
+                "size": slider("side or diameter in mm", 40, 320, 5, 240),
+                "torque": slider("torque limit in N mm", 20, 200, 5, 85)}
+    return explorer(draw, controls, panels, layout=[["plane", "sigma"], ["force", "null"]], widths=[1, 1.35],
+                    size=(9.2, 6.6), setup=setup, live=True)
+
+
+def prestress(robot: Manipulator | None = None) -> Explorer:
+    """Prestress along the path: torques with and without it, and the changes of sign that let backlash act."""
+    robot = frictionless(robot)
+
+    @lru_cache(maxsize=8)
+    def along(side: int):
+        t = triangle(robot, 1e-3 * side, dt=0.005)
+        A = act.control_matrix(robot, t.q)
+        return t, act.inverse_dynamics(robot, t.q, t.qd, t.qdd), act.prestress_projector(A)
+
+    def draw(picture, level, side):
+        t, least, projector = along(side)
+        wish = 1e-3 * level * np.ones(robot.n_arms)
+        stress = matvec(projector, wish)
+        c = least + stress
+        for i in range(robot.n_arms):
+            picture.line("without", t.t, 1e3 * least[:, i], **arm_line(i))
+            picture.line("with", t.t, 1e3 * c[:, i], **arm_line(i))
+        top = 1e3 * max(np.abs(c).max(), np.abs(least).max())
+        for panel in ("without", "with"):
+            picture.fit(panel, top)
+            picture.line(panel, t.t[[0, -1]], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=1)
+        energy = [t.dt * np.sum(robot.resistance * (v / robot.torque_constant) ** 2) for v in (least, c)]
+        changes = [sign_changes(v) for v in (least, c)]
+        return {"changes of sign without": per_drive(changes[0], 0), "with": per_drive(changes[1], 0),
+                "heat without": f"{energy[0]:.2f} J", "heat with": f"{energy[1]:.2f} J",
+                "largest prestress": f"{1e3 * np.abs(stress).max():.0f} N mm"}
+
+    def setup(axes):
+        drive_legend(axes["without"], robot)
+        drive_legend(axes["with"], robot)
+
+    panels = {name: {"title": title, "xlabel": TIME, "ylabel": "torque in N mm", "xlim": (0, 5), "ylim": (-100, 100)}
+              for name, title in (("without", "No prestress"), ("with", "With prestress"))}
+    controls = {"level": slider("prestress wished for in N mm", -100, 100, 2, 40),
+                "side": slider("side of the triangle in mm", 60, 300, 5, 240)}
+    return explorer(draw, controls, panels, setup=setup, live=True)
+
+
+def sign_changes(c: np.ndarray) -> np.ndarray:
+    """How often each column of c (k, m) changes its sign, zeros not counted, (m,)."""
+    count = []
+    for column in c.T:
+        signs = np.sign(column[np.abs(column) > 1e-9])
+        count.append(int(np.count_nonzero(np.diff(signs))))
+    return np.array(count)

@@ -1,0 +1,69 @@
+"""Explorer that plays a run: the mechanism with the forces of its drives, and a time that all panels share."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from .. import actuation as act
+from ..control import PD
+from ..manipulator import Manipulator
+from ..plotting.machine import plot_path, plot_workspace
+from ..plotting.style import AFTER, NEUTRAL, arm_colour, arm_line
+from ..simulation import simulate
+from ..trajectory import triangle
+from .builder import Explorer, choice, explorer, slider, switch
+from .parts import TIME, draw_machine, drive_legend, frictionless, plane_limits
+from .runs import LAWS
+
+
+def animation(robot: Manipulator | None = None) -> Explorer:
+    """The machine moves along the triangle; arrows are the forces of the drives at the end-effector."""
+    robot = frictionless(robot)
+    N = robot.n_arms
+    path = triangle(robot)
+    calibration = {False: np.zeros(N), True: 1e-3 * np.resize([-5.0, -6.0, 12.0], N)}
+
+    @lru_cache(maxsize=8)
+    def recorded(filter: str, offsets: bool):
+        run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, calibration[offsets])
+        A = act.control_matrix(robot, run.q)
+        return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
+
+    def draw(picture, time, filter, offsets):
+        run, force, error = recorded(filter, offsets)
+        k = min(round(1e-3 * time / run.dt), len(run.t) - 1)
+        draw_machine(picture, "plane", robot, run.q[k])
+        # 0.1 m of arrow for 1 N.
+        for i in range(N):
+            picture.arrow("plane", run.x[k], 0.1 * force[k, i], facecolor=arm_colour(i), edgecolor="white", zorder=6)
+        total = force[k].sum(axis=0)
+        picture.arrow("plane", run.x[k], 0.1 * total, facecolor=AFTER, edgecolor="white", zorder=7)
+        for panel, values in (("torque", 1e3 * run.c), ("error", error[:, None])):
+            for i, column in enumerate(values.T):
+                style = arm_line(i) if panel == "torque" else {"color": AFTER}
+                picture.trace(panel, run.t, column, **style)
+                picture.line(panel, run.t[k], column[k], marker="o", markersize=6, color=style["color"], zorder=5)
+            picture.fit(panel, values, symmetric=panel == "torque", least=0.5)
+            picture.line(panel, run.t[[k, k]], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.9, zorder=1)
+        antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
+        return {"time": f"{run.t[k]:.2f} s", "force on the end-effector": f"{np.hypot(*total):.2f} N",
+                "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
+                "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} N mm",
+                "path error": f"{error[k]:.2f} mm"}
+
+    def setup(axes):
+        plot_workspace(robot, axes["plane"])
+        plot_path(path, axes["plane"])
+        axes["plane"].set(**plane)
+        drive_legend(axes["torque"], robot)
+
+    plane = plane_limits(robot) | {"title": "Machine; arrows: 0.1 m for 1 N"}
+    time = {"xlabel": TIME, "xlim": (0, 5)}
+    panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in N mm", **time},
+              "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}
+    controls = {"time": slider("time in ms", 0, 5000, 40, 400), "filter": choice("antagonism filter", LAWS.keys()),
+                "offsets": switch("calibration offsets −5, −6, 12 mrad", True)}
+    return explorer(draw, controls, panels, layout=[["plane", "torque"], ["plane", "error"]], size=(9.2, 4.8),
+                    setup=setup, play="time")
