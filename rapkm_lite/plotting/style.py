@@ -34,5 +34,8 @@ def axes_or_new(ax=None, **figure):
     """The given axes, or the axes of a new figure in the collection's style."""
     if ax is not None:
         return ax
+    # The figure comes first: a backend that is loaded inside a style context is not interactive when the context ends,
+    # and a notebook would show no figure any more.
+    fig = plt.figure(layout="constrained", **({"figsize": (8.0, 3.2)} | figure))
     with mpl.style.context(STYLE):
-        return plt.subplots(**figure)[1]
+        return fig.add_subplot()
