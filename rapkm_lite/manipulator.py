@@ -99,8 +99,8 @@ class Manipulator:
         J_a, J_d, P = self.arm_inertias.T
         if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(
-                f"inertias = {given['inertias'].tolist()} with masses and centers leave an arm without resistance to some "
-                "motion; allowed: values with a positive definite mass matrix"
+                f"inertias = {given['inertias'].tolist()} with masses and centers let an arm move freely; "
+                "allowed: values with a positive definite mass matrix"
             )
         if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
             raise ValueError(

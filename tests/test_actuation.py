@@ -1,0 +1,384 @@
+"""Actuation: degree, singularities, inverse dynamics, filters, explicit pseudoinverse, steady state, maps."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import FRICTIONLESS, MACHINES, MODES, TESTBED, machines, modes, norm, random_motion, random_points
+from scipy.optimize import brentq, minimize, root
+
+import rapkm_lite as rk
+
+T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
+PAIRS = [(0, 1), (0, 2), (1, 2)]
+MIDPOINTS = [(TESTBED.base[i] + TESTBED.base[(i + 1) % 3]) / 2 for i in range(3)]
+EQUAL_SIGNS = MODES[np.abs(MODES.sum(axis=1)) == 3]
+MIXED = MODES[np.abs(MODES.sum(axis=1)) < 3]
+
+
+def singular_points(mode):
+    """Minima of sigma_min over the workspace that reach zero, found from a map and polished."""
+    x, y, sigma = rk.actuation_map(TESTBED, mode=mode, n=50)
+
+    def value(p):
+        if not rk.reachable(TESTBED, p):
+            return 1.0
+        A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, p, mode))
+        return np.linalg.svd(A_tilde, compute_uv=False)[1]
+
+    inner = sigma.filled(9.0)
+    dips = [(i, j) for i in range(1, 49) for j in range(1, 49)
+            if inner[i, j] < 0.2 and inner[i, j] <= inner[i - 1 : i + 2, j - 1 : j + 2].min()]
+    found = [minimize(value, [x[j], y[i]], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12})
+             for i, j in dips]
+    return [f.x for f in found if f.fun < 1e-6]
+
+
+# (8)-(10)
+@machines
+def test_control_vector_fields_are_the_accelerations_per_torque(robot):
+    robot = robot.replace(friction=0.0, gravity=[0, 0])
+    q = rk.inverse_kinematics(robot, random_points(robot, 30))
+    fields = rk.control_vector_fields(robot, q)
+    F = rk.orthogonal_complement(robot, q)
+    for i, c in enumerate(np.eye(robot.n_arms)):
+        qdd, _ = rk.forward_dynamics(robot, q, 0 * q, c)
+        assert_allclose(np.einsum("kij,kj->ki", F, fields[..., i]), qdd, rtol=1e-8, atol=1e-7 * np.abs(qdd).max())
+
+
+@machines
+def test_degree_of_actuation_is_the_rank_of_the_control_vector_fields(robot):
+    q = rk.inverse_kinematics(robot, random_points(robot, 100))
+    rank = np.linalg.matrix_rank(rk.control_vector_fields(robot, q))
+    assert np.array_equal(rk.degree_of_actuation(robot, q), rank)
+    kind = "fully actuated" if robot.n_arms == 2 else "redundantly actuated"
+    assert rk.actuation_type(robot, q[0]) == kind
+    assert np.all(rk.actuation_type(robot, q) == kind)
+
+
+def test_equal_signs_have_no_input_singularity():
+    for mode in EQUAL_SIGNS:
+        assert singular_points(mode) == []
+        sigma = rk.actuation_map(TESTBED, mode=mode, n=300)[2]
+        assert sigma.min() > 0.3
+
+
+@pytest.mark.parametrize("mode", MIXED, ids=str)
+def test_mixed_modes_have_one_input_singularity_at_the_midpoint_of_a_side(mode):
+    points = singular_points(mode)
+    assert points
+    for p in points:
+        assert_allclose(p, points[0], atol=1e-5)
+    side = np.linalg.norm(MIDPOINTS - points[0], axis=-1)
+    assert side.min() < 1e-5
+    q = rk.inverse_kinematics(TESTBED, MIDPOINTS[side.argmin()], mode)
+    assert_allclose(rk.distal_cross_products(TESTBED, q), 0, atol=1e-14)
+    assert rk.degree_of_actuation(TESTBED, q) == 1
+    assert rk.actuation_type(TESTBED, q) == "underactuated"
+    for f in (rk.weighted_pseudoinverse, rk.antagonism_filter, rk.prestress_projector):
+        with pytest.raises(ValueError, match="input singularity"):
+            f(rk.control_matrix(TESTBED, q))
+    with pytest.raises(ValueError, match="input singularity"):
+        rk.null_vector(TESTBED, q)
+
+
+@modes
+def test_null_vector_in_closed_form_spans_the_kernel(mode):
+    for robot in (TESTBED, MACHINES["asymmetric"]):
+        q = random_motion(robot, 1000, mode)[0]
+        n, A = rk.null_vector(robot, q), rk.control_matrix(robot, q)
+        assert_allclose(np.linalg.norm(n, axis=-1), 1, atol=1e-14)
+        assert (norm(np.einsum("kij,ki->kj", A, n)) / norm(A)).max() < 1e-13
+        assert norm(np.einsum("kij,ki->kj", rk.redundant_control_matrix(robot, q), n)).max() < 1e-13
+        projector = rk.prestress_projector(A)
+        good = np.linalg.svd(rk.redundant_control_matrix(robot, q), compute_uv=False)[:, 1] > 1e-2
+        assert norm(projector - n[:, :, None] * n[:, None, :])[good].max() < 1e-11
+
+
+def test_drive_opposite_to_a_singular_pair_carries_no_prestress():
+    # On the zero of d_2 x d_3 the null vector has no component 1: switching map and prestress map are one map.
+    pose = lambda t: rk.inverse_kinematics(TESTBED, 0.11 * np.array([np.cos(t), np.sin(t)]))  # noqa: E731
+    angle = np.linspace(0, 2 * np.pi, 400)
+    for k, drive in enumerate([2, 1, 0]):
+        cross = lambda t, k=k: rk.distal_cross_products(TESTBED, pose(t))[k]  # noqa: E731
+        signs = np.sign([cross(t) for t in angle])
+        i = np.flatnonzero(np.diff(signs))
+        assert len(i) > 0
+        n = rk.null_vector(TESTBED, pose(brentq(cross, angle[i[0]], angle[i[0] + 1], xtol=1e-15)))
+        assert abs(n[drive]) < 1e-13
+        assert np.abs(np.delete(n, drive)).min() > 0.1
+
+
+def test_isotropy_at_the_centroid():
+    q = rk.inverse_kinematics(TESTBED, [0.0, 0.0])
+    A = rk.control_matrix(TESTBED, q)
+    assert_allclose(A.T @ A, (A.T @ A)[0, 0] * np.eye(2), atol=1e-12)
+    assert_allclose(np.abs(rk.null_vector(TESTBED, q)), np.sqrt(1 / 3), atol=1e-14)
+    assert_allclose(rk.singular_values(A)[0], rk.singular_values(A)[1], rtol=1e-12)
+
+
+def test_clearance_of_the_pair_singularities_and_crossings_of_the_triangle():
+    # Nearest point to the centroid of each curve d_j x d_k = 0: the smallest radius where a sign changes.
+    angle = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    ray = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    at_centroid = np.sign(rk.distal_cross_products(TESTBED, rk.inverse_kinematics(TESTBED, [0.0, 0.0])))
+
+    def smallest(radius):
+        return (at_centroid * rk.distal_cross_products(TESTBED, rk.inverse_kinematics(TESTBED, radius * ray))).min()
+
+    assert smallest(0.05) > 0
+    assert_allclose(brentq(smallest, 0.09, 0.12, xtol=1e-8), 0.1012, atol=5e-5)
+    changes = lambda path: np.sum(  # noqa: E731
+        np.diff(np.sign(rk.distal_cross_products(TESTBED, path.q)), axis=0) != 0, axis=0)
+    assert np.array_equal(changes(rk.triangle(TESTBED)), [2, 2, 2])
+    assert np.array_equal(changes(rk.circle(TESTBED, 0.1)), [0, 0, 0])
+
+
+def test_cross_products_vanish_where_a_pair_is_no_coordinate():
+    q = rk.inverse_kinematics(TESTBED, random_points(TESTBED, 200))
+    A = rk.control_matrix(TESTBED, q)
+    a, d = rk.arm_vectors(TESTBED, q)
+    lever = (a[..., 0] * d[..., 1] - a[..., 1] * d[..., 0]) / 0.2
+    for k, (i, j) in enumerate(PAIRS):
+        minor = A[:, i, 0] * A[:, j, 1] - A[:, i, 1] * A[:, j, 0]
+        assert_allclose(rk.distal_cross_products(TESTBED, q)[:, k], minor * lever[:, i] * lever[:, j], atol=1e-14)
+
+
+def test_singular_values_in_closed_form_match_lapack():
+    A = np.random.default_rng(0).normal(size=(500, 4, 2)) * np.logspace(0, -6, 500)[:, None, None] ** [0, 1]
+    sigma = np.linalg.svd(A, compute_uv=False)
+    assert_allclose(rk.singular_values(A), sigma, rtol=1e-8)
+    assert_allclose(rk.singular_values(np.zeros((3, 2))), 0)
+
+
+# (11)
+@machines
+def test_inverse_dynamics_inverts_forward_dynamics_for_every_weight_and_prestress(robot):
+    q, qd, qdd, _ = random_motion(robot, 200)
+    if robot.n_arms == 2:
+        keep = np.abs(rk.distal_cross_products(robot, q)[:, 0]) > 0.05
+        q, qd, qdd = q[keep], qd[keep], qdd[keep]
+    rng = np.random.default_rng(1)
+    B = rng.normal(size=(robot.n_arms, robot.n_arms))
+    A = rk.control_matrix(robot, q)
+    for W in (None, 2.0, rng.uniform(0.5, 2, robot.n_arms), B @ B.T + np.eye(robot.n_arms)):
+        for c0 in (None, rng.normal(size=robot.n_arms)):
+            c = rk.inverse_dynamics(robot, q, qd, qdd, W, c0)
+            again, _ = rk.forward_dynamics(robot, q, qd, c)
+            assert (norm(again - qdd) / norm(qdd)).max() < 1e-9
+        P = rk.weighted_pseudoinverse(A, W)
+        assert_allclose(T(A) @ P, np.broadcast_to(np.eye(2), (len(q), 2, 2)), atol=1e-12)
+        N = rk.prestress_projector(A, W)
+        assert norm(N @ N - N).max() < 1e-11
+        assert (norm(T(A) @ N) / norm(A)).max() < 1e-12
+
+
+def test_weighted_pseudoinverse_has_the_smallest_weighted_torque():
+    rng = np.random.default_rng(2)
+    A = rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, random_points(TESTBED, 50)))
+    B = rng.normal(size=(3, 3))
+    W, force = B @ B.T + 0.5 * np.eye(3), rng.normal(size=2)
+    for M in A:
+        c = rk.weighted_pseudoinverse(M, W) @ force
+        # Lagrange: W c is in the range of A.
+        multiplier = np.linalg.lstsq(M, W @ c, rcond=None)[0]
+        assert_allclose(M @ multiplier, W @ c, atol=1e-12)
+        assert_allclose(rk.weighted_pseudoinverse(M), np.linalg.pinv(M.T), atol=1e-12)
+
+
+@modes
+def test_redundant_inverse_dynamics_equals_the_minimal_one(mode):
+    # (25), without the idle N_J, equals (11) with W = I and no prestress.
+    q, qd, qdd, _ = random_motion(FRICTIONLESS, 1000, mode)
+    A_tilde = rk.redundant_control_matrix(FRICTIONLESS, q)
+    k = np.linalg.svd(A_tilde, compute_uv=False)[:, 1] > 0.02
+    q, qd, qdd, A_tilde = q[k], qd[k], qdd[k], A_tilde[k]
+    pinv = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
+    G, C = rk.mass_matrix(FRICTIONLESS, q), rk.coriolis_matrix(FRICTIONLESS, q, qd)
+    terms = np.einsum("kij,kj->ki", G, qdd) + np.einsum("kij,kj->ki", C, qd)
+    c = rk.inverse_dynamics(FRICTIONLESS, q, qd, qdd)
+    assert (norm(np.einsum("kij,kj->ki", pinv, terms) - c) / norm(c)).max() < 1e-10
+    Gt, Ct, Qt = rk.redundant_dynamics(FRICTIONLESS, q, qd)
+    terms = np.einsum("kij,kj->ki", Gt, qdd) + np.einsum("kij,kj->ki", Ct, qd) + Qt
+    assert (norm(np.einsum("kij,kj->ki", pinv, terms) - c) / norm(c)).max() < 1e-10
+
+
+# (15), (17)
+@machines
+def test_filters_keep_the_end_effector_force(robot):
+    q = rk.inverse_kinematics(robot, random_points(robot, 200))
+    if robot.n_arms == 2:
+        q = q[np.abs(rk.distal_cross_products(robot, q)[:, 0]) > 0.05]
+    A, K = rk.control_matrix(robot, q), np.linspace(4, 9, robot.n_arms)
+    R, R_K = rk.antagonism_filter(A), rk.command_filter(A, K)
+    assert (norm(T(A) @ R - T(A)) / norm(A)).max() < 1e-14
+    assert norm(R @ R - R).max() < 1e-14
+    assert norm(R - np.linalg.pinv(T(A)) @ T(A)).max() < 1e-11
+    assert (norm(T(A) @ np.diag(K) @ R_K - T(A) @ np.diag(K)) / norm(A)).max() < 1e-12
+    assert_allclose(rk.command_filter(A, 3.0), R, atol=1e-13)
+    assert_allclose(R + rk.prestress_projector(A), np.broadcast_to(np.eye(robot.n_arms), R.shape), atol=1e-12)
+
+
+# (26)-(27)
+@modes
+def test_explicit_pseudoinverse_for_every_valid_partition(mode):
+    for robot in (TESTBED, MACHINES["four_arms"], MACHINES["asymmetric"]):
+        signs = np.resize(mode, robot.n_arms)
+        A_tilde = rk.redundant_control_matrix(robot, random_motion(robot, 1000, signs)[0])
+        sigma = np.linalg.svd(A_tilde, compute_uv=False)
+        # The rank is 2 by construction: without an explicit cut-off rounding may count as a third singular value.
+        peer = np.linalg.pinv(T(A_tilde), rcond=1e-10)
+        compared = 0
+        for pair in itertools.combinations(range(robot.n_arms), 2):
+            part = np.linalg.svd(A_tilde[:, pair, :], compute_uv=False)
+            valid = (part[:, 1] > 1e-2 * sigma[:, 0]) & (sigma[:, 1] > 1e-2)
+            ours = rk.explicit_pseudoinverse(A_tilde[valid], pair)
+            assert (norm(ours - peer[valid]) / norm(peer[valid])).max() < 1e-10
+            compared += valid.sum()
+        assert compared > 2000
+        best = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
+        ok = sigma[:, 1] > 1e-2
+        assert (norm(best - peer)[ok] / norm(peer)[ok]).max() < 1e-10
+
+
+def test_partition_rules_choose_what_they_say():
+    A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, random_points(TESTBED, 300)))
+    parts = np.stack([A_tilde[:, pair, :] for pair in PAIRS], axis=1)
+    sigma = np.linalg.svd(parts, compute_uv=False)
+    index = lambda rows: [PAIRS.index(tuple(r)) for r in rows.tolist()]  # noqa: E731
+    assert np.array_equal(index(rk.select_independent(A_tilde)), sigma[..., 1].argmax(axis=1))
+    assert np.array_equal(index(rk.select_independent(A_tilde, "condition")),
+                          (sigma[..., 0] / sigma[..., 1]).argmin(axis=1))
+    assert np.array_equal(index(rk.select_independent(A_tilde, "printed")),
+                          np.abs(parts).sum(-1).max(-1).argmin(axis=1))
+
+
+# (13)-(14)
+@pytest.mark.parametrize("name", ["testbed", "four_arms", "asymmetric"])
+def test_steady_state_is_the_first_order_solution_of_the_nonlinear_equilibrium(name):
+    # Equilibrium of PD with offsets, gravity and load: A(q)^T K (e_a + offset) + Qbar(q) = 0, solved for x.
+    robot = MACHINES[name].replace(friction=0.0)
+    x_d = np.array([0.03, 0.02])
+    q_d = rk.inverse_kinematics(robot, x_d)
+    K = np.linspace(20.0, 60.0, robot.n_arms)
+    deviations = []
+    for scale in (1.0, 0.1):
+        machine = robot.replace(gravity=scale * robot.gravity)
+        offset = scale * np.linspace(-0.004, 0.005, robot.n_arms)
+
+        def static(q, machine=machine):
+            return rk.minimal_dynamics(machine, q, 0 * q)[2]
+
+        def balance(p, machine=machine, offset=offset, static=static):
+            q = rk.inverse_kinematics(machine, p)
+            e = (q - q_d)[: machine.n_arms]
+            return rk.control_matrix(machine, q).T @ (K * (e + offset)) + static(q)
+
+        p = root(balance, x_d, tol=1e-14).x
+        e = (rk.inverse_kinematics(machine, p) - q_d)[: machine.n_arms]
+        A = rk.control_matrix(machine, q_d)
+        predicted = rk.steady_state_error(A, K, offset, static(q_d))
+        deviations.append(np.abs(predicted - e).max())
+        assert deviations[-1] < 0.1 * np.abs(e).max()
+        # (13): the predicted state satisfies the linear balance exactly, with c0 = -K (e_a + offset) after (14).
+        c = rk.steady_state_torque(A, K, offset, static(q_d))
+        assert_allclose(A.T @ c, static(q_d), atol=1e-12)
+        assert_allclose(c, -K * (predicted + offset), atol=1e-15)
+    # Second-order remainder: ten times smaller causes, a hundred times smaller deviation.
+    assert_allclose(np.log10(deviations[0] / deviations[1]), 2, atol=0.15)
+
+
+def test_without_wrench_all_torque_at_rest_is_antagonism():
+    A = rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, random_points(TESTBED, 100)))
+    offset = np.array([0.004, -0.002, 0.005])
+    c = rk.steady_state_torque(A, 7.05, offset)
+    assert_allclose(np.einsum("kij,kj->ki", rk.antagonism_filter(A), c), 0, atol=1e-15)
+    many = rk.steady_state_error(A[0], 7.05, np.stack([offset, 2 * offset]))
+    assert_allclose(many[1], 2 * many[0], rtol=1e-13)
+
+
+# Maps.
+@modes
+def test_maps_agree_with_the_pointwise_functions(mode):
+    x, y, sigma = rk.actuation_map(TESTBED, "sigma_min", mode, n=40)
+    points = np.stack(np.meshgrid(x, y), axis=-1)[~sigma.mask]
+    q = rk.inverse_kinematics(TESTBED, points, mode)
+    A_tilde, A = rk.redundant_control_matrix(TESTBED, q), rk.control_matrix(TESTBED, q)
+    lapack = lambda M: np.linalg.svd(M, compute_uv=False)  # noqa: E731
+    assert_allclose(sigma.compressed(), lapack(A_tilde)[:, 1], atol=1e-10)
+    assert_allclose(rk.actuation_map(TESTBED, "condition", mode, n=40)[2].compressed(), np.linalg.cond(A), rtol=1e-8)
+    cross = np.abs(rk.distal_cross_products(TESTBED, q))
+    assert_allclose(rk.actuation_map(TESTBED, "cross", mode, n=40)[2].compressed(), cross.max(axis=-1), atol=1e-15)
+    prestress = rk.actuation_map(TESTBED, "prestress", mode, n=40)[2]
+    assert_allclose(prestress[2].compressed(), np.abs(rk.null_vector(TESTBED, q))[:, 2], atol=1e-15)
+    for k, pair in enumerate(PAIRS):
+        alone = lambda measure, pair=pair: rk.actuation_map(TESTBED, measure, mode, 40, pair=pair)[2]  # noqa: E731
+        assert_allclose(alone("cross").compressed(), cross[:, k], atol=1e-15)
+        assert_allclose(alone("sigma_min").compressed(), lapack(A_tilde[:, pair, :])[:, 1], atol=1e-9)
+    for rule in ("sigma_min", "condition", "printed"):
+        chosen = rk.switching_map(TESTBED, rule, mode, n=40)[2].compressed()
+        assert np.mean(np.array(PAIRS)[chosen] == rk.select_independent(A_tilde, rule)) > 0.999  # ties aside
+    assert np.array_equal(rk.switching_map(TESTBED, mode=mode, n=40)[2].compressed(), cross.argmax(axis=-1))
+
+
+def test_maps_of_all_modes_at_once_hold_no_nan():
+    for measure in ("sigma_min", "condition", "cross", "prestress"):
+        x, y, value = rk.actuation_map(TESTBED, measure, MODES, n=60)
+        assert value.shape == ((3,) if measure == "prestress" else ()) + (8, 60, 60)
+        assert np.all(np.isfinite(value.data))
+        alone = rk.actuation_map(TESTBED, measure, MODES[3], n=60)[2]
+        assert np.array_equal(value[..., 3, :, :].filled(-1), alone.filled(-1))
+    box = (-0.01, 0.01, -0.02, 0.02)
+    x, y, value = rk.actuation_map(TESTBED, box=box, n=5)
+    assert (x[0], x[-1], y[0], y[-1]) == box and not value.mask.any()
+
+
+def test_map_masks_the_input_singularity_of_a_mixed_mode():
+    mode, box = next((m, p) for m in MIXED for p in MIDPOINTS
+                     if rk.degree_of_actuation(TESTBED, rk.inverse_kinematics(TESTBED, p, m)) == 1)
+    px, py = box
+    x, y, n = rk.actuation_map(TESTBED, "prestress", mode, n=3, box=(px - 0.01, px + 0.01, py - 0.01, py + 0.01))
+    assert n.mask[:, 1, 1].all() and np.all(np.isfinite(n.data))
+    _, _, kappa = rk.actuation_map(TESTBED, "condition", mode, n=3, box=(px - 0.01, px + 0.01, py - 0.01, py + 0.01))
+    assert kappa.mask[1, 1]
+
+
+def test_zero_prestress_curves_are_the_switching_curves():
+    # Fact 3: |n_1| and |d_2 x d_3| vanish together, cell by cell.
+    x, y, n = rk.actuation_map(TESTBED, "prestress", n=150)
+    for arm, pair in ((0, (1, 2)), (1, (0, 2)), (2, (0, 1))):
+        cross = rk.actuation_map(TESTBED, "cross", n=150, pair=pair)[2]
+        inside = ~cross.mask
+        assert np.corrcoef(n[arm][inside] < 0.02, cross[inside] < 0.02)[0, 1] > 0.7
+        assert n[arm][inside][cross[inside] < 1e-3].max() < 0.02
+
+
+# Leading axes.
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_one_pose_and_a_trajectory_are_the_same_call(name):
+    robot = MACHINES[name]
+    q, qd, qdd, _ = random_motion(robot, 12)
+    A, A_tilde = rk.control_matrix(robot, q), rk.redundant_control_matrix(robot, q)
+    rng = np.random.default_rng(3)
+    offset, W = rng.normal(0, 0.01, (12, robot.n_arms)), rng.uniform(1, 2, robot.n_arms)
+    of = lambda f: lambda *a: f(robot, *a)  # noqa: E731
+    calls = [(of(rk.control_matrix), q), (of(rk.redundant_control_matrix), q), (of(rk.degree_of_actuation), q),
+             (of(rk.control_vector_fields), q), (of(rk.distal_cross_products), q), (rk.singular_values, A),
+             (lambda M: rk.weighted_pseudoinverse(M, W), A), (lambda M: rk.prestress_projector(M, W), A),
+             (rk.antagonism_filter, A), (lambda M: rk.command_filter(M, W), A),
+             (lambda *a: rk.inverse_dynamics(robot, *a, W, offset[0]), q, qd, qdd),
+             (of(rk.required_wrench), q, qd, qdd), (lambda M, o: rk.steady_state_error(M, W, o), A, offset),
+             (lambda M, o: rk.steady_state_torque(M, W, o), A, offset), (rk.select_independent, A_tilde),
+             (rk.explicit_pseudoinverse, A_tilde, rk.select_independent(A_tilde))]
+    if robot.n_arms == 3:
+        calls.append((of(rk.null_vector), q))
+    for f, *args in calls:
+        whole = f(*args)
+        single = np.stack([f(*[a[k] for a in args]) for k in range(12)])
+        assert_allclose(whole, single, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
+        block = f(*[a.reshape(3, 4, *a.shape[1:]) for a in args])
+        assert_allclose(block.reshape(whole.shape), single, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
+        assert f(*[a[:0] for a in args]).shape == (0, *whole.shape[1:])
+    assert rk.actuation_type(robot, q).shape == (12,)
