@@ -77,12 +77,12 @@ EXERCISES = {
     ),
     "02.guaranteed_force": Exercise(
         reference=guaranteed_force, cases=_control_matrices, invariant=_overpromise, unit="N", tolerance=1e-9,
-        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across a row "
+        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across row "
              "A_i every drive j adds at most torque times |A_j x A_i| / |A_i|",
     ),
     "02.input_singularity": Exercise(
         reference=input_singularity, cases=_mixed_modes, invariant=_spread, unit="m", tolerance=1e-6,
-        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest point "
-             "of the map, or ask where two of the three curves cross",
+        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest "
+             "point of the map, or ask where two of the three curves cross",
     ),
 }

@@ -1,4 +1,4 @@
-"""Actuation over the workspace: control vector fields, mode maps, parameterization singularities (fig. 8), prestress."""
+"""Actuation over the workspace: control fields, mode maps, parameterization singularities (fig. 8), prestress."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..actuation import (
     control_vector_fields,
     distal_cross_products,
     drive_pairs,
-    redundant_control_matrix,
+    singular_values,
 )
 from ..kinematics import arm_vectors, inverse_kinematics, working_modes
 from ..manipulator import Manipulator
@@ -19,7 +19,7 @@ from ..maps import workspace_grid
 from .machine import plot_machine, plot_path, plot_workspace
 from .style import ALARM, NEUTRAL, arm_line, axes_or_new
 
-_OUTLINED = [patheffects.withStroke(linewidth=3.2, foreground="#222222")]
+_OUTLINED = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
 
 
 def pair_name(pair: tuple[int, int]) -> str:
@@ -40,7 +40,8 @@ def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, ba
     ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
     ax.grid(False)
     if bar:
-        ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
+        extend = "max" if vmax is not None and values.max() > vmax else "neither"
+        ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85, extend=extend)
     return ax
 
 
@@ -79,9 +80,9 @@ def plot_control_fields(robot, axes=None, n: int = 15):
     for i, ax in enumerate(axes):
         plot_workspace(robot, ax)
         arrows = ax.quiver(*points.T, *field[:, :, i].T, color=arm_line(i)["color"], angles="xy", pivot="tail",
-                           scale=6e3, scale_units="width", width=0.008, zorder=3)
+                           scale=200, scale_units="width", width=0.007, zorder=3)
         ax.plot(*robot.base[i], "o", color=arm_line(i)["color"], ms=8, zorder=4)
-        ax.quiverkey(arrows, 0.80, 0.93, 1000, "1000", labelpos="N", coordinates="axes")
+        ax.quiverkey(arrows, 0.74, 0.90, 30, "30 m/s² per N m", labelpos="N", coordinates="axes")
         ax.set(title=f"drive {i + 1}", xlim=(-0.25, 0.25), ylim=(-0.21, 0.29))
         if i:
             ax.set_ylabel("")
@@ -104,17 +105,19 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         ax.set_title("(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")")
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
-    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of all drives", shrink=0.8)
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of Ã, all drives", shrink=0.8)
     return axes
 
 
 def plot_grid_search(spacings, minima, ax=None):
-    """Smallest measure found on a grid against its spacing in m; `minima` maps a label to values of the same length."""
+    """Smallest measure found on grids against their spacings in m; `minima` maps a label to one value per grid."""
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for k, (label, values) in enumerate(minima.items()):
-        ax.loglog(spacings, values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
-    ax.set(xlabel="grid spacing in m", ylabel="smallest σ_min on the grid")
-    ax.legend(loc="center left")
+        ax.loglog(1e3 * np.asarray(spacings), values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
+    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min on the grid")
+    ax.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
+    ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
+    ax.legend(loc="center left", title="mode")
     return ax
 
 
@@ -122,7 +125,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     """Fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
     robot = trajectory.robot
     if axes is None:
-        axes = plt.subplots(1, 2, figsize=(9.6, 4.4))[1]
+        axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
     q = inverse_kinematics(robot, x)
     plot_workspace(robot, axes[0])
     plot_pair_curves(robot, axes[0], pairs=[pair])
@@ -135,9 +138,11 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     for k, left_out in ((k, pair_line(robot, p)) for k, p in enumerate(drive_pairs(robot))):
         at = curve_crossings(trajectory)[k]
         axes[1].plot(*trajectory.x[at].T, "o", mfc="white", mec=left_out["color"], mew=1.8, ms=7, ls="", zorder=5)
+    axes[0].set(xlim=(-0.32, 0.32), ylim=(-0.25, 0.36))
     axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
     axes[1].set_title("all three pairs and the path")
-    axes[1].legend(loc="upper right", fontsize=8.5)
+    axes[1].set(xlim=(-0.24, 0.24), ylim=(-0.2, 0.26))
+    axes[1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return axes
 
 
@@ -194,15 +199,13 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
 
 
 def plot_pair_measures(trajectory, ax=None):
-    """sigma_min of the rows of A~ of every pair, and of all drives, along the path; ticks mark the crossed curves."""
+    """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path."""
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
-    robot, A = trajectory.robot, redundant_control_matrix(trajectory.robot, trajectory.q)
-    for pair, at in zip(drive_pairs(robot), curve_crossings(trajectory), strict=True):
-        look = pair_line(robot, pair)
-        sigma = np.linalg.svd(A[:, list(pair)], compute_uv=False)[:, -1]
-        ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **look)
-        ax.plot(trajectory.t[at], np.full(len(at), 2e-3), "|", color=look["color"], ms=12, mew=2)
-    ax.semilogy(trajectory.t, np.linalg.svd(A, compute_uv=False)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="σ_min of the rows of Ã", xlim=(0, trajectory.t[-1]), ylim=(1.5e-3, 1.5))
-    ax.legend(loc="lower right", ncols=4)
+    robot, A = trajectory.robot, control_matrix(trajectory.robot, trajectory.q)
+    for pair in drive_pairs(robot):
+        sigma = singular_values(A[:, list(pair)])[:, 1]
+        ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
+    ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
+    ax.set(xlabel="time in s", ylabel="σ_min in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
