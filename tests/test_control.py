@@ -1,0 +1,318 @@
+"""Control laws: what (12), (16)-(20), (28)-(35) promise, by algebra, linearization, independent integration."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import FRICTIONLESS, MACHINES, TESTBED, norm, random_motion, random_points
+from scipy.integrate import solve_ivp
+
+import rapkm_lite as rk
+
+T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
+mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
+ROBOT = MACHINES["asymmetric"].replace(friction=0.0)
+
+
+def state_and_target(robot, count=60, seed=0):
+    """A motion, and a desired one near it, both on V."""
+    q, qd, _, (x, xd, _) = random_motion(robot, count, seed=seed, bend=0.3)
+    rng = np.random.default_rng(seed + 50)
+    x, xd, xdd = x + rng.normal(0, 1e-3, x.shape), xd + rng.normal(0, 1e-2, x.shape), rng.normal(0, 1, x.shape)
+    q_d = rk.inverse_kinematics(robot, x)
+    F = rk.orthogonal_complement(robot, q_d)
+    qd_d = mv(F, xd)
+    qdd_d = mv(F, xdd) + mv(rk.orthogonal_complement_dot(robot, q_d, qd_d), xd)
+    return q, qd, rk.Desired(robot.n_arms, x, xd, xdd, q_d, qd_d, qdd_d)
+
+
+def torque(law, robot, q, qd, desired, offset=0.0):
+    N = robot.n_arms
+    return law.torque(robot, q, qd, q[..., :N] + offset, qd[..., :N], desired)
+
+
+def part(desired, k):
+    return rk.Desired(3, *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd, desired.qdd)))
+
+
+# (12), (16)-(18)
+def test_pd_is_decentralized():
+    q, qd, desired = state_and_target(TESTBED)
+    K_P, K_D = np.array([5.0, 6.0, 7.0]), np.array([0.1, 0.2, 0.3])
+    c = torque(rk.PD(K_P, K_D), TESTBED, q, qd, desired)
+    assert_allclose(c, -K_P * (q - desired.q)[:, :3] - K_D * (qd - desired.qd)[:, :3], atol=1e-15)
+    full = rk.PD(np.diag(K_P), np.diag(K_D))
+    assert_allclose(torque(full, TESTBED, q, qd, desired), c, atol=1e-15)
+
+
+def test_force_filter_removes_antagonism_and_nothing_else():
+    q, qd, desired = state_and_target(TESTBED)
+    pd, A = rk.PD([5, 6, 7], 0.2), rk.control_matrix(TESTBED, q)
+    offset = np.array([0.004, -0.002, 0.005])
+    raw = torque(pd, TESTBED, q, qd, desired, offset)
+    filtered = torque(rk.AntagonismFilter(pd), TESTBED, q, qd, desired, offset)
+    assert_allclose(mv(T(A), filtered), mv(T(A), raw), atol=1e-13)
+    assert np.abs(mv(rk.prestress_projector(A), filtered)).max() < 1e-14
+    assert np.all((filtered**2).sum(-1) <= (raw**2).sum(-1) + 1e-15)
+
+
+def test_command_filter_equals_the_force_filter_only_for_equal_gains():
+    q, qd, desired = state_and_target(TESTBED)
+    A, offset = rk.control_matrix(TESTBED, q), np.array([0.004, -0.002, 0.005])
+    pair = lambda pd: [torque(f(pd), TESTBED, q, qd, desired, offset)  # noqa: E731
+                       for f in (rk.AntagonismFilter, rk.CommandFilter)]
+    force, command = pair(rk.PD(7.05, 0.225))
+    assert_allclose(force, command, atol=1e-14)
+    force, command = pair(rk.PD([4.0, 7.0, 10.0], [0.2, 0.2, 0.3]))
+    assert_allclose(mv(T(A), force), mv(T(A), command), atol=1e-13)
+    assert np.abs(force - command).max() > 1e-3
+    assert np.abs(mv(rk.prestress_projector(A), command)).max() > 1e-3
+    # (18): PD drives that get the filtered commands give the torques of (17).
+    law = rk.CommandFilter(rk.PD([4.0, 7.0, 10.0], [0.2, 0.2, 0.3]))
+    q_a, qd_a = q[:, :3] + offset, qd[:, :3]
+    q_c, qd_c = law.commands(TESTBED, q, q_a, qd_a, desired)
+    K_P, K_D = law.law.gains(3)
+    assert_allclose(-mv(K_P, q_a - q_c) - mv(K_D, qd_a - qd_c), command, atol=1e-15)
+
+
+def test_energy_saved_by_the_filter_is_that_of_the_null_torque():
+    # Fact 6: Pythagoras in the torques, total over identical drives.
+    q, qd, desired = state_and_target(TESTBED)
+    pd, offset = rk.PD(7.05, 0.225), np.array([0.004, -0.002, 0.005])
+    raw, filtered = (torque(law, TESTBED, q, qd, desired, offset) for law in (pd, rk.AntagonismFilter(pd)))
+    null = mv(rk.prestress_projector(rk.control_matrix(TESTBED, q)), raw)
+    saved = rk.copper_loss(TESTBED, raw, 1e-3).sum() - rk.copper_loss(TESTBED, filtered, 1e-3).sum()
+    assert_allclose(saved, 0.611 / 0.0259**2 * (null**2).sum() * 1e-3, rtol=1e-12)
+    assert_allclose(saved, rk.copper_loss(TESTBED, null, 1e-3).sum(), rtol=1e-12)
+
+
+# (19)-(20), (28), (32): perfect tracking without errors.
+LAWS = {
+    "APD": rk.APD(50.0, 5.0), "APD in x": rk.APD(50.0, 5.0, None), "CTC": rk.CTC(400.0, 40.0, (0, 2)),
+    "CTC in x": rk.CTC(400.0, 40.0, None, W=[1.0, 2.0, 3.0]), "CTC, elbows": rk.CTC(400.0, 40.0, (3, 5)),
+    "switched": rk.SwitchedCTC(400.0, 40.0), "redundant APD": rk.RedundantAPD(50.0, 5.0),
+    "redundant CTC": rk.RedundantCTC(400.0, 40.0), "line 2": rk.RedundantCTC(400.0, 40.0, projected=False),
+    "printed rule": rk.RedundantCTC(400.0, 40.0, rule="printed"),
+}
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_model_based_laws_follow_exactly_without_error(law):
+    q, qd, qdd, (x, xd, xdd) = random_motion(ROBOT, 60, bend=0.3)
+    elbows = np.linalg.svd(np.delete(rk.constraint_jacobian(ROBOT, q), [3, 5], axis=-1), compute_uv=False)[:, -1]
+    ok = (np.abs(rk.distal_cross_products(ROBOT, q)).min(axis=-1) > 0.05) & (elbows > 0.02)
+    assert ok.sum() > 30
+    q, qd, qdd, x, xd, xdd = (v[ok] for v in (q, qd, qdd, x, xd, xdd))
+    desired = rk.Desired(3, x, xd, xdd, q, qd, qdd)
+    again, _ = rk.forward_dynamics(ROBOT, q, qd, torque(law, ROBOT, q, qd, desired))
+    assert (norm(again - qdd) / norm(qdd)).max() < 1e-9
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), None])
+def test_ctc_makes_the_error_of_its_coordinates_linear(pair):
+    q, qd, desired = state_and_target(ROBOT)
+    if pair is not None:
+        k = np.abs(rk.distal_cross_products(ROBOT, q))[:, [(0, 1), (0, 2), (1, 2)].index(pair)] > 0.05
+        q, qd, desired = q[k], qd[k], part(desired, k)
+    qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(rk.CTC([300.0, 500.0], 30.0, pair), ROBOT, q, qd, desired))
+    if pair is None:
+        F_dot = rk.orthogonal_complement_dot(ROBOT, q, qd)
+        back = np.linalg.pinv(rk.orthogonal_complement(ROBOT, q))
+        xd = mv(back, qd)
+        e, ed = rk.forward_kinematics(ROBOT, q) - desired.x, xd - desired.xd
+        edd = mv(back, qdd - mv(F_dot, xd)) - desired.xdd
+    else:
+        j = list(pair)
+        e, ed, edd = (q - desired.q)[:, j], (qd - desired.qd)[:, j], (qdd - desired.qdd)[:, j]
+    assert_allclose(edd + 30 * ed + np.array([300.0, 500.0]) * e, 0, atol=1e-8 * np.abs(qdd).max())
+
+
+# Switching.
+def test_switching_takes_the_best_pair_and_hysteresis_saves_switches():
+    path = rk.triangle(FRICTIONLESS)
+    free = rk.SwitchedCTC(400, 40, hysteresis=1.0).pairs(FRICTIONLESS, path.q)
+    best = np.abs(rk.distal_cross_products(FRICTIONLESS, path.q)).argmax(axis=-1)
+    assert np.mean(np.array(rk.drive_pairs(FRICTIONLESS))[best] == free) > 0.999  # ties aside
+    count = lambda p: np.count_nonzero(np.any(np.diff(p, axis=0) != 0, axis=-1))  # noqa: E731
+    counts = [count(rk.SwitchedCTC(400, 40, hysteresis=h).pairs(FRICTIONLESS, path.q)) for h in (1.0, 1.2, 1.5, 3.0)]
+    assert counts == sorted(counts, reverse=True) and counts[-1] >= 2
+    # The map says the same as the law, off the borders.
+    x, y, chosen = rk.switching_map(FRICTIONLESS, n=200)
+    i, j = np.rint((path.x[:, 1] - y[0]) / (y[1] - y[0])).astype(int), np.rint((path.x[:, 0] - x[0]) / (x[1] - x[0]))
+    assert np.mean(chosen[i, j.astype(int)] == best) > 0.98
+    law = rk.SwitchedCTC(400, 40, hysteresis=1.5)
+    assert law.choose(FRICTIONLESS, path.q[0], (1, 0)) in rk.drive_pairs(FRICTIONLESS)
+
+
+def test_switched_torques_along_a_path_are_those_of_the_pair_in_use():
+    path, law = rk.triangle(FRICTIONLESS, dt=5e-3), rk.SwitchedCTC(400, 40)
+    q = path.q + 1e-4
+    c = torque(law, FRICTIONLESS, q, path.qd, path)
+    for k in range(0, len(path), 50):
+        pair = law.pairs(FRICTIONLESS, q[: k + 1])[-1]
+        assert_allclose(c[k], torque(law.fixed(pair), FRICTIONLESS, q[k], path.qd[k], path[k]), atol=1e-14)
+    assert_allclose(torque(law, FRICTIONLESS, q[0], path.qd[0], path[0]), c[0], atol=1e-14)
+
+
+def test_fixed_pair_feedback_grows_at_its_singularity_and_the_redundant_one_does_not():
+    # Fact 7: A (A^T A)^-1 Gbar grows like 1 / |d_2 x d_3| for the pair (2, 3); feed-forward torques agree to rounding.
+    angle = np.linspace(0, 2 * np.pi, 4000)
+    q = rk.inverse_kinematics(FRICTIONLESS, 0.11 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    cross = np.abs(rk.distal_cross_products(FRICTIONLESS, q))[:, 2]
+    k = np.argsort(cross)[:40]
+    A, G = rk.control_matrix(FRICTIONLESS, q[k], (1, 2)), rk.minimal_dynamics(FRICTIONLESS, q[k], 0 * q[k], (1, 2))[0]
+    fixed = np.linalg.norm(rk.weighted_pseudoinverse(A) @ G, axis=(-2, -1))
+    slope = np.polyfit(np.log(cross[k]), np.log(fixed), 1)[0]
+    assert_allclose(slope, -1, atol=0.05)
+    A_tilde, Gt = rk.redundant_control_matrix(FRICTIONLESS, q), rk.redundant_dynamics(FRICTIONLESS, q, 0 * q)[0]
+    pinv = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
+    redundant = np.linalg.norm(pinv @ Gt, axis=(-2, -1))
+    assert redundant.max() < 2 * np.median(redundant) < 0.1 * fixed.max()
+    away = q[np.argsort(cross)[-50:]]
+    still = rk.Desired(3, rk.forward_kinematics(FRICTIONLESS, away), np.zeros((50, 2)), np.ones((50, 2)), away, 0 * away,
+                       mv(rk.orthogonal_complement(FRICTIONLESS, away), np.ones((50, 2))))
+    one = torque(rk.CTC(400, 40, (1, 2)), FRICTIONLESS, away, 0 * away, still)
+    two = torque(rk.RedundantCTC(400, 40), FRICTIONLESS, away, 0 * away, still)
+    assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
+
+
+# (29)-(31): the redundant APD law.
+def test_closed_loop_of_the_redundant_apd():
+    q, qd, desired = state_and_target(ROBOT)
+    law = rk.RedundantAPD(60.0, 6.0)
+    qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(law, ROBOT, q, qd, desired))
+    G, C, _ = rk.redundant_dynamics(ROBOT, q, qd)
+    D = rk.closed_loop_projector(rk.redundant_control_matrix(ROBOT, q))
+    e, ed, edd = q - desired.q, qd - desired.qd, qdd - desired.qdd
+    terms = [mv(G, edd), mv(C, ed), 6 * mv(D, ed), 60 * mv(D, e)]
+    assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_d_equals_the_projector_wherever_the_degree_of_actuation_is_two(name):
+    robot = MACHINES[name]
+    q = rk.inverse_kinematics(robot, random_points(robot, 300))
+    q = q[np.linalg.svd(rk.redundant_control_matrix(robot, q), compute_uv=False)[:, 1] > 0.01]
+    D = rk.closed_loop_projector(rk.redundant_control_matrix(robot, q))
+    assert norm(D - rk.nullspace_projector(robot, q)).max() < 1e-11
+
+
+def test_lyapunov_function_falls_at_the_rate_of_the_damping():
+    target = rk.inverse_kinematics(ROBOT, [0.02, 0.0])
+    desired = rk.Desired(3, np.array([0.02, 0.0]), np.zeros(2), np.zeros(2), target, np.zeros(6), np.zeros(6))
+    law, K_D = rk.RedundantAPD(40.0, 1.5), 1.5
+
+    def rate(t, s):
+        q = rk.inverse_kinematics(ROBOT, s[:2])
+        F = rk.orthogonal_complement(ROBOT, q)
+        qd = F @ s[2:4]
+        qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(law, ROBOT, q, qd, desired))
+        xdd = np.linalg.pinv(F) @ (qdd - rk.orthogonal_complement_dot(ROBOT, q, qd) @ s[2:4])
+        return np.concatenate([s[2:4], xdd, [K_D * qd @ qd]])
+
+    run = solve_ivp(rate, (0, 0.5), [0.05, 0.03, 0, 0, 0], method="DOP853", rtol=1e-10, atol=1e-12)
+    q = rk.inverse_kinematics(ROBOT, run.y[:2].T)
+    qd = mv(rk.orthogonal_complement(ROBOT, q), run.y[2:4].T)
+    V = rk.lyapunov_function(ROBOT, q, q - target, qd, 40.0)
+    assert np.all(np.diff(V) <= 1e-12)
+    assert_allclose(V[0] - V, run.y[4], atol=1e-7 * V[0])
+    # Without elbow gains too: the damping of the drives alone.
+    assert_allclose(rk.lyapunov_function(ROBOT, q, q - target, qd, [40.0] * 3),
+                    rk.kinetic_energy(ROBOT, q, qd) + 20 * ((q - target)[:, :3] ** 2).sum(-1), rtol=1e-9)
+
+
+# (32)-(35): the redundant CTC law.
+def stiffness(law, robot, x):
+    """-d(q2dd)/d(x) at rest in the desired pose x, in end-effector coordinates, by central differences."""
+    target = rk.inverse_kinematics(robot, x)
+    desired = rk.Desired(robot.n_arms, x, np.zeros(2), np.zeros(2), target, 0 * target, 0 * target)
+
+    def acceleration(p):
+        q = rk.inverse_kinematics(robot, p)
+        qdd, _ = rk.forward_dynamics(robot, q, 0 * q, torque(law, robot, q, 0 * q, desired))
+        return np.linalg.pinv(rk.orthogonal_complement(robot, q)) @ qdd
+
+    h = 1e-4
+    weights = {1: 2 / 3, 2: -1 / 12}
+    slope = lambda e: sum(w * (acceleration(x + k * h * e) - acceleration(x - k * h * e))  # noqa: E731
+                          for k, w in weights.items()) / h
+    return -np.stack([slope(e) for e in np.eye(2)], axis=-1)
+
+
+@pytest.mark.parametrize("gain", [400.0, [400.0, 400.0, 400.0]], ids=["all joints", "drives only"])
+def test_effective_gain_is_what_the_error_feels(gain):
+    x = np.array([0.04, -0.03])
+    F = rk.orthogonal_complement(ROBOT, rk.inverse_kinematics(ROBOT, x))
+    K = 400.0 * np.diag([1, 1, 1, *([1, 1, 1] if np.ndim(gain) == 0 else [0, 0, 0])])
+    found = stiffness(rk.RedundantCTC(gain, 40.0), ROBOT, x)
+    assert_allclose(found, rk.effective_gain(F, K), rtol=1e-6, atol=1e-4)
+    if np.ndim(gain) == 0:
+        assert_allclose(rk.effective_gain(F, gain), 400 * np.eye(2), atol=1e-9)
+
+
+def test_pose_dependent_gain_at_the_centroid_and_along_the_path():
+    S = np.diag([1.0, 1, 1, 0, 0, 0])
+    gain = lambda q: np.linalg.eigvals(rk.effective_gain(rk.orthogonal_complement(TESTBED, q), S)).real  # noqa: E731
+    assert_allclose(gain(rk.inverse_kinematics(TESTBED, [0.0, 0.0])), 3 / 7, atol=1e-12)
+    along_path = gain(rk.triangle(TESTBED).q)
+    assert_allclose([along_path.min(), along_path.max()], [0.19, 0.73], atol=0.005)
+    # Eigenvalues do not depend on the coordinates.
+    q = rk.inverse_kinematics(TESTBED, [0.03, 0.02])
+    other = np.linalg.eigvals(rk.effective_gain(rk.orthogonal_complement(TESTBED, q, (0, 1)), S))
+    assert_allclose(np.sort(other), np.sort(gain(q)), atol=1e-12)
+
+
+def test_torques_do_not_depend_on_the_partition_rule():
+    q, qd, desired = state_and_target(ROBOT)
+    for law in (rk.RedundantAPD, rk.RedundantCTC):
+        rules = ("sigma_min", "condition", "printed")
+        c = [torque(law(400.0, 40.0, rule=rule), ROBOT, q, qd, desired) for rule in rules]
+        assert (norm(c[1] - c[0]) / norm(c[0])).max() < 1e-11
+        assert (norm(c[2] - c[0]) / norm(c[0])).max() < 1e-6  # the printed rule picks nearly singular partitions
+
+
+# The controller in a sampled loop.
+def test_controller_uses_the_least_squares_pose_of_the_measurement():
+    path, offset = rk.triangle(FRICTIONLESS, dt=0.01), np.array([0.004, -0.002, 0.005])
+    law = rk.AntagonismFilter(rk.PD(7.05, 0.225))
+    controller = rk.Controller(law, FRICTIONLESS)
+    for k in (0, 1, 2):
+        q_a, qd_a = path.q_a[k] + offset, path.qd_a[k]
+        q = rk.estimate_pose(FRICTIONLESS, q_a, path.x[k])
+        A = rk.control_matrix(FRICTIONLESS, q)
+        c = controller(path.t[k], q_a, qd_a, path[k])
+        assert_allclose(c, rk.antagonism_filter(A) @ (-7.05 * offset), atol=1e-12)
+    true = rk.Controller(rk.AntagonismFilter(rk.PD(7.05, 0.225), pose="true"), FRICTIONLESS)
+    A = rk.control_matrix(FRICTIONLESS, path.q[5])
+    c = true(0.05, path.q_a[5] + offset, path.qd_a[5], path[5], truth=(path.x[5], path.xd[5]))
+    assert_allclose(c, rk.antagonism_filter(A) @ (-7.05 * offset), atol=1e-12)
+    switched = rk.Controller(rk.SwitchedCTC(400, 40), FRICTIONLESS)
+    switched(0.0, path.q_a[0], path.qd_a[0], path[0])
+    assert switched.pair == rk.SwitchedCTC(400, 40).choose(FRICTIONLESS, path.q[0])
+    with pytest.raises(NotImplementedError):
+        rk.Law().torque(FRICTIONLESS, None, None, None, None, None)
+
+
+PLAIN = rk.PD(7.0, 0.2)
+MEMORYLESS = [PLAIN, rk.AntagonismFilter(PLAIN), rk.CommandFilter(PLAIN), *[LAWS[k] for k in LAWS if k != "switched"]]
+
+
+@pytest.mark.parametrize("law", MEMORYLESS, ids=lambda law: type(law).__name__)
+def test_one_sample_and_many_are_the_same_call(law):
+    q, qd, desired = state_and_target(ROBOT, 8)
+    whole = torque(law, ROBOT, q, qd, desired, offset=1e-3)
+    for k in range(8):
+        assert_allclose(torque(law, ROBOT, q[k], qd[k], part(desired, k), offset=1e-3), whole[k], atol=1e-12 * np.abs(whole).max())
+
+
+# Runs: what energy and antagonism say about them.
+def test_energies_of_a_run_by_their_definitions():
+    path = rk.triangle(FRICTIONLESS, duration=1.0, dt=1e-3, side=0.1)
+    offset = np.array([0.004, -0.002, 0.005])
+    run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), path, offset)
+    n = rk.null_vector(FRICTIONLESS, run.q)
+    null = n * np.einsum("ki,ki->k", n, run.c)[:, None]
+    assert_allclose(rk.antagonistic_torque(run), null, atol=1e-13)
+    assert_allclose(rk.antagonistic_energy(run), 0.611 / 0.0259**2 * (null[:-1] ** 2).sum() * 1e-3, rtol=1e-12)
+    assert_allclose(run.energy, rk.copper_loss(FRICTIONLESS, run.c[:-1], 1e-3) + rk.mechanical_work(run), rtol=1e-12)
+    gained = rk.kinetic_energy(FRICTIONLESS, run.q[-1], run.qd[-1])
+    assert_allclose(rk.mechanical_work(run).sum(), gained, atol=1e-9)
