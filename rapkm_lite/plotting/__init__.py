@@ -55,6 +55,7 @@ from .robust import (
 )
 from .runs import (
     plot_antagonism,
+    plot_difference,
     plot_energies,
     plot_errors,
     plot_table1,

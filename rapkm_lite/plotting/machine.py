@@ -26,7 +26,7 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
         if labels:
             outward = robot.base[i] - robot.base.mean(axis=0)
             outward = outward / max(np.hypot(*outward), 1e-9)
-            ax.annotate(f"drive {i + 1}", robot.base[i], xytext=16 * outward, textcoords="offset points",
+            ax.annotate(f"drive {i + 1}", robot.base[i], xytext=outward * (34, 17), textcoords="offset points",
                         ha="center", va="center", color=arm_colour(i), fontweight="bold", fontsize=9)
     return plane_axes(robot, ax)
 
@@ -34,7 +34,8 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
 def plot_workspace(robot, ax=None, n: int = 240, colour: str = "#EEF2F6"):
     """Shade the points that all arms reach."""
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
-    x, y = plane_grid(robot, n)
+    # A little more than the workspace, so that its outline closes.
+    x, y = (v.mean() + 1.02 * (v - v.mean()) for v in plane_grid(robot, n))
     inside = reachable(robot, np.stack([x, y], axis=-1))
     ax.contourf(x, y, inside.astype(float), levels=[0.5, 1.5], colors=[colour], zorder=0)
     ax.contour(x, y, inside.astype(float), levels=[0.5], colors=[NEUTRAL], linewidths=0.8, zorder=1)
@@ -119,10 +120,11 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
 
 
 def plane_grid(robot, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """n x n grids x, y in m over the box that all arms reach into."""
+    """n x n grids x, y in m over the box that all arms reach into: centres of n x n cells, none on the edge."""
     reach = robot.lengths.sum(axis=1)[:, None]
     low, high = (robot.base - reach).max(axis=0), (robot.base + reach).min(axis=0)
-    return tuple(np.meshgrid(np.linspace(low[0], high[0], n), np.linspace(low[1], high[1], n)))
+    place = (np.arange(n) + 0.5) / n
+    return tuple(np.meshgrid(*(low[:, None] + place * (high - low)[:, None])))
 
 
 def plane_axes(robot, ax):

@@ -33,13 +33,18 @@ def plot_antagonism(run, ax=None, title: str = ""):
     return _per_drive(run, antagonistic_torque(run), ax, "antagonism in N m", title)
 
 
+def plot_difference(run, other, ax=None, title: str = ""):
+    """How much the true base angles of two runs along the same path differ, over time."""
+    return _per_drive(run, 1e6 * (run.q_a - other.q_a), ax, "difference in µrad", title)
+
+
 def _per_drive(run, values, ax, ylabel: str, title: str):
-    """One line per drive; the legend gets a strip of its own above the curves."""
+    """One line per drive; the margin keeps the legend off the curves, also on shared axes."""
     ax = axes_or_new(ax)
     for i, line in enumerate(values.T):
         ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))
-    low, high = ax.get_ylim()
-    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]), ylim=(low, high + 0.16 * (high - low)))
+    ax.margins(y=0.18)
+    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]))
     ax.legend(ncols=run.robot.n_arms, loc="upper right")
     return ax
 
@@ -49,7 +54,7 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
 
     antagonism : show only the part that moves nothing.  log : logarithmic axis, cut off at 1e-9 N m.
     """
-    ax = axes_or_new(ax)
+    ax = axes_or_new(ax, figsize=(9.8, 3.3))
     for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
         ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
