@@ -58,6 +58,8 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     grid = np.stack([gx, gy], axis=-1)
     extent = gx[0, 0], gx[0, -1], gy[0, 0], gy[-1, 0]
     inside = reachable(robot, grid)
+    # On the very boundary an arm is straight and A in end-effector coordinates does not exist.
+    inside[inside] = np.all(np.abs(np.sin(inverse_kinematics(robot, grid[inside])[:, robot.n_arms :])) > 1e-6, axis=-1)
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ma.MaskedArray:
