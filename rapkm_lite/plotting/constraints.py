@@ -46,7 +46,7 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
                                                     "shrinkB": 4}, zorder=7)
         if i != 1:
             ax.plot([], [], color=ALARM, label=f"arm 2 to arm {i + 1}: {1e3 * gap:.1f} mm")
-    ax.legend(loc="upper left", handlelength=0, title="gaps")
+    ax.legend(loc="upper left", handlelength=0, handletextpad=0, title="gaps")
     ax.set_title(title)
     return ax
 
@@ -74,20 +74,24 @@ def plot_topology(robot, ax=None):
     return ax
 
 
-def configuration_sheet(robot, mode, n: int = 41) -> np.ndarray:
-    """Base angles (n, 4 n, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi.
+def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
+    """Base angles (n, rays, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi.
 
     The workspace is taken to be star-shaped about the mean of the base points.
     """
     centre = robot.base.mean(axis=0)
-    way = unit_vector(np.linspace(0, 2 * np.pi, 4 * n))
+    # At a corner on a base point one point of the plane is a whole edge of the sheet: rays crowd there.
+    corners = np.arctan2(*(robot.base - centre).T[::-1])
+    crowd = np.concatenate([[0], np.logspace(-7, -1.5, 8), -np.logspace(-7, -1.5, 8)])
+    rays = np.concatenate([np.linspace(0, 2 * np.pi, 4 * n + 1), np.ravel(corners[:, None] + crowd) % (2 * np.pi)])
+    way = unit_vector(np.sort(rays))
     low, high = np.zeros(len(way)), np.full(len(way), robot.lengths.sum(axis=1).max())
     for _ in range(50):
         middle = (low + high) / 2
         inside = reachable(robot, centre + middle[:, None] * way)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    # Rings close together at the rim, where the angles change like a square root.
-    ring = np.sin(np.linspace(0, np.pi / 2, n))
+    # Rings close together at the rim, where the angles change like a square root; the last one stays just inside.
+    ring = np.sin(np.linspace(0, np.pi / 2, n)) * (1 - 1e-10)
     q = inverse_kinematics(robot, centre + ring[:, None, None] * low[:, None] * way, mode)
     start = np.arctan2(*(centre - robot.base).T[::-1])
     return start + wrap(q[..., : robot.n_arms] - start)
@@ -106,7 +110,7 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     for shade, mode in zip(shades, modes, strict=True):
         sheet = np.rad2deg(configuration_sheet(robot, mode))
         name = "".join("+" if s > 0 else "−" for s in mode)
-        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.75, lw=0, rcount=41, ccount=80, label=f"mode {name}")
+        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.8, lw=0, rstride=1, cstride=1, label=f"mode {name}")
         ax.plot(*sheet[-1, :, :3].T, color=NEUTRAL, lw=0.8)
         rims.append(sheet[-1])
     if len(rims) == 2:
@@ -126,9 +130,9 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     ax.set_aspect("equal")
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(mpl.ticker.MultipleLocator(90 if len(modes) > 2 else 45))
-        axis.labelpad = 7
-    ax.view_init(elev=22, azim=-52)
-    ax.set_box_aspect(None, zoom=0.85)
+        axis.labelpad = 10
+    ax.view_init(elev=22, azim=-105)
+    ax.set_box_aspect(None, zoom=0.95)
     ax.legend(loc="upper left", fontsize=9)
     return ax
 
@@ -155,7 +159,7 @@ def plot_loop_gaps(t, gaps: dict, ax=None):
     """Largest loop gap over time on a logarithmic axis; `gaps` maps a label to (k,) gaps in m."""
     ax = axes_or_new(ax)
     for k, (label, gap) in enumerate(gaps.items()):
-        colour, dash = (ALARM, BEFORE, AFTER)[k % 3], ("-", "--", "-.")[k % 3]
+        colour, dash = (ALARM, BEFORE, AFTER)[k % 3], ("-", "--", "-")[k % 3]
         ax.semilogy(t, 1e3 * np.maximum(gap, 1e-16), color=colour, ls=dash, label=label)
     ax.set(xlabel="time in s", ylabel="largest loop gap in mm", xlim=(t[0], t[-1]))
     ax.legend(loc="center right")
