@@ -86,6 +86,6 @@ EXERCISES = {
         "(without unit)", _partitions, _penrose),
     "05.gain_for_bandwidth": Exercise(
         gain_for_bandwidth,
-        "effective_gain of the matrix that selects the driven joints, at every pose: its smallest eigenvalue says what is lost",
+        "take effective_gain of the matrix that selects the driven joints at every pose, and its smallest eigenvalue",
         "1/s^2", _bandwidths, _slowest, tolerance=1e-6),
 }

@@ -92,7 +92,7 @@ def plot_feedback_along(trajectory, ax=None):
                     **pair_line(robot, pair))
     ax.semilogy(trajectory.t, feedback_norm(robot, trajectory.q), label="redundant", color=AFTER, lw=2.4)
     ax.set(xlabel="time in s", ylabel="norm in N m per rad/s²", xlim=(0, trajectory.t[-1]))
-    ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.06, 1.0), columnspacing=1.2, handlelength=1.8)
     return ax
 
 
@@ -106,6 +106,9 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     for ax in axes:
         for t in run.t[at]:
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
+    # One legend for both panels, above the data.
+    axes[0].get_legend().remove()
+    axes[1].legend(ncols=run.robot.n_arms, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return axes
 
 
@@ -115,23 +118,32 @@ def plot_ee_errors(runs: dict, ax=None):
     for label, run in runs.items():
         distance = np.linalg.norm(run.x - run.trajectory.x, axis=-1)
         ax.semilogy(run.t[1:], 1e3 * distance[1:], label=label, **_law_line(label))
-    ax.set(xlabel="time in s", ylabel="end-effector error in mm")
+    longest = max(run.t[-1] for run in runs.values())
+    ax.set(xlabel="time in s", ylabel="end-effector error in mm", xlim=(0, longest), ylim=(0.05, None))
     ax.legend(ncols=len(runs), loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return ax
 
 
-def plot_ee_paths(runs: dict, ax=None, pair=None):
-    """True end-effector paths of several runs over their desired path and the curve of a pair; keys are labels."""
-    ax = axes_or_new(ax, figsize=(4.6, 4.4))
+def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -0.045)):
+    """True end-effector paths of several runs and the curve of a pair: the workspace, and the box `zoom` in m.
+
+    runs : label -> run; a cross marks where a run shorter than the longest one ends.
+    """
+    if axes is None:
+        axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1]
     longest = max(runs.values(), key=lambda run: len(run.t))
-    plot_workspace(longest.robot, ax)
-    plot_path(longest.trajectory, ax, color="#AAAAAA", lw=3.5)
-    plot_pair_curves(longest.robot, ax, pairs=None if pair is None else [pair])
-    for label, run in runs.items():
-        ax.plot(*run.x.T, lw=1.6, label=label, zorder=4, **_law_line(label))
-        ax.plot(*run.x[-1], "x" if run is not longest else "", color=_law_line(label).get("color"), ms=9, mew=2.5)
-    ax.legend(loc="upper left", fontsize=8.5)
-    return _frame(ax)
+    for ax in axes:
+        plot_workspace(longest.robot, ax)
+        plot_path(longest.trajectory, ax, color="#BBBBBB", lw=5)
+        plot_pair_curves(longest.robot, ax, pairs=None if pair is None else [pair])
+        for label, run in runs.items():
+            ax.plot(*run.x.T, label=label, zorder=4, **_law_line(label))
+            if run is not longest:
+                ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
+        _frame(ax)
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="")
+    axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
 
 
 def plot_pairs(run, ax=None):
@@ -189,14 +201,12 @@ def plot_step_response(t, measured: dict, predicted: dict, ax=None):
     return ax
 
 
-def plot_lyapunov(t, V, dissipated, ax=None):
-    """Lyapunov function and what damping has not yet taken of its first value, both in J, on a logarithmic axis."""
+def plot_lyapunov(t, V, to_come, ax=None):
+    """Lyapunov function and the work that damping has still to do, both in J, on a logarithmic axis."""
     ax = axes_or_new(ax)
     ax.semilogy(t, V, color=AFTER, label="V from the simulated state")
-    left = V[0] - dissipated
     show = slice(None, None, max(1, len(t) // 40))
-    ax.semilogy(t[show], np.where(left[show] > 0, left[show], np.nan), "o", color=ALARM, mfc="white", ms=5,
-                label="V(0) minus the work of the damping")
-    ax.set(xlabel="time in s", ylabel="V in J", xlim=(0, t[-1]))
+    ax.semilogy(t[show], to_come[show], "o", color=ALARM, mfc="white", ms=5, label="work of the damping from now on")
+    ax.set(xlabel="time in s", ylabel="energy in J", xlim=(0, t[-1]))
     ax.legend(loc="upper right")
     return ax
