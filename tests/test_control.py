@@ -168,8 +168,9 @@ def test_fixed_pair_feedback_grows_at_its_singularity_and_the_redundant_one_does
     redundant = np.linalg.norm(pinv @ Gt, axis=(-2, -1))
     assert redundant.max() < 2 * np.median(redundant) < 0.1 * fixed.max()
     away = q[np.argsort(cross)[-50:]]
-    still = rk.Desired(3, rk.forward_kinematics(FRICTIONLESS, away), np.zeros((50, 2)), np.ones((50, 2)), away, 0 * away,
-                       mv(rk.orthogonal_complement(FRICTIONLESS, away), np.ones((50, 2))))
+    none, ones = np.zeros((50, 2)), np.ones((50, 2))
+    still = rk.Desired(3, rk.forward_kinematics(FRICTIONLESS, away), none, ones, away, 0 * away,
+                       mv(rk.orthogonal_complement(FRICTIONLESS, away), ones))
     one = torque(rk.CTC(400, 40, (1, 2)), FRICTIONLESS, away, 0 * away, still)
     two = torque(rk.RedundantCTC(400, 40), FRICTIONLESS, away, 0 * away, still)
     assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
@@ -301,7 +302,8 @@ def test_one_sample_and_many_are_the_same_call(law):
     q, qd, desired = state_and_target(ROBOT, 8)
     whole = torque(law, ROBOT, q, qd, desired, offset=1e-3)
     for k in range(8):
-        assert_allclose(torque(law, ROBOT, q[k], qd[k], part(desired, k), offset=1e-3), whole[k], atol=1e-12 * np.abs(whole).max())
+        single = torque(law, ROBOT, q[k], qd[k], part(desired, k), offset=1e-3)
+        assert_allclose(single, whole[k], atol=1e-12 * np.abs(whole).max())
 
 
 # Runs: what energy and antagonism say about them.
