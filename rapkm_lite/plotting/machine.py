@@ -93,7 +93,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
                      label=f"seen by drives {pair[0] + 1} and {pair[1] + 1}")
     axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
     plane_axes(robot, axes[0])
-    low, high = robot.base.min(axis=0) - 0.08, robot.base.max(axis=0) + 0.05
+    low, high = robot.base.min(axis=0) - 0.11, robot.base.max(axis=0) + 0.08
     axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1] + 0.13), title=f"offsets magnified {magnify:g} times")
     axes[0].legend(loc="upper left")
 
