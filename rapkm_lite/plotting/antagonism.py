@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from ..actuation import control_matrix, null_vector, steady_state_error, steady_state_torque
-from ..kinematics import inverse_kinematics, reachable
-from .machine import plane_axes, plane_grid, plot_path
+from ..kinematics import inverse_kinematics
+from ..maps import workspace_grid
+from .machine import plane_axes, plot_path
 from .runs import plot_torques
 from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
 
@@ -29,7 +31,7 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     for i in range(len(A)):
         along = np.array([-normal[i, 1], normal[i, 0]])
         foot = centre + (level[i] - normal[i] @ centre) * normal[i]
-        label = f"drive {i + 1}: {torque[i]:+.1f} mN m"
+        label = f"drive {i + 1}: {np.round(torque[i], 1) + 0.0:.1f} mN m"
         ax.plot(*(foot + np.outer([-4 * half, 4 * half], along)).T, label=label, **arm_line(i))
         target = rest + (level[i] - normal[i] @ rest) * normal[i]
         ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)
@@ -59,28 +61,32 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
     ax.set(xscale="log", xlabel="gain of drive 3 / gain of drives 1 and 2", ylabel="largest rest torque in mN m",
            title=title)
+    _plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
     ax.legend()
     return ax
 
 
-def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 161, title: str = ""):
+def _plain_ticks(ax, values) -> None:
+    """Marks on a logarithmic x axis, written as plain numbers."""
+    ax.set_xticks(values, [f"{v:g}" for v in values])
+    ax.set_xticks([], minor=True)
+
+
+def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
     """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all."""
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
-    x, y = plane_grid(robot, n)
-    points = np.stack([x, y], axis=-1)
-    inside = reachable(robot, points) & (np.hypot(*np.gradient(reachable(robot, points).astype(float))) == 0.0)
-    q = inverse_kinematics(robot, points[inside])
-    torque = np.full(x.shape, np.nan)
-    signed = np.full(x.shape, np.nan)
+    x, y, inside = workspace_grid(robot, n)
+    q = inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
+    torque, signed = np.full((2, n, n), np.nan)
     torque[inside] = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
     signed[inside] = null_vector(robot, q) @ np.asarray(offset, dtype=float)
-    image = ax.pcolormesh(x, y, torque, shading="gouraud", rasterized=True, vmin=0.0)
+    image = ax.pcolormesh(x, y, np.ma.masked_invalid(torque), shading="nearest", rasterized=True, vmin=0.0)
     ax.contour(x, y, signed, levels=[0.0], colors="white", linewidths=1.6)
     ax.figure.colorbar(image, ax=ax, label="norm of the rest torques in mN m", shrink=0.9)
     if trajectory is not None:
         plot_path(trajectory, ax, color="white", ls="--")
     plane_axes(robot, ax)
-    ax.set(xlim=(np.nanmin(x), np.nanmax(x)), ylim=(np.nanmin(y), np.nanmax(y)), title=title)
+    ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], title=title)
     ax.grid(visible=False)
     return ax
 
@@ -99,27 +105,28 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     for mask, look in ((~held, {"color": ALARM}), (held, {"color": AFTER, "lw": 3.5})):
         label = "measured, rests here" if look["color"] == AFTER else "measured, is driven on"
         steps = np.where(mask & (np.abs(np.gradient(torque)) == 0.0), torque, np.nan)
-        ax.plot(angle, steps, label=label if mask.any() else None, **look)
-    ax.axvline(target, color=NEUTRAL, lw=0.8)
+        ax.plot(angle, steps, label=label, **look)
+    ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
     ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
     return ax
 
 
-def plot_chatter(ratio, chatter, can_rest, ax=None, title: str = ""):
-    """Torque ripple of many runs against K_P quantum / (2 f_c); open dots: a place of rest exists, crosses: none does.
+def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
+    """Torque jumps per second of many runs (k,) against K_P quantum / (2 f_c) (k,).
 
-    ratio, can_rest : (k,) ; chatter : (k,) standard deviation of the torque over half its step.
+    can_rest : (k,); open circles where a place of rest exists, crosses where none does.
     """
     ax = axes_or_new(ax)
-    ratio, chatter, can_rest = np.asarray(ratio), np.asarray(chatter), np.asarray(can_rest)
+    ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
     ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
     ax.axvline(1.0, color=NEUTRAL, lw=1.0)
     dots, crosses = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}, {"color": ALARM, "mew": 1.8, "ms": 7}
-    ax.plot(ratio[can_rest], chatter[can_rest], "o", label="a place of rest exists", **dots)
-    ax.plot(ratio[~can_rest], chatter[~can_rest], "x", label="no place of rest", **crosses)
-    ax.set(xscale="log", xlim=(ratio.min() / 1.15, ratio.max() * 1.15), ylim=(-0.06, 1.16), title=title,
+    ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
+    ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
+    ax.set(xscale="log", xlim=(ratio.min() / 1.15, ratio.max() * 1.15), title=title,
            xlabel="step of the torque over width of the friction band, K$_P$ quantum / (2 f$_c$)",
-           ylabel="torque ripple / half a step")
+           ylabel="torque jumps per second")
+    _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 4])
     ax.legend(loc="center left")
     return ax
 
@@ -127,7 +134,7 @@ def plot_chatter(ratio, chatter, can_rest, ax=None, title: str = ""):
 def plot_log(log, axes=None):
     """A log: measured minus desired angles above, drive torques below, over time; returns both axes."""
     if axes is None:
-        axes = axes_or_new(figsize=(8.0, 4.4), nrows=2, sharex=True)
+        axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True)
     for i in range(log.c.shape[1]):
         axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
         axes[1].plot(log.t, log.c[:, i], **arm_line(i))
