@@ -96,8 +96,11 @@ def plot_feedback_along(trajectory, ax=None):
     return ax
 
 
-def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
-    """Torques and angle errors of one run (figs. 9 and 10); thin lines where the path crosses the pair's curve."""
+def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_to: float | None = None):
+    """Torques and angle errors of one run (figs. 9 and 10); thin lines where the path crosses the pair's curve.
+
+    linear_to : torque in N m beyond which the torque axis is logarithmic; None for a linear axis.
+    """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
     plot_torques(run, axes[0], title)
@@ -106,6 +109,11 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     for ax in axes:
         for t in run.t[at]:
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
+    if linear_to is not None:
+        axes[0].set_yscale("symlog", linthresh=linear_to)
+        low, high = axes[0].get_ylim()
+        ticks = [t for t in (-100, -10, -1, -0.1, 0, 0.1, 1, 10, 100) if low <= t <= high]
+        axes[0].set_yticks(ticks, [f"{t:g}" for t in ticks])
     # One legend for both panels, above the data.
     axes[0].get_legend().remove()
     axes[1].legend(ncols=run.robot.n_arms, loc="lower right", bbox_to_anchor=(1.0, 1.0))
@@ -141,8 +149,8 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
             if run is not longest:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(ax)
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="")
-    axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", aspect="auto", title="enlarged, y stretched")
+    axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
 
 
