@@ -31,7 +31,6 @@ from .constraints import (
     plot_topology,
 )
 from .machine import (
-    pair_poses,
     plane_axes,
     plane_grid,
     plot_machine,

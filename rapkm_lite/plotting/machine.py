@@ -61,7 +61,7 @@ def plot_working_modes(robot, x, axes=None):
     return axes
 
 
-def pair_poses(robot, q_a, guess) -> dict:
+def _pair_poses(robot, q_a, guess) -> dict:
     """What each equivalent five-bar (fig. 3) makes of measured base angles q_a (N,) in rad, by pair of drives.
 
     Each value is the configuration (4,) in rad of ``robot.with_arms(pair)``, found from the point `guess` (2,) in m.
@@ -80,7 +80,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
     true = inverse_kinematics(robot, x)[: robot.n_arms]
     pairs = drive_pairs(robot)
-    shown = pair_poses(robot, true + magnify * offset, x)
+    shown = _pair_poses(robot, true + magnify * offset, x)
     for pair, face in zip((pairs[0], pairs[-1]), ("white", ALARM), strict=True):
         five_bar = robot.with_arms(pair)
         a, d = arm_vectors(five_bar, shown[pair])
@@ -97,7 +97,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1] + 0.13), title=f"offsets magnified {magnify:g} times")
     axes[0].legend(loc="upper left")
 
-    seen = pair_poses(robot, true + offset, x)
+    seen = _pair_poses(robot, true + offset, x)
     points = {pair: forward_kinematics(robot.with_arms(pair), q) for pair, q in seen.items()}
     _plot_beliefs(robot, x, points, forward_kinematics(robot, estimate_pose(robot, true + offset, x)), axes[1])
     return axes
