@@ -52,7 +52,7 @@ def _regular_pairs(rng) -> list[tuple]:
     cases = []
     while len(cases) < 12:
         robot = (load(), _four_arms())[len(cases) % 2]
-        q, pair = _pose(robot, rng), sorted(int(i) for i in rng.choice(robot.n_joints, 2, replace=False))
+        q, pair = _pose(robot, rng), [int(i) for i in rng.choice(robot.n_joints, 2, replace=False)]
         rest = [j for j in range(robot.n_joints) if j not in pair]
         if np.linalg.svd(constraint_jacobian(robot, q)[:, rest], compute_uv=False)[-1] > 0.02:
             cases.append((robot, q, pair))

@@ -30,7 +30,9 @@ def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: st
     ax.plot(*np.stack([at, at + 1.35 * size * unit_vector(start)]).T, ":", color=NEUTRAL, lw=1.1, zorder=2)
     ax.plot(*arc.T, color=colour, lw=1.1, zorder=2)
     ax.annotate("", arc[-1], arc[-4], arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.1}, zorder=2)
-    middle = at + 1.55 * size * unit_vector(np.asarray((start + stop) / 2))
+    # The name of a narrow angle stands on the other side of its dotted line.
+    half = (stop - start) / 2
+    middle = at + 1.55 * size * unit_vector(np.asarray(start + (half if abs(half) > 0.4 else -np.copysign(0.3, half))))
     ax.text(*middle, text, color=colour, ha="center", va="center", fontsize=11, zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8})
 
