@@ -18,7 +18,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     try:
         array = np.asarray(value)
         # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
-        if array.dtype.kind not in "iufO":
+        if value is None or array.dtype.kind not in "iufO":
             raise TypeError
         array = array.astype(float, copy=False)
     except (TypeError, ValueError):

@@ -202,7 +202,7 @@ class APD(Law):
             xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
             return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
-        j = list(self.independent)
+        j = list(joint_indices("independent", self.independent, model.n_joints))
         e, ed = state[0][..., j] - desired.q[..., j], state[1][..., j] - desired.qd[..., j]
         return e, ed, desired.qd[..., j], desired.qdd[..., j], qd[..., j], control_matrix(model, q, j)
 

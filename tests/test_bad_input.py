@@ -1,0 +1,273 @@
+"""Every public function against bad arguments: always a ValueError with a sentence, never NaN or LinAlgError."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from samples import MACHINES, TESTBED, random_motion
+
+import rapkm_lite as rk
+
+Q, QD, QDD, (X, XD, XDD) = random_motion(TESTBED, 5, bend=0.3)
+C = np.full((5, 3), 0.01)
+A = rk.control_matrix(TESTBED, Q)
+A_TILDE = rk.redundant_control_matrix(TESTBED, Q)
+F = rk.orthogonal_complement(TESTBED, Q)
+PATH = rk.hold(TESTBED, [0.01, 0.02], 0.01)
+SAMPLE = rk.Desired(3, X, XD, XDD, Q, QD, QDD)
+
+
+def broken(value):
+    """What nobody should pass where a real array is wanted."""
+    value = np.asarray(value, dtype=float)
+    holes = [value.copy(), value.copy(), value + 0j, value.astype(str), value.astype(bool), None, "abc", {}]
+    holes[0][(0,) * value.ndim], holes[1][(-1,) * value.ndim] = np.nan, np.inf
+    shapes = [np.zeros(0), np.zeros((5, 7))]
+    if value.ndim:
+        shapes += [value[..., :-1], 1.0, np.concatenate([value, value], axis=-1)]
+    return holes + shapes
+
+
+def lead(value):
+    """Leading axes that fit nothing else."""
+    return np.broadcast_to(value[0], (4, *value.shape[1:]))
+
+
+def on(f, **good):
+    return pytest.param(lambda **kw: f(TESTBED, **kw), good, id=f.__name__)
+
+
+
+motion = {"q": Q, "qd": QD}
+CALLS = [
+    on(rk.arm_vectors, q=Q), on(rk.tips, q=Q), on(rk.forward_kinematics, q=Q), on(rk.loop_constraints, q=Q),
+    on(rk.constraint_jacobian, q=Q), on(rk.constraint_jacobian_dot, **motion), on(rk.reachable, x=X),
+    on(rk.working_mode, q=Q), on(rk.inverse_kinematics, x=X, mode=np.ones((5, 3))), on(rk.close_loops, q=Q),
+    on(rk.estimate_pose, q_a=Q[:, :3], guess=X), on(rk.mass_matrix, q=Q), on(rk.coriolis_matrix, **motion),
+    on(rk.generalized_forces, **motion), on(rk.orthogonal_complement, q=Q), on(rk.orthogonal_complement_dot, **motion),
+    on(rk.minimal_dynamics, **motion), on(rk.constraint_rank, q=Q), on(rk.degree_of_freedom, q=Q),
+    on(rk.nullspace_projector, q=Q), on(rk.nullspace_projector_dot, **motion), on(rk.redundant_dynamics, **motion),
+    on(rk.forward_dynamics, **motion, c=C), on(rk.kinetic_energy, **motion), on(rk.potential_energy, q=Q),
+    on(rk.control_matrix, q=Q), on(rk.redundant_control_matrix, q=Q), on(rk.degree_of_actuation, q=Q),
+    on(rk.actuation_type, q=Q), on(rk.control_vector_fields, q=Q), on(rk.distal_cross_products, q=Q),
+    on(rk.null_vector, q=Q), on(rk.inverse_dynamics, **motion, qdd=QDD, prestress=C),
+    on(rk.required_wrench, **motion, qdd=QDD),
+    pytest.param(lambda **kw: rk.lyapunov_function(TESTBED, **kw, K_P=1.0), {"q": Q, "e": Q, "ed": QD}, id="lyapunov"),
+    pytest.param(lambda **kw: rk.steady_state_error(A, 1.0, **kw), {"offset": C, "wrench": X}, id="steady_error"),
+    pytest.param(lambda **kw: rk.steady_state_torque(A, 1.0, **kw), {"offset": C, "wrench": X}, id="steady_torque"),
+    pytest.param(lambda c: rk.copper_loss(TESTBED, c, 1e-3), {"c": C}, id="copper_loss"),
+]
+TALL = {
+    "singular_values": rk.singular_values, "weighted_pseudoinverse": rk.weighted_pseudoinverse,
+    "prestress_projector": rk.prestress_projector, "antagonism_filter": rk.antagonism_filter,
+    "command_filter": lambda A: rk.command_filter(A, 1.0),
+    "steady_state_error": lambda A: rk.steady_state_error(A, 1.0, [0.1, 0.1, 0.1]),
+    "steady_state_torque": lambda A: rk.steady_state_torque(A, 1.0, [0.1, 0.1, 0.1]),
+}
+WIDE = {
+    "select_independent": rk.select_independent, "closed_loop_projector": rk.closed_loop_projector,
+    "explicit_pseudoinverse": lambda A_tilde: rk.explicit_pseudoinverse(A_tilde, (0, 1)),
+}
+
+
+def refused(call, name, *args, **kwargs):
+    """The call raises ValueError, not LinAlgError, with a sentence that names the argument."""
+    with pytest.raises(ValueError) as caught:
+        call(*args, **kwargs)
+    message = str(caught.value)
+    assert not isinstance(caught.value, np.linalg.LinAlgError)
+    assert re.search(rf"\b{re.escape(name)}", message), message
+    assert "allowed" in message or "needed" in message, message
+
+
+@pytest.mark.parametrize(("call", "good"), CALLS)
+def test_arrays(call, good):
+    call(**good)
+    for name in good:
+        for bad in broken(good[name]):
+            if bad is None and name in ("mode", "prestress", "wrench"):
+                continue  # None is the default there
+            refused(call, name, **(good | {name: bad}))
+        if len(good) > 1 and np.ndim(good[name]) > 1 and len(good[name]) == 5:
+            refused(call, name, **(good | {name: lead(good[name])}))
+
+
+@pytest.mark.parametrize("name", [*TALL, *WIDE, "effective_gain"])
+def test_matrices(name):
+    call, good, argument = {
+        **{k: (f, A, "A") for k, f in TALL.items()}, **{k: (f, A_TILDE, "A_tilde") for k, f in WIDE.items()},
+        "effective_gain": (lambda F: rk.effective_gain(F, np.eye(F.shape[-2] if np.ndim(F) > 1 else 6)), F, "F")}[name]
+    call(good)
+    odd = [good * np.nan, good + 0j, good.astype(str), good > 0, None, "A", 1.0, np.zeros(3), np.swapaxes(good, -1, -2)]
+    for bad in odd:
+        refused(call, argument, bad if name != "effective_gain" else np.asarray(bad))
+
+
+def test_leading_axes_of_matrices():
+    W = np.broadcast_to(np.eye(3), (4, 3, 3))
+    refused(rk.weighted_pseudoinverse, "W", A, W)
+    refused(rk.command_filter, "K", A, W)
+    refused(rk.steady_state_error, "K_P", A, W, C)
+    refused(rk.steady_state_error, "offset", A, 1.0, C[:4])
+    refused(rk.inverse_dynamics, "W", TESTBED, Q, QD, QDD, W)
+    refused(rk.inverse_dynamics, "prestress", TESTBED, Q, QD, QDD, None, C[:4])
+    refused(rk.effective_gain, "K", F, np.broadcast_to(np.eye(6), (4, 6, 6)))
+    for bad in (np.eye(5), np.nan, "K", np.ones(6), 1j):
+        refused(rk.effective_gain, "K", F, bad)
+
+
+@pytest.mark.parametrize("independent", [(0, 0), (0,), (0, 1, 2), (0, 6), (-1, 2), (0.5, 1), "01", 3, (True, False), [],
+                                         (None, 1), ((0, 1), (1, 2))], ids=str)
+def test_choice_of_coordinates(independent):
+    for f in (rk.orthogonal_complement, rk.control_matrix, rk.control_vector_fields):
+        refused(f, "independent", TESTBED, Q, independent)
+    for f in (rk.orthogonal_complement_dot, rk.minimal_dynamics):
+        refused(f, "independent", TESTBED, Q, QD, independent)
+    refused(lambda: rk.APD(1.0, 1.0, independent).torque(TESTBED, Q, QD, Q[:, :3], QD[:, :3], SAMPLE), "independent")
+    refused(rk.explicit_pseudoinverse, "rows", A_TILDE, independent)
+
+
+ROWS = [np.zeros((5, 2), int), np.full((5, 2), 3), np.array([[0, 1]] * 4), np.zeros((5, 3), int),
+        np.array([[0.0, 1.0]] * 5), np.array([[-1, 1]] * 5)]
+
+
+@pytest.mark.parametrize("rows", ROWS, ids=range(len(ROWS)))
+def test_row_choices(rows):
+    refused(rk.explicit_pseudoinverse, "rows", A_TILDE, rows)
+
+
+NOT_SPD = [0.0, -1.0, np.nan, [1.0, 2.0], [1.0, -1.0, 1.0], -np.eye(3), np.zeros((3, 3)), np.ones((3, 3)), np.eye(4),
+           np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]]), np.array([[1.0, 2, 0], [2, 1, 0], [0, 0, 1]]), "I", [],
+           True, 1j]
+
+
+@pytest.mark.parametrize("bad", NOT_SPD, ids=range(len(NOT_SPD)))
+def test_weights_and_gains(bad):
+    refused(rk.weighted_pseudoinverse, "W", A, bad)
+    refused(rk.prestress_projector, "W", A, bad)
+    refused(rk.inverse_dynamics, "W", TESTBED, Q, QD, QDD, bad)
+    refused(rk.command_filter, "K", A, bad)
+    refused(rk.steady_state_error, "K_P", A, bad, 0.01 * C)
+    refused(rk.steady_state_torque, "K_P", A, bad, 0.01 * C)
+    for law, name in itertools.product((rk.PD, rk.APD, rk.CTC, rk.SwitchedCTC, rk.RedundantAPD, rk.RedundantCTC),
+                                       ("K_P", "K_D")):
+        def use(law=law, name=name):
+            made = law(**({"K_P": 1.0, "K_D": 1.0} | {name: bad}))
+            made.torque(TESTBED, Q, QD, Q[:, :3], QD[:, :3], SAMPLE)
+        if not (np.shape(bad) == (2,) and law in (rk.APD, rk.CTC, rk.SwitchedCTC)):
+            refused(use, name)
+    refused(lambda: rk.CTC(1.0, 1.0, W=bad).torque(TESTBED, Q, QD, Q[:, :3], QD[:, :3], SAMPLE), "W")
+
+
+def test_options_of_the_laws():
+    pd = rk.PD(1.0, 1.0)
+    refused(rk.AntagonismFilter, "pose", pd, pose="guess")
+    refused(rk.AntagonismFilter, "law", 3.0)
+    refused(rk.CommandFilter, "law", rk.APD(1.0, 1.0))
+    refused(rk.RedundantCTC, "rule", 1.0, 1.0, rule="best")
+    refused(rk.SwitchedCTC, "hysteresis", 1.0, 1.0, hysteresis=0.5)
+    refused(rk.SwitchedCTC, "hysteresis", 1.0, 1.0, hysteresis=[1.2, 1.3])
+    switched = rk.SwitchedCTC(1.0, 1.0)
+    refused(switched.choose, "q", TESTBED, Q)
+    refused(switched.choose, "current", TESTBED, Q[0], (0, 5))
+    refused(switched.pairs, "q", TESTBED, Q[0])
+    assert switched.pairs(TESTBED, Q[:0]).shape == (0, 2)
+    laws = (pd, rk.AntagonismFilter(pd), rk.CommandFilter(pd), rk.APD(1.0, 1.0), rk.CTC(1.0, 1.0, None), switched,
+            rk.RedundantAPD(1.0, 1.0), rk.RedundantCTC(1.0, 1.0))
+    for law in laws:
+        refused(law.torque, "q_a", TESTBED, Q, QD, Q[:, :2], QD[:, :3], SAMPLE)
+        refused(law.torque, "qd_a", TESTBED, Q, QD, Q[:, :3], QD[:, :3] * np.nan, SAMPLE)
+        if law is not pd:
+            refused(law.torque, "q", TESTBED, Q[:, :5], QD, Q[:, :3], QD[:, :3], SAMPLE)
+
+
+def test_rules_measures_and_numbers():
+    refused(rk.select_independent, "rule", A_TILDE, "largest")
+    refused(rk.select_independent, "rule", A_TILDE, None)
+    for bad in ("sigma", 3, None, ["cross"]):
+        refused(rk.actuation_map, "measure", TESTBED, bad)
+        refused(rk.switching_map, "rule", TESTBED, bad)
+    for bad in (1, 0, -5, 2.5, np.nan, "9", [5, 5], True):
+        refused(rk.actuation_map, "n", TESTBED, n=bad)
+    for bad in ((0, 0, 0, 1), (1, 0, 0, 1), (0, 1, 0), "box", (0, 1, 0, np.inf)):
+        refused(rk.actuation_map, "box", TESTBED, n=5, box=bad)
+    for bad in ((0, 0), (0, 3), 1, "01"):
+        refused(rk.actuation_map, "pair", TESTBED, n=5, pair=bad)
+    for bad in ([1, 1], [1, 1, 0], [1, 1, 0.5], "+++", np.nan):
+        refused(rk.actuation_map, "mode", TESTBED, n=5, mode=bad)
+        refused(rk.inverse_kinematics, "mode", TESTBED, X, bad)
+    refused(rk.actuation_map, "robot", MACHINES["four_arms"], "prestress", n=5)
+    refused(rk.null_vector, "robot", MACHINES["five_bar"], np.zeros(4))
+    for bad in (0.0, -1e-9, np.nan, "tight", [1e-9, 1e-9]):
+        refused(rk.degree_of_actuation, "tolerance", TESTBED, Q, bad)
+        refused(rk.degree_of_freedom, "tolerance", TESTBED, Q, bad)
+        refused(rk.close_loops, "tolerance", TESTBED, Q, bad)
+        refused(rk.estimate_pose, "tolerance", TESTBED, Q[:, :3], X, bad)
+        refused(rk.copper_loss, "dt", TESTBED, C, bad)
+    for bad in (0, 1.5, "many"):
+        refused(rk.close_loops, "iterations", TESTBED, Q, iterations=bad)
+        refused(rk.estimate_pose, "iterations", TESTBED, Q[:, :3], X, iterations=bad)
+    refused(rk.copper_loss, "c", TESTBED, np.ones(3), 1e-3)
+    refused(rk.singular_values, "A", np.ones((5, 3, 3)))
+
+
+def test_rank_loss_is_named():
+    flat = np.ones((3, 2))
+    for f in (rk.weighted_pseudoinverse, rk.antagonism_filter, rk.prestress_projector):
+        refused(f, "A", flat)
+    refused(rk.steady_state_error, "A", flat, 1.0, np.zeros(3))
+    refused(rk.explicit_pseudoinverse, "A~_1", np.ones((3, 6)), (0, 1))
+    refused(rk.closed_loop_projector, "A~_1", np.ones((3, 6)))
+    refused(rk.effective_gain, "F^T F", np.zeros((6, 2)), 1.0)
+    edge = rk.inverse_kinematics(TESTBED, TESTBED.base[0] + 0.4 * np.array([np.cos(0.5), np.sin(0.5)]))
+    refused(rk.orthogonal_complement, "q", TESTBED, edge)
+    refused(rk.inverse_dynamics, "q", TESTBED, edge, edge, edge)
+    refused(rk.redundant_dynamics, "q", TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]), np.zeros(6))
+
+
+OUTSIDE = [[0.3, 0.3], [-0.25, -0.2], [1e3, 0.0]]
+
+
+def test_points_and_paths_outside_the_workspace():
+    for p in OUTSIDE:
+        refused(rk.inverse_kinematics, "x", TESTBED, p)
+        refused(rk.hold, "x", TESTBED, p)
+    with pytest.raises(ValueError, match=r"x\[1\] = \(0.3, 0.3\) m lies outside .* base point 1; allowed: 0 to 0.4 m"):
+        rk.inverse_kinematics(TESTBED, [[0, 0], [0.3, 0.3]])
+    refused(rk.triangle, "x", TESTBED, side=0.5)
+    refused(rk.circle, "x", TESTBED, radius=0.2)
+
+
+def test_arguments_of_the_paths():
+    for bad in (0.0, -1.0, np.nan, "0.1", [0.1, 0.2], None, True, 1j):
+        for name in ("side", "duration", "dt"):
+            refused(rk.triangle, name, TESTBED, **{name: bad})
+        for name in ("radius", "duration", "dt", "turns"):
+            refused(rk.circle, name, TESTBED, **{name: bad})
+    refused(rk.triangle, "dt", TESTBED, duration=1.0, dt=0.3)
+    refused(rk.triangle, "dt", TESTBED, duration=1.0, dt=2.0)
+    for bad in (-0.1, 2.5, 3.0, np.nan, [0.1], "0"):
+        refused(rk.triangle, "rest", TESTBED, rest=bad)
+    for bad in ([0, 0, 0], 0.0, [[0, 0], [0, 0]], [np.nan, 0], "origin"):
+        refused(rk.triangle, "centre", TESTBED, centre=bad)
+        refused(rk.circle, "centre", TESTBED, centre=bad)
+        refused(rk.hold, "x", TESTBED, bad)
+    refused(rk.triangle, "angle", TESTBED, angle=[0.1, 0.2])
+    for bad in ([[0, 0]], [0, 0], np.zeros((3, 3)), [], [[0, 0], [np.nan, 0]]):
+        refused(rk.polygon, "corners", TESTBED, bad)
+    times = ([0.0], [0.0, 1.0, 3.0], [1.0, 2.0], [0.0, 0.0], [0.0, -1.0], 1.0, [[0.0, 1.0]], ["0", "1"], [0, np.nan])
+    for bad in times:
+        zero = np.zeros((np.size(bad), 2))
+        refused(rk.follow, "t", TESTBED, bad, zero, zero, zero)
+    good = np.zeros((3, 2))
+    for name in ("x", "xd", "xdd"):
+        for bad in (np.zeros((2, 2)), np.zeros((3, 3)), np.zeros((1, 3, 2)), np.nan * good):
+            refused(rk.follow, name, TESTBED, [0, 0.1, 0.2], **({"x": good, "xd": good, "xdd": good} | {name: bad}))
+
+
+def test_no_numpy_warnings_turn_into_results():
+    with np.errstate(all="raise"):
+        for f in (rk.inverse_dynamics, rk.required_wrench):
+            assert np.all(np.isfinite(f(TESTBED, Q, QD, QDD)))
+        assert np.all(np.isfinite(rk.singular_values(np.zeros((2, 3, 2)))))

@@ -1,0 +1,94 @@
+"""Paths: geometry, boundary values, derivatives against finite differences."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import MACHINES, TESTBED
+
+import rapkm_lite as rk
+
+
+def paths():
+    square = [[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]]
+    rested = rk.triangle(TESTBED, rest=0.25, angle=0.3, centre=(0.01, 0.02))
+    return {"triangle": rk.triangle(TESTBED), "with rest": rested,
+            "circle": rk.circle(TESTBED, 0.09, turns=2), "square": rk.polygon(TESTBED, square, 4.0),
+            "asymmetric": rk.triangle(MACHINES["asymmetric"], side=0.18)}
+
+
+every_path = pytest.mark.parametrize("path", paths().values(), ids=paths().keys())
+
+
+@every_path
+def test_rates_are_the_derivatives_of_what_they_belong_to(path):
+    # Central differences of order eight; away from the corners, where the third derivative jumps.
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    k = np.arange(4, len(path) - 4)
+    difference = lambda v: sum(w * (v[k + j] - v[k - j]) for j, w in weights.items()) / path.dt  # noqa: E731
+    for value, rate in ((path.x, path.xd), (path.xd, path.xdd), (path.q, path.qd), (path.qd, path.qdd)):
+        error = np.abs(difference(value) - rate[k]).max(axis=-1)
+        smooth = np.ones(len(k), dtype=bool)
+        jumps = np.flatnonzero(np.abs(np.diff(path.xdd, 2, axis=0)).max(axis=-1) > 1e-3 * np.abs(path.xdd).max())
+        for j in jumps:
+            smooth[max(j - 12, 0) : j + 8] = False
+        assert smooth.mean() > 0.9
+        assert error[smooth].max() < 1e-7 * np.abs(rate).max()
+        assert error.max() < 1e-2 * np.abs(rate).max()
+
+
+@every_path
+def test_paths_are_closed_and_run_from_rest_to_rest(path):
+    assert_allclose(path.x[0], path.x[-1], atol=1e-15)
+    for rate in (path.xd, path.xdd, path.qd, path.qdd):
+        assert_allclose(rate[[0, -1]], 0, atol=1e-12)
+    assert np.abs(rk.loop_constraints(path.robot, path.q)).max() < 1e-15
+    assert_allclose(rk.forward_kinematics(path.robot, path.q), path.x, atol=1e-15)
+    assert np.abs(np.diff(path.q, axis=0)).max() < 0.02  # continuous, no wrap
+
+
+def test_triangle_is_the_one_of_the_reference():
+    path = rk.triangle(TESTBED)
+    assert path.t.shape == (5001,) and path.dt == 1e-3
+    corners = 0.24 / np.sqrt(3) * np.array([[-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5], [0, 1]])
+    for corner, time in zip(corners, (0, 5 / 3, 10 / 3), strict=True):
+        nearest = np.abs(path.t - time).argmin()
+        assert_allclose(path.x[nearest], corner, atol=1e-7)
+    length = np.linalg.norm(np.diff(path.x, axis=0), axis=-1).sum()
+    assert_allclose(length, 3 * 0.24, rtol=1e-6)
+    # Quintic rest to rest: a_max = 10/sqrt(3) s / T^2 = 0.4988 m/s^2.
+    assert_allclose(np.linalg.norm(path.xdd, axis=-1).max(), 10 / np.sqrt(3) * 0.24 / (5 / 3) ** 2, rtol=1e-5)
+    quarter = rk.triangle(TESTBED, angle=2 * np.pi / 3)
+    assert_allclose(quarter.x[0], corners[1], atol=1e-15)
+
+
+def test_circle_holds_its_radius_and_turns():
+    path = rk.circle(TESTBED, 0.1, turns=2, centre=(0.01, 0))
+    assert_allclose(np.linalg.norm(path.x - [0.01, 0], axis=-1), 0.1, atol=1e-15)
+    angle = np.unwrap(np.arctan2(path.x[:, 1], path.x[:, 0] - 0.01))
+    assert_allclose(angle[-1] - angle[0], 4 * np.pi, rtol=1e-12)
+
+
+def test_rest_is_spent_at_the_first_corner():
+    path = rk.triangle(TESTBED, rest=0.25)
+    still = (path.t <= 0.25) | (path.t >= 4.75)
+    assert_allclose(path.x[still], np.broadcast_to(path.x[0], (still.sum(), 2)), atol=1e-15)
+    assert np.abs(path.xd[~still]).max(axis=-1).min() >= 0
+    assert_allclose(np.linalg.norm(path.xdd, axis=-1).max(), 10 / np.sqrt(3) * 0.24 / 1.5**2, rtol=1e-5)
+
+
+def test_hold_stays():
+    path = rk.hold(TESTBED, [0.02, 0.01], duration=0.1)
+    assert np.all(path.x == [0.02, 0.01]) and not path.qd.any() and not path.qdd.any()
+
+
+def test_samples_and_other_machines():
+    path = rk.triangle(TESTBED, dt=0.01)
+    sample = path[17]
+    assert_allclose(sample.q_a, path.q_a[17])
+    assert_allclose(sample.qd_a, path.qd[17, :3])
+    assert_allclose(sample.qdd_a, path.qdd[17, :3])
+    assert path.for_robot(TESTBED.replace(friction=0.1)) is path
+    other = path.for_robot(MACHINES["asymmetric"])
+    assert_allclose(other.x, path.x)
+    assert_allclose(rk.forward_kinematics(MACHINES["asymmetric"], other.q), path.x, atol=1e-14)
+    assert repr(path) == "Trajectory(501 samples, 5 s, 'testbed')"
