@@ -36,6 +36,8 @@ def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
     """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y."""
     ax = axes_or_new(ax, figsize=(4.6, 3.9))
+    # What lies under the mask may be anything; colour maps look at it.
+    values = np.ma.array(np.ma.filled(values, 0.0), mask=np.ma.getmaskarray(values))
     mesh = ax.pcolormesh(x, y, values, cmap="cividis", vmin=vmin, vmax=vmax, shading="nearest", rasterized=True)
     ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
     ax.grid(False)
