@@ -139,14 +139,14 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
     """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1]
-    longest = max(runs.values(), key=lambda run: len(run.t))
+    longest = max(runs.values(), key=lambda run: run.t[-1])
     for ax in axes:
         plot_workspace(longest.robot, ax)
         plot_path(longest.trajectory, ax, color="#BBBBBB", lw=5)
         plot_pair_curves(longest.robot, ax, pairs=None if pair is None else [pair])
         for label, run in runs.items():
             ax.plot(*run.x.T, label=label, zorder=4, **_law_line(label))
-            if run is not longest:
+            if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(ax)
     axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", aspect="auto", title="enlarged, y stretched")
