@@ -149,7 +149,8 @@ class Explorer:
                 raise ValueError(f"{name} = {value!r}; allowed: {', '.join(map(repr, allowed))}")
         elif hasattr(widget, "min"):
             low, high = (widget.base**b if hasattr(widget, "base") else b for b in (widget.min, widget.max))
-            if not low * (1 - 1e-12) - 1e-12 <= value <= high * (1 + 1e-12) + 1e-12:
+            slack = 1e-12 * max(abs(low), abs(high))
+            if not low - slack <= value <= high + slack:
                 raise ValueError(f"{name} = {value!r}; allowed: {low:g} to {high:g}")
 
     def reset(self) -> None:
@@ -168,6 +169,11 @@ class Explorer:
             self.picture.sentence(self.problem)
         self._image.value = self.picture.png()
         self._words.value = self._html()
+
+    @property
+    def png(self) -> bytes:
+        """The picture as it is shown."""
+        return bytes(self._image.value)
 
     def close(self) -> None:
         """Take the widgets and their callbacks away."""
@@ -190,7 +196,7 @@ class Explorer:
         """One output: the widget where a kernel runs, the picture and its numbers elsewhere."""
         view = self.widget._repr_mimebundle_()
         said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
-        picture = base64.b64encode(self._image.value).decode()
+        picture = base64.b64encode(self.png).decode()
         return {**view, "image/png": picture, "text/plain": "\n".join([repr(self), *said])}
 
     def __repr__(self):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from .. import actuation as act
 from .._arguments import matvec
@@ -18,6 +20,9 @@ from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_d
 
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
+# Pale steps of the map, so that the arms stand out on them; dark is weak.
+MAP = ListedColormap(["#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F4F3E4", "#FCFBEE"])
+LEVELS = BoundaryNorm([0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5], MAP.N)
 
 
 def mode_word(mode) -> str:
@@ -66,12 +71,12 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         A = act.control_matrix(robot, inverse_kinematics(robot, grid[inside], modes[mode]))
         rows = slice(None) if drives == which[0] else list(pairs[which.index(drives) - 1])
         values = np.ma.masked_all(gx.shape)
-        values[inside] = np.minimum(np.floor(act.singular_values(A[:, rows])[:, 1] / 0.75) * 0.75, 7.5)
+        values[inside] = act.singular_values(A[:, rows])[:, 1]
         return values
 
     def draw(picture, x, y, mode, drives):
         sigma = sigma_map(mode, drives)
-        picture.image("machine", sigma, extent, cmap="cividis", clim=(0.0, 7.5), alpha=0.75)
+        picture.image("machine", sigma, extent, cmap=MAP, norm=LEVELS)
         point = 1e-3 * np.array([x, y])
         picture.line("machine", *point, color=ALARM, marker="x", markersize=9, zorder=6)
         q = inverse_kinematics(robot, point, modes[mode])
@@ -82,7 +87,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         for pair, name, value in zip(pairs, "abc", sigma_pairs(robot, q), strict=False):
             weak = value < WEAK
             draw_machine(picture, name, robot, q, arms=pair)
-            picture.text(name, 0.5, 1.02, f"pair {pair_word(pair)}: {value:.2f} rad/m", inside=True, ha="center",
+            picture.text(name, 0.5, 1.02, f"{pair_word(pair)}: {value:.2f} rad/m", inside=True, ha="center",
                          fontsize=10, fontweight="bold" if weak else "normal", color=ALARM if weak else AFTER)
             numbers[f"σ_min of {pair_word(pair)}"] = f"{value:.2f} rad/m"
         return numbers
@@ -92,21 +97,13 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
 
     def setup(axes):
-        colours = axes["machine"].figure.colorbar(mappable(0.0, 7.5), ax=axes["machine"], shrink=0.85, pad=0.02)
-        colours.set_label("σ_min in rad/m")
+        bar = axes["machine"].figure.colorbar(ScalarMappable(LEVELS, MAP), ax=axes["machine"], shrink=0.85, pad=0.02)
+        bar.set_label("σ_min in rad/m")
 
     controls = {"x": slider("x in mm", -200, 200, 2, 20), "y": slider("y in mm", -200, 230, 2, 30),
                 "mode": choice("working mode", modes), "drives": choice("map for", which)}
     rows = [["machine", name] for name in "abc"[: len(pairs)]]
-    return explorer(draw, controls, panels, layout=rows, widths=[3.2, 1], size=(7.6, 5.4), setup=setup, live=True)
-
-
-def mappable(low: float, high: float):
-    """Colours for a colour bar."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    return ScalarMappable(Normalize(low, high), "cividis")
+    return explorer(draw, controls, panels, layout=rows, widths=[2.7, 1], size=(8.2, 5.4), setup=setup, live=True)
 
 
 def zonotope(generators: np.ndarray) -> np.ndarray:
@@ -129,8 +126,12 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         size = 1e-3 * size
         t = triangle(robot, size, dt=0.01) if path == "triangle" else circle(robot, size / 2, dt=0.01)
         A = act.control_matrix(robot, t.q)
-        projector = act.prestress_projector(A)
-        null = act.null_vector(robot, t.q) if robot.n_arms == 3 else np.sqrt(np.diagonal(projector, axis1=-2, axis2=-1))
+        if robot.n_arms == 3:
+            null = act.null_vector(robot, t.q)
+        else:
+            # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
+            share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
+            null = np.sqrt(np.maximum(share, 0.0))
         return t, A, sigma_pairs(robot, t.q), null
 
     def draw(picture, place, path, size, torque):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
+from collections import OrderedDict
 
 import matplotlib as mpl
 import numpy as np
@@ -29,7 +30,7 @@ class LivePicture:
 
     A draw function calls `line`, `text`, `bar`, `polygon`, `arrow` and `image`.  The k-th line of a panel in one step
     is the k-th line of that panel in the next one: artists are made once and updated; those not drawn disappear.
-    What the set-up painted, with axes and ticks, is kept as a bitmap and drawn anew only when limits change.
+    What the set-up painted, with axes and ticks, is kept as a bitmap and drawn anew only for limits not met before.
     """
 
     def __init__(self, panels: dict, layout=None, widths=None, size=(9.4, 3.3), setup=None):
@@ -46,7 +47,8 @@ class LivePicture:
         self._pools: dict[tuple, list] = {}
         self._used: dict[tuple, int] = {}
         self._drawn: list = []
-        self._background = None
+        # Bitmaps of the axes for the last few limits: a slider dragged to and fro finds them again.
+        self._backgrounds: OrderedDict[tuple, object] = OrderedDict()
         self.full_draws = 0
 
     def line(self, panel: str, x, y, **style) -> None:
@@ -104,12 +106,11 @@ class LivePicture:
             image.set_data(values)
 
     def limits(self, panel: str, x=None, y=None) -> None:
-        """Set the limits of a panel; the axes are drawn anew only when they change."""
+        """Set the limits of a panel."""
         ax = self.axes[panel]
         for new, old, change in ((x, ax.get_xlim(), ax.set_xlim), (y, ax.get_ylim(), ax.set_ylim)):
-            if new is not None and tuple(map(float, new)) != tuple(map(float, old)):
+            if new is not None and tuple(new) != tuple(old):
                 change(*new)
-                self._background = None
 
     def fit(self, panel: str, *values, symmetric: bool = True, least: float = 1e-9) -> None:
         """Vertical limits that hold all `values`, in steps of 1, 1.5, 2, 3, 5, 7 so that they seldom change.
@@ -143,11 +144,9 @@ class LivePicture:
 
     def png(self) -> bytes:
         """Draw the step and return it as a PNG."""
-        if self._background is None:
-            self._draw_background()
-        self.canvas.restore_region(self._background)
+        self.canvas.restore_region(self._background())
         for artist in sorted(self._drawn, key=lambda a: a.get_zorder()):
-            artist.draw(self.figure.canvas.get_renderer())
+            artist.draw(self.canvas.get_renderer())
         image = Image.frombuffer("RGBA", self.canvas.get_width_height(), self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
         file = io.BytesIO()
         # 64 colours are enough for lines on white, and half the size and time of all colours.
@@ -155,15 +154,23 @@ class LivePicture:
             file, "PNG", compress_level=1)
         return file.getvalue()
 
-    def _draw_background(self) -> None:
+    def _background(self):
+        """Bitmap of what does not change under the present limits."""
+        key = tuple((*ax.get_xlim(), *ax.get_ylim()) for ax in self.axes.values())
+        if key in self._backgrounds:
+            self._backgrounds.move_to_end(key)
+            return self._backgrounds[key]
         with mpl.rc_context(_RC):
             self.canvas.draw()
             if self.figure.get_layout_engine() is not None:
                 # From here on panels stay where they are, whatever the numbers at their ticks.
                 self.figure.set_layout_engine("none")
                 self.canvas.draw()
-        self._background = self.canvas.copy_from_bbox(self.figure.bbox)
         self.full_draws += 1
+        self._backgrounds[key] = self.canvas.copy_from_bbox(self.figure.bbox)
+        if len(self._backgrounds) > 16:
+            self._backgrounds.popitem(last=False)
+        return self._backgrounds[key]
 
     def _artist(self, panel: str, kind: str, style: dict, make):
         """The next artist of its kind in this step, made when there is none, with the style asked for."""

@@ -35,11 +35,10 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         run, force, error = recorded(filter, offsets)
         k = min(round(1e-3 * time / run.dt), len(run.t) - 1)
         draw_machine(picture, "plane", robot, run.q[k])
-        # 0.1 m of arrow for 1 N.
-        for i in range(N):
-            picture.arrow("plane", run.x[k], 0.1 * force[k, i], facecolor=arm_colour(i), edgecolor="white", zorder=6)
+        # 0.4 m of arrow for 1 N.
         total = force[k].sum(axis=0)
-        picture.arrow("plane", run.x[k], 0.1 * total, facecolor=AFTER, edgecolor="white", zorder=7)
+        for vector, colour in [*zip(force[k], map(arm_colour, range(N)), strict=True), (total, AFTER)]:
+            picture.arrow("plane", run.x[k], 0.4 * vector, 0.012, facecolor=colour, edgecolor="white", zorder=6)
         for panel, values in (("torque", 1e3 * run.c), ("error", error[:, None])):
             for i, column in enumerate(values.T):
                 style = arm_line(i) if panel == "torque" else {"color": AFTER}
@@ -59,7 +58,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         axes["plane"].set(**plane)
         drive_legend(axes["torque"], robot)
 
-    plane = plane_limits(robot) | {"title": "Machine; arrows: 0.1 m for 1 N"}
+    plane = plane_limits(robot) | {"title": "Machine; arrows: 0.4 m for 1 N, black the sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in N mm", **time},
               "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}

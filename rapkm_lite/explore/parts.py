@@ -37,7 +37,7 @@ def legend(ax, entries) -> None:
     """A one-line legend above the panel, on the right; entries are (words, keywords of a line)."""
     handles = [Line2D([], [], **{"linewidth": 2, **style}) for _, style in entries]
     ax.legend(handles, [words for words, _ in entries], ncols=len(entries), loc="lower right", bbox_to_anchor=(1, 1),
-              handlelength=1.7, columnspacing=0.9, handletextpad=0.4, borderaxespad=0.1, fontsize=9)
+              handlelength=1.7, columnspacing=0.9, handletextpad=0.6, borderaxespad=0.1, fontsize=9)
 
 
 def drive_legend(ax, robot: Manipulator, words: str = "drive") -> None:

@@ -12,7 +12,7 @@ from ..energy import measured_energies
 from ..kinematics import inverse_kinematics
 from ..manipulator import Manipulator, load
 from ..plotting.style import NEUTRAL, arm_colour, arm_line
-from ..simulation import simulate
+from ..simulation import experiment, simulate
 from ..trajectory import hold, triangle
 from .builder import Explorer, choice, explorer, log_slider, switch
 from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive
@@ -20,14 +20,14 @@ from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
 
-def bars(picture, panel: str, groups, width: float = 0.36, form: str = ".2f") -> None:
+def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") -> None:
     """Two or more bars per drive with their numbers; groups are (values per drive, keywords of the bar)."""
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
             at = i + 1 + (k - (len(groups) - 1) / 2) * width
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
-            picture.text(panel, at, value, format(value + 0.0, form), ha="center", va="bottom" if value >= 0 else "top",
-                         fontsize=9)
+            picture.text(panel, at, value, format(value + 0.0, form).replace("-", "−"), ha="center", fontsize=9,
+                         va="bottom" if value >= 0 else "top")
 
 
 def steady_state(robot: Manipulator | None = None) -> Explorer:
@@ -70,9 +70,9 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
                               ("simulated", {"color": NEUTRAL, "linewidth": 7})])
 
     drives = {"xticks": range(1, N + 1), "xlabel": "drive", "xlim": (0.4, N + 0.6)}
-    panels = {"error": {"title": "Settling", "xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
-              "rest": {"title": "At rest", "ylabel": "angle error in mrad", **drives},
-              "torque": {"title": "Rest torque", "ylabel": "torque in N mm", **drives}}
+    panels = {"error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
+              "rest": {"ylabel": "error at rest in mrad", **drives},
+              "torque": {"ylabel": "torque at rest in N mm", **drives}}
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     controls["place"] = choice("point", points.keys())
@@ -85,14 +85,16 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
     friction = robot.friction if np.any(robot.friction) else load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
-    path = triangle(robot)
+    paths = {"centred triangle": triangle(robot)}
+    if robot.same_kinematics(load()):
+        paths["reading of Table 1"] = experiment("table1_reading").trajectory
     table = measured_energies() if N == 3 else None
-    plain = lru_cache(maxsize=4)(lambda on, encoder, K_P, K_D, *offset: simulate(
-        machines[on], PD(K_P, K_D), path, np.array(offset), encoder).energy)
+    plain = lru_cache(maxsize=4)(lambda path, on, encoder, K_P, K_D, *offset: simulate(
+        machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder).energy)
 
-    def draw(picture, K_P, K_D, filter, friction, encoder, **offsets):
+    def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
         offset = 1e-3 * np.array([offsets[f"offset_{i + 1}"] for i in range(N)])
-        run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), path, offset, encoder)
+        run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         for i in range(N):
             picture.trace("torque", run.t, torque[:, i], **arm_line(i))
@@ -106,10 +108,9 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         picture.fit("energy", *(1.15 * v for v, _ in groups), symmetric=False, least=0.5)
         numbers = {"energy": per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J"}
         if filter != "off":
-            before = plain(friction, encoder, K_P, K_D, *offset).sum()
+            before = plain(path, friction, encoder, K_P, K_D, *offset).sum()
             numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
-        rest = run.c[-1] - 0.0
-        return numbers | {"torque at the end": per_drive(1e3 * rest, 1) + " N mm",
+        return numbers | {"torque at the end": per_drive(torque[-1], 1) + " N mm",
                           "largest torque": f"{np.abs(torque).max():.0f} N mm",
                           "largest error": f"{np.abs(error).max():.1f} mrad"}
 
@@ -119,14 +120,14 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         measured = [("Table 1", {"color": NEUTRAL, "alpha": 0.4, "linewidth": 7})] if table is not None else []
         legend(axes["energy"], [("this run", {"color": NEUTRAL, "linewidth": 7}), *measured])
 
-    panels = {"torque": {"title": "Torque", "xlabel": TIME, "ylabel": "torque in N mm", "xlim": (0, 5)},
-              "error": {"title": "Error", "xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 5)},
-              "energy": {"title": "Energy", "xlabel": "drive", "ylabel": "electric energy in J", "xlim": (0.4, N + 0.6),
+    panels = {"torque": {"xlabel": TIME, "ylabel": "torque in N mm", "xlim": (0, 5)},
+              "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 5)},
+              "energy": {"xlabel": "drive", "ylabel": "electric energy in J", "xlim": (0.4, N + 0.6),
                          "xticks": range(1, N + 1)}}
-    controls = offset_sliders(robot, (-5.0, -6.0, 12.0))
+    controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", None), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
                  "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
                  "filter": choice("antagonism filter", LAWS.keys()), "friction": switch("friction", True),
-                 "encoder": choice("encoder counts per turn", counts)}
+                 "encoder": choice("encoder counts per turn", counts), "path": choice("path", paths.keys())}
     return explorer(draw, controls, panels, widths=[1.15, 1.15, 1], setup=setup)

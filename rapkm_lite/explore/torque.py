@@ -109,6 +109,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
 
     def setup(axes):
         plot_workspace(robot, axes["plane"])
+        axes["plane"].set(**plane)
         for pair, lines in curves.items():
             for line in lines:
                 axes["plane"].plot(*line.T, linewidth=1.0, **pair_style(robot, pair))
@@ -121,7 +122,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
 
     reach = robot.base
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (reach[:, 0].min(), reach[:, 0].max()),
-             "ylim": (reach[:, 1].min() - 0.06, reach[:, 1].max() + 0.02), "title": "Path"}
+             "ylim": (reach[:, 1].min() - 0.06, reach[:, 1].max() + 0.02), "title": " "}
     time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {"plane": plane, "map": {"title": "Feedback", "ylabel": "norm in N m s²/rad", **time},
               "torque": {"title": "Torque", "ylabel": "torque in N mm", **time},

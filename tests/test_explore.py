@@ -1,0 +1,288 @@
+"""The explorers: drawn at corners and defaults of their controls, honest about mistakes, and without leaks."""
+
+import base64
+import inspect
+import io
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import ipywidgets as widgets
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+import rapkm_lite as rk
+from rapkm_lite import explore
+
+matplotlib.use("agg")
+import matplotlib.pyplot as plt
+
+NAMES = ["machine", "steady_state", "decentralized_run", "actuation", "computed_torque", "animation", "prestress"]
+_made = {}
+
+
+def made(name):
+    """One explorer of each kind, back at its defaults."""
+    if name not in _made:
+        _made[name] = getattr(explore, name)()
+    _made[name].reset()
+    return _made[name]
+
+
+def ends(widget):
+    """First and last setting of a control."""
+    if isinstance(widget, widgets.Checkbox):
+        return False, True
+    if isinstance(widget, widgets.Dropdown):
+        values = [o[1] if isinstance(o, tuple) else o for o in widget.options]
+        return values[0], values[-1]
+    if isinstance(widget, widgets.FloatLogSlider):
+        return 10**widget.min, 10**widget.max
+    return widget.min, widget.max
+
+
+def pixels(explorer):
+    return np.asarray(Image.open(io.BytesIO(explorer.png)).convert("RGB")).astype(int)
+
+
+def assert_sound(explorer):
+    words = " ".join([*explorer.numbers.values(), explorer._words.value])
+    assert "nan" not in words.lower() and "inf " not in words.lower(), words
+    assert bool(explorer.numbers) != bool(explorer.problem)
+    assert explorer.png.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_draws_every_end_of_every_control_and_random_corners(name):
+    explorer = made(name)
+    assert not explorer.problem, explorer.problem
+    for control, widget in explorer.controls.items():
+        for value in ends(widget):
+            explorer.reset()
+            assert_sound(explorer.set(**{control: value}))
+    rng = np.random.default_rng(6)
+    corners = list(itertools.product(*(ends(w) for w in explorer.controls.values())))
+    for corner in rng.permutation(len(corners))[:6]:
+        assert_sound(explorer.set(**dict(zip(explorer.controls, corners[corner], strict=True))))
+    assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_choice_is_drawn(name):
+    explorer = made(name)
+    for control, widget in explorer.controls.items():
+        if isinstance(widget, widgets.Dropdown):
+            for option in widget.options:
+                explorer.reset()
+                assert_sound(explorer.set(**{control: option[1] if isinstance(option, tuple) else option}))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_control_changes_the_picture_and_reset_brings_it_back(name):
+    explorer = made(name)
+    first, setting = pixels(explorer), explorer.values
+    for control, widget in explorer.controls.items():
+        low, high = ends(widget)
+        explorer.set(**{control: high if setting[control] == low else low})
+        assert np.any(pixels(explorer) != first), f"{control} changes nothing"
+        explorer.reset()
+        assert explorer.values == setting
+        # A limit may stay wider than at first, so only the settings and numbers are compared with the start.
+        assert not explorer.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_controls_are_labelled_with_units_and_fit(name):
+    dimensionless = {"mode", "drives", "path", "law", "filter", "friction", "encoder"}
+    for control, widget in made(name).controls.items():
+        assert widget.description and widget.style.description_width == "initial"
+        if hasattr(widget, "min") and control not in dimensionless:
+            assert " in " in widget.description or "1/s" in widget.description, widget.description
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_other_machines_are_accepted(name):
+    testbed = rk.load()
+    two = rk.Manipulator(base=testbed.base[:2], lengths=0.2, masses=0.134)
+    four = rk.Manipulator(base=0.16 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), lengths=0.2, masses=0.1)
+    for robot in (two, four):
+        explorer = getattr(explore, name)(robot)
+        assert_sound(explorer)
+        explorer.close()
+
+
+def test_theory_and_simulation_meet_in_the_steady_state_explorer():
+    explorer = made("steady_state")
+    # Without a contradiction between the drives, offsets A e_x move the end-effector and leave no torque: (14).
+    explorer.set(**{f"offset_{i}": 0.0 for i in (1, 2, 3)})
+    assert explorer.numbers["rest torque"].startswith("0.0 / 0.0 / 0.0")
+    explorer.set(offset_1=5.0)
+    theory, simulated = (np.array([float(v) for v in explorer.numbers[k].removesuffix(" mrad").split(" / ")])
+                         for k in ("error at rest, theory", "simulated"))
+    assert np.abs(theory - simulated).max() < 0.05
+
+
+def test_reading_of_table_1_is_reproduced_by_the_run_explorer():
+    reading = rk.experiment("table1_reading")
+    explorer = explore.decentralized_run(rk.load().replace(friction=reading.robot.friction))
+    explorer.set(path="reading of Table 1", K_P=5.0, K_D=0.15, offset_1=-4.5, offset_2=-6.0, offset_3=12.0)
+    run = rk.simulate(reading.robot, rk.PD(5.0, 0.15), reading.trajectory, 1e-3 * np.array([-4.5, -6.0, 12.0]))
+    per_drive = " / ".join(f"{e:.2f}" for e in run.energy)
+    assert explorer.numbers["energy"] == f"{per_drive} J, in all {run.energy.sum():.2f} J"
+
+
+def test_zonotope_holds_every_force_of_limited_torques():
+    A = rk.control_matrix(rk.load(), rk.inverse_kinematics(rk.load(), [0.05, -0.03]))
+    corners = explore.geometry.zonotope(0.085 * A)
+    forces = np.array(list(itertools.product([-0.085, 0.085], repeat=3))) @ A
+    edges = np.roll(corners, -1, axis=0) - corners
+    gap = forces[:, None] - corners
+    assert np.all(edges[:, 0] * gap[..., 1] - edges[:, 1] * gap[..., 0] > -1e-12)
+    # Its area is 4 sum |g_i x g_j| (McMullen).
+    area = np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)) / 2
+    minors = sum(abs(np.linalg.det(0.085 * A[list(p)])) for p in rk.drive_pairs(rk.load()))
+    assert area == pytest.approx(4 * minors, rel=1e-12)
+
+
+def line(picture, slope, power=1.0):
+    if slope < -2:
+        raise ValueError(f"slope = {slope:g}; allowed: >= -2")
+    x = np.linspace(0, 1, 50)
+    picture.line("a", x, slope * x**power)
+    picture.fit("a", slope * x)
+    return {"slope": f"{slope:g}"}
+
+
+def light(**others):
+    controls = {"slope": explore.slider("slope in m/s", -3.0, 3.0, 0.1, 1.0),
+                "power": explore.slider("power", 1, 3, 1, 1)}
+    return explore.explorer(line, controls | others, {"a": {"xlabel": "time in s"}}, size=(3, 2))
+
+
+def test_wrong_names_raise_a_sentence_that_names_both_sides():
+    with pytest.raises(ValueError, match="slope, power, gain, but line takes slope, power"):
+        light(gain=explore.slider("gain", 0, 1, 1, 0))
+    with pytest.raises(ValueError, match="controls are named slope, but line takes slope, power"):
+        explore.explorer(line, {"slope": explore.slider("slope", 0, 1, 1, 0)}, {"a": {}})
+    with pytest.raises(ValueError, match="play = 'time'; allowed: one of slope, power"):
+        explore.explorer(line, light().controls, {"a": {}}, play="time")
+    with pytest.raises(ValueError, match="no control 'slop'; allowed: slope, power"):
+        light().set(slop=1)
+    with pytest.raises(ValueError, match="slope = 9; allowed: -3 to 3"):
+        light().set(slope=9)
+    with pytest.raises(ValueError, match="'up'"):
+        light(power=explore.choice("power", [1, 2])).set(power="up")
+    with pytest.raises(KeyError, match="no panel 'b'; allowed: a"):
+        light().picture.line("b", 0, 0)
+
+
+def test_a_broken_draw_fails_at_once():
+    def broken(picture, slope):
+        raise TypeError("a mistake in the lesson")
+
+    with pytest.raises(TypeError, match="a mistake in the lesson"):
+        explore.explorer(broken, {"slope": explore.slider("slope in m", 0, 1, 1, 0)}, {"a": {}})
+
+
+def test_what_cannot_be_computed_is_a_sentence_in_the_picture():
+    explorer = light()
+    good = pixels(explorer)
+    explorer.set(slope=-3.0)
+    assert "slope = -3; allowed: >= -2" in explorer.problem and explorer.numbers == {}
+    assert "slope = -3" in explorer._words.value and np.any(pixels(explorer) != good)
+    explorer.set(slope=1.0)
+    assert explorer.problem == "" and explorer.numbers == {"slope": "1"}
+    outside = made("machine").set(x=190, y=200)
+    assert "outside the workspace" in outside.problem
+    crossed = made("computed_torque").set(side=240)
+    assert "left the workspace" in crossed.problem
+
+
+def test_moving_a_slider_redraws_and_set_redraws_once():
+    explorer, calls = light(), []
+    inner = explorer.draw
+
+    def counted(picture, **values):
+        calls.append(values)
+        return inner(picture, **values)
+
+    explorer.draw = counted
+    explorer.controls["slope"].value = 2.0
+    assert calls == [{"slope": 2.0, "power": 1}]
+    explorer.set(slope=0.5, power=2)
+    assert calls[1:] == [{"slope": 0.5, "power": 2}]
+    explorer.close()
+    explorer.controls["slope"].value = -1.0
+    assert len(calls) == 2
+
+
+def test_continuous_update_only_when_compiled_or_asked_for():
+    from rapkm_lite import engine
+
+    assert light().controls["slope"].continuous_update is engine.COMPILED
+    assert made("machine").controls["x"].continuous_update is True
+
+
+def test_one_output_holds_the_widget_and_the_picture():
+    explorer = light()
+    bundle = explorer._repr_mimebundle_()
+    assert set(bundle) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}
+    assert base64.b64decode(bundle["image/png"]) == explorer.png
+    assert bundle["text/plain"] == "Explorer(line: slope = 1, power = 1)\nslope: 1"
+
+
+def test_axes_are_drawn_once_for_the_same_limits():
+    explorer = light()
+    before = explorer.picture.full_draws
+    for _ in range(5):
+        explorer.set(slope=3.0)
+        explorer.set(slope=1.0)
+    assert explorer.picture.full_draws - before <= 2
+
+
+def test_thinned_traces_keep_every_extreme():
+    explorer = light()
+    t = np.linspace(0, 5, 5001)
+    y = np.random.default_rng(3).standard_normal(5001)
+    y[2345] = 9.0
+    explorer.picture.begin()
+    explorer.picture.trace("a", t, y)
+    x, thin = explorer.picture._drawn[0].get_data()
+    assert len(thin) < 700 and thin.max() == 9.0 and thin.min() == y.min() and np.all(np.diff(x) > 0)
+    assert x[-1] == 5.0 and x[thin.argmax()] == t[2345]
+
+
+def test_thousand_steps_leave_nothing_behind():
+    # In a process of its own, where nothing else allocates; Matplotlib's caches of texts are full after 500 steps.
+    code = """
+import gc, math, sys
+from test_explore import light
+explorer = light()
+slider = explorer.controls["slope"]
+def steps(count):
+    for k in range(count):
+        slider.value = 2.5 * math.sin(0.37 * k)
+    gc.collect()
+    return sys.getallocatedblocks(), len(gc.get_objects()), len(explorer.picture.axes["a"].get_children())
+blocks, objects, artists = (b - a for a, b in zip(steps(500), steps(1000)))
+assert blocks < 200 and objects < 20 and artists == 0, (blocks, objects, artists)
+assert len(explorer.picture._backgrounds) <= 16 and len(slider._trait_notifiers["value"]["change"]) == 1
+from matplotlib import pyplot
+assert pyplot.get_fignums() == []
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_drawing_leaves_the_readers_style_alone():
+    before = dict(matplotlib.rcParams)
+    light().set(slope=2.0)
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_explorers_take_a_machine_and_nothing_else(name):
+    assert list(inspect.signature(getattr(explore, name)).parameters) == ["robot"]
