@@ -46,11 +46,22 @@ def test_runs_without_a_place_of_rest_keep_moving():
     assert lively >= 4
 
 
+def test_runs_below_the_threshold_come_to_rest():
+    """The other direction, for friction sharp enough not to creep: from rest to rest without a jump of the torque."""
+    rng = np.random.default_rng(4)
+    robot = rk.load().replace(friction_velocity=5e-6)
+    for (x, offset), ratio in zip(random_rests(4, 30), rng.uniform(0.5, 1.0, 30), strict=True):
+        gain = ratio * 2 * 4.2e-3 / QUANTUM
+        law, path = rk.PD(gain, 0.225 * np.sqrt(gain / K_P)), rk.hold(robot, x, 0.5, 2e-5)
+        c = rk.simulate(robot, law, path, offset, encoder=2000).c[-10_000:]
+        assert np.count_nonzero(np.abs(np.diff(c, axis=0)) > 0.5 * gain * QUANTUM) <= 1  # one last count at most
+
+
 @pytest.mark.parametrize("name", script.SIDES)
 def test_log_in_the_repository_is_the_one_the_script_makes(name):
     log = rk.mystery_run(name)
     stored = np.column_stack([log.t, log.q_a, log.q_a_desired, log.c])
-    np.testing.assert_allclose(stored, script.record(name), atol=6e-5)  # rounding of the last printed digit
+    np.testing.assert_allclose(stored, script.record(name), rtol=0.0, atol=6e-5)  # rounding of the last printed digit
     assert (ROOT / "data" / "mystery_runs" / f"{name}.csv").stat().st_size < 150_000
 
 
@@ -60,6 +71,12 @@ def test_rest_at_one_place_tells_the_offset_along_the_null_vector_only():
     offset, _ = hidden("offset_c")
     found = -n @ log.c[log.t > 1.0].mean(axis=0) / K_P
     assert abs(found - n @ offset) < 1e-4 and np.linalg.norm(offset - n * found) > 3e-3
+
+
+@pytest.mark.parametrize("name", script.SIDES)
+def test_no_log_begins_with_its_offsets(name):
+    """A run starts at the desired point: there the measured error is the offset.  The logs begin later."""
+    assert np.abs(rk.mystery_run(name).error[0] - hidden(name)[0]).max() > 5e-4
 
 
 def test_unknown_log_names_what_is_allowed():

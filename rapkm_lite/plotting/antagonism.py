@@ -126,7 +126,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     ax.set(xscale="log", xlim=(ratio.min() / 1.15, ratio.max() * 1.15), title=title,
            xlabel="step of the torque over width of the friction band, K$_P$ quantum / (2 f$_c$)",
            ylabel="torque jumps per second")
-    _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 4])
+    _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
     ax.legend(loc="center left")
     return ax
 
