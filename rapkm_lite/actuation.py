@@ -184,7 +184,8 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
 
     q, qd, qdd : a motion on V, (..., 2N).  W : see `weighted_pseudoinverse`.
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
-    Evaluated in end-effector coordinates, so that no parameterization singularity enters.
+    Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
+    also the inverse dynamics (25) in redundant coordinates.
     """
     A, wrench = control_matrix(robot, q), required_wrench(robot, q, qd, qdd)
     pinv = weighted_pseudoinverse(A, W)

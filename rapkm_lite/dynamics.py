@@ -27,7 +27,7 @@ from .manipulator import Manipulator
 
 
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:
-    """Generalized mass matrix G(q) of the cut tree, (..., 2N, 2N) in kg m^2; block diagonal over the arms."""
+    """Generalized mass matrix G(q) of (2), (..., 2N, 2N) in kg m^2; the cut tree couples only the joints of one arm."""
     q = real_array("q", q, robot.n_joints)
     Ja, Jd, P = robot.arm_inertias.T
     cosine = P * np.cos(q[..., robot.n_arms :])
@@ -35,7 +35,7 @@ def mass_matrix(robot: Manipulator, q) -> np.ndarray:
 
 
 def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
-    """C(q, qd) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric."""
+    """C(q, qd) of (2) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric."""
     q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     N = robot.n_arms
     sine = robot.arm_inertias[:, 2] * np.sin(q[..., N:])
@@ -165,7 +165,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
 
 
 def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
-    """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., 2N, 2N) in 1/s.  The chapter prints B for J."""
+    """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., 2N, 2N) in 1/s, for (24).  The chapter prints B for J."""
     q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
     Q, R = _row_space(robot, constraint_jacobian(robot, q))
     N = np.eye(robot.n_joints) - Q @ transpose(Q)
