@@ -123,10 +123,11 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     dots, crosses = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}, {"color": ALARM, "mew": 1.8, "ms": 7}
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
-    ax.set(xscale="log", xlim=(ratio.min() / 1.15, ratio.max() * 1.15), title=title,
+    ax.set(xscale="log", title=title,
            xlabel="step of the torque over width of the friction band, K$_P$ quantum / (2 f$_c$)",
            ylabel="torque jumps per second")
     _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
+    ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
     ax.legend(loc="center left")
     return ax
 
