@@ -226,6 +226,14 @@ def test_continuous_update_only_when_compiled_or_asked_for():
     assert made("machine").controls["x"].continuous_update is True
 
 
+def test_log_slider_has_a_step_at_its_value():
+    # Browsers move a value that lies between two steps.
+    slider = explore.log_slider("K_P in N m/rad", 1.0, 50.0, 7.05, steps=40)
+    steps = (np.log10(slider.value) - slider.min) / slider.step
+    assert steps == pytest.approx(round(steps), abs=1e-9) and slider.value == 7.05
+    assert 10**slider.max / 10**slider.min == pytest.approx(50.0)
+
+
 def test_one_output_holds_the_widget_and_the_picture():
     explorer = light()
     bundle = explorer._repr_mimebundle_()

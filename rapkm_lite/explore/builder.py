@@ -15,7 +15,8 @@ from .._arguments import ConvergenceError
 from ..simulation import SimulationError
 from .live import LivePicture
 
-_LAYOUT = {"width": "300px", "margin": "1px 10px 1px 0"}
+# As wide as the row allows: a long label leaves a short slider.
+_LAYOUT = {"flex": "1 1 320px", "max_width": "420px", "min_width": "280px", "margin": "1px 12px 1px 0"}
 
 
 def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
@@ -28,9 +29,11 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 
 
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
-    """A slider with equal ratios, for gains: `steps` steps from low to high."""
-    a, b = math.log10(low), math.log10(high)
-    return widgets.FloatLogSlider(value, base=10, min=a, max=b, step=(b - a) / steps, description=label,
+    """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`."""
+    step = math.log10(high / low) / steps
+    # A browser moves a value between two steps to the nearer one, so the steps are laid through the value.
+    first = math.log10(value) - step * round(math.log10(value / low) / step)
+    return widgets.FloatLogSlider(value, base=10, min=first, max=first + steps * step, step=step, description=label,
                                   readout_format=".3g", **_common())
 
 

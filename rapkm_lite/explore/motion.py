@@ -58,7 +58,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         axes["plane"].set(**plane)
         drive_legend(axes["torque"], robot)
 
-    plane = plane_limits(robot) | {"title": "Machine; arrows: 0.4 m for 1 N, black the sum"}
+    plane = plane_limits(robot) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in N mm", **time},
               "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}

@@ -54,7 +54,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         picture.fit("error", error, theory, least=1.0)
         bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
-        bars(picture, "torque", [(torque, {})], width=0.6, form=".0f")
+        bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
         picture.fit("torque", 1.25 * torque, least=10.0)
         for panel in ("rest", "torque"):
             picture.line(panel, [0.4, N + 0.6], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=4)
@@ -76,7 +76,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     controls["place"] = choice("point", points.keys())
-    return explorer(draw, controls, panels, setup=setup)
+    return explorer(draw, controls, panels, widths=[1, 1.25, 1], setup=setup)
 
 
 def decentralized_run(robot: Manipulator | None = None) -> Explorer:
@@ -90,11 +90,11 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         paths["reading of Table 1"] = experiment("table1_reading").trajectory
     table = measured_energies() if N == 3 else None
     plain = lru_cache(maxsize=4)(lambda path, on, encoder, K_P, K_D, *offset: simulate(
-        machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder).energy)
+        machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder or None).energy)
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
         offset = 1e-3 * np.array([offsets[f"offset_{i + 1}"] for i in range(N)])
-        run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder)
+        run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder or None)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         for i in range(N):
             picture.trace("torque", run.t, torque[:, i], **arm_line(i))
@@ -125,7 +125,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
               "energy": {"xlabel": "drive", "ylabel": "electric energy in J", "xlim": (0.4, N + 0.6),
                          "xticks": range(1, N + 1)}}
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
-    counts = [("ideal", None), *((str(n), n) for n in (500, 2000, 8000))]
+    counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
                  "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
                  "filter": choice("antagonism filter", LAWS.keys()), "friction": switch("friction", True),
