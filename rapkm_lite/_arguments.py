@@ -26,9 +26,11 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     if last and array.shape[-len(last) :] != last:
         want = "(" + ", ".join(["...", *map(str, last)]) + ")"
         raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
-    if not np.all(np.isfinite(array)):
-        bad = np.argwhere(~np.isfinite(array))[0]
-        raise ValueError(f"{name}{_at(bad)} = {array[tuple(bad)]}; allowed: finite numbers")
+    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.
+    fine = np.abs(array) < 1e100
+    if not np.all(fine):
+        bad = np.argwhere(~fine)[0]
+        raise ValueError(f"{name}{_at(bad)} = {array[tuple(bad)]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
 

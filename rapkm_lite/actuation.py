@@ -10,7 +10,9 @@ import itertools
 import numpy as np
 
 from ._arguments import (
+    bounded,
     check_leading,
+    exact_array,
     joint_indices,
     joint_vectors,
     matvec,
@@ -245,8 +247,11 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     True when counts exist that a pose of the closed loops reads, and whose torques differ from a prestress by no more
     than the friction of each drive; certain for K_P quantum <= 2 friction.  First order about q.
     K_P : number or (3,), N m/rad.  offset : (3,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
+    Raises ValueError for another number of arms, at input singularities, and for values out of range.
     """
-    n, desired = null_vector(robot, q), real_array("q", q, robot.n_joints)[:3]
+    n, desired = null_vector(robot, q), exact_array("q", q, robot.n_joints)[:3]
+    offset, quantum = exact_array("offset", offset, 3), positive_number("quantum", quantum)
+    friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
     ideal = desired + steady_state_error(control_matrix(robot, q), K_P, offset) + offset
     counts = np.rint(ideal / quantum) + np.array(list(itertools.product(range(-4, 5), repeat=3)))
     read = np.abs((quantum * counts - desired - offset) @ n) <= quantum / 2 * np.abs(n).sum()

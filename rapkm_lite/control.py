@@ -122,7 +122,7 @@ class PD(Law):
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         K_P, K_D = self.gains(model.n_arms)
-        q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
+        q_a, qd_a = _measured(model, q_a, qd_a, desired)
         return -matvec(K_P, q_a - desired.q_a) - matvec(K_D, qd_a - desired.qd_a)
 
 
@@ -161,7 +161,7 @@ class CommandFilter(Law):
     def commands(self, model, q, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
         """The filtered commands (18) for angles and rates, each (..., N), formed with the *measured* angles."""
         A = control_matrix(model, q)
-        q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
+        q_a, qd_a = _measured(model, q_a, qd_a, desired)
         e, ed = q_a - desired.q_a, qd_a - desired.qd_a
         return q_a - matvec(command_filter(A, self.law.K_P), e), qd_a - matvec(command_filter(A, self.law.K_D), ed)
 
@@ -197,7 +197,7 @@ class APD(Law):
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
-        state = _joint_state(model, q, qd, q_a, qd_a)
+        state = _joint_state(model, q, qd, q_a, qd_a, desired)
         if self.independent is None:
             xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
@@ -272,6 +272,8 @@ class SwitchedCTC(Law):
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""
+        q_a, qd_a = _joint_state(model, q, qd, q_a, qd_a, desired)
+        q_a, qd_a = q_a[..., : model.n_arms], qd_a[..., : model.n_arms]
         if np.ndim(q) == 1:
             return self.fixed(self.choose(model, q)).torque(model, q, qd, q_a, qd_a, desired)
         chosen = self.pairs(model, q)
@@ -307,7 +309,7 @@ class RedundantAPD(Law):
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """K_P e + K_D ed in all joints, and (A~^T)^+."""
-        state = _joint_state(model, q, qd, q_a, qd_a)
+        state = _joint_state(model, q, qd, q_a, qd_a, desired)
         K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
         feedback = matvec(K_P, state[0] - desired.q) + matvec(K_D, state[1] - desired.qd)
         A_tilde = redundant_control_matrix(model, q)
@@ -343,11 +345,21 @@ class RedundantCTC(RedundantAPD):
         return matvec(pinv, matvec(G, v) + matvec(C, qd) + Q)
 
 
-def _joint_state(model, q, qd, q_a, qd_a) -> tuple[np.ndarray, np.ndarray]:
+def _measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
+    """The measured base angles and rates, after a check that they fit the model and the desired motion."""
+    q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
+    if desired.n_arms != model.n_arms:
+        raise ValueError(f"desired has {desired.n_arms} arms, the model {model.n_arms}; allowed: the same number")
+    check_leading(q_a=q_a.shape[:-1], desired=desired.q.shape[:-1])
+    return q_a, qd_a
+
+
+def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles and rates as known: driven joints as measured, elbows from the pose."""
     N = model.n_arms
     q, qd = joint_vectors(model.n_joints, q=q, qd=qd)
-    q_a, qd_a = joint_vectors(N, q_a=q_a, qd_a=qd_a)
+    q_a, qd_a = _measured(model, q_a, qd_a, desired)
+    check_leading(q=q.shape[:-1], q_a=q_a.shape[:-1])
     elbows, rates = q[..., N:], qd[..., N:]
     return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
 
@@ -363,7 +375,8 @@ def joint_gain(name: str, K, N: int) -> np.ndarray:
 class Controller:
     """A law at work in a sampled loop: it remembers the last pose estimate and the pair in use.
 
-    Called as ``controller(t, q_a, qd_a, desired, truth=(q, qd))`` with measured base angles and rates.
+    Called as ``controller(t, q_a, qd_a, desired, truth=(x, xd))`` with measured base angles and rates; the true
+    end-effector motion is needed for a law with pose="true" only.
     """
 
     def __init__(self, law: Law, model: Manipulator):
@@ -382,13 +395,16 @@ class Controller:
     def _state(self, q_a, qd_a, desired, truth):
         """Pose and its rate on V by least squares from the measurement, or from the true end-effector motion."""
         model = self.model
+        q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
         if self.law.pose == "true":
+            if truth is None:
+                raise ValueError("truth = None for a law with pose = 'true'; allowed: the true motion (x, xd)")
             x, xd = truth
             q = inverse_kinematics(model, x)
         else:
             q = estimate_pose(model, q_a, desired.x if self.x is None else self.x)
             A = control_matrix(model, q)
-            projected = matvec(transpose(A), np.asarray(qd_a, dtype=float))
+            projected = matvec(transpose(A), qd_a)
             xd = solve("A^T A (an input singularity)", transpose(A) @ A, projected[..., None])[..., 0]
             self.x = forward_kinematics(model, q)
         return q, matvec(ee_complement(model, q), xd)

@@ -21,8 +21,9 @@ SAMPLE = rk.Desired(3, X, XD, XDD, Q, QD, QDD)
 def broken(value):
     """What nobody should pass where a real array is wanted."""
     value = np.asarray(value, dtype=float)
-    holes = [value.copy(), value.copy(), value + 0j, value.astype(str), value.astype(bool), None, "abc", {}]
+    holes = [value.copy(), value.copy(), value + 1e200]
     holes[0][(0,) * value.ndim], holes[1][(-1,) * value.ndim] = np.nan, np.inf
+    holes += [value + 0j, value.astype(str), value.astype(bool), None, "abc", {}]
     shapes = [np.zeros(0), np.zeros((5, 7))]
     if value.ndim:
         shapes += [value[..., :-1], 1.0, np.concatenate([value, value], axis=-1)]
@@ -178,8 +179,21 @@ def test_options_of_the_laws():
     for law in laws:
         refused(law.torque, "q_a", TESTBED, Q, QD, Q[:, :2], QD[:, :3], SAMPLE)
         refused(law.torque, "qd_a", TESTBED, Q, QD, Q[:, :3], QD[:, :3] * np.nan, SAMPLE)
+        refused(law.torque, "desired", TESTBED, Q[:4], QD[:4], Q[:4, :3], QD[:4, :3], SAMPLE)
+        other = MACHINES["four_arms"]
+        q, qd, _, _ = random_motion(other, 5)
+        refused(law.torque, "desired", other, q, qd, q[:, :4], qd[:, :4], SAMPLE)
         if law is not pd:
+            refused(law.torque, "q_a", TESTBED, Q, QD, Q[:4, :3], QD[:4, :3], SAMPLE)
             refused(law.torque, "q", TESTBED, Q[:, :5], QD, Q[:, :3], QD[:, :3], SAMPLE)
+
+
+def test_controller_names_what_it_misses():
+    true = rk.Controller(rk.CTC(1.0, 1.0, pose="true"), TESTBED)
+    refused(true, "truth", 0.0, Q[0, :3], QD[0, :3], PATH[0])
+    measured = rk.Controller(rk.CTC(1.0, 1.0), TESTBED)
+    refused(measured, "q_a", 0.0, Q[0, :2], QD[0, :3], PATH[0])
+    refused(measured, "qd_a", 0.0, Q[0, :3], QD[0, :2], PATH[0])
 
 
 def test_rules_measures_and_numbers():
@@ -264,6 +278,17 @@ def test_arguments_of_the_paths():
     for name in ("x", "xd", "xdd"):
         for bad in (np.zeros((2, 2)), np.zeros((3, 3)), np.zeros((1, 3, 2)), np.nan * good):
             refused(rk.follow, name, TESTBED, [0, 0.1, 0.2], **({"x": good, "xd": good, "xdd": good} | {name: bad}))
+
+
+def test_question_for_a_place_of_rest():
+    good = {"q": Q[0], "K_P": 7.0, "offset": C[0], "quantum": 3e-3, "friction": 4e-3}
+    rk.rest_exists(TESTBED, **good)
+    bad_values = (("q", Q), ("q", Q[0] * np.nan), ("K_P", -1.0), ("K_P", [1.0, 2.0]), ("offset", C), ("offset", 0.0),
+                  ("quantum", 0.0), ("quantum", None), ("friction", -1.0), ("friction", [0.1, 0.1, 0.1]))
+    for name, bad in bad_values:
+        refused(rk.rest_exists, name, TESTBED, **(good | {name: bad}))
+    refused(rk.rest_exists, "robot", MACHINES["four_arms"], **good)
+    refused(rk.antagonism_form, "K_P", TESTBED, PATH, [1.0, 2.0])
 
 
 def test_no_numpy_warnings_turn_into_results():

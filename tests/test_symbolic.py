@@ -138,18 +138,20 @@ def loops():
     arms = [Arm(str(i)) for i in range(3)]
     q = [a.q[0] for a in arms] + [a.q[1] for a in arms]
     qd = [a.qd[0] for a in arms] + [a.qd[1] for a in arms]
-    tips = [a.tip for a in arms]
-    h = sp.Matrix.vstack(tips[0] - tips[1], tips[2] - tips[1])
-    J = h.jacobian(q)
-    J_dot = sum((J.diff(x) * xd for x, xd in zip(q, qd, strict=True)), sp.zeros(*J.shape))
-    G, C, Q = lagrange(q, qd, sum(a.kinetic() for a in arms), sum(a.potential(GRAVITY) for a in arms))
     values = {}
     for i, arm in enumerate(arms):
         numbers = [*ROBOT.base[i], *ROBOT.lengths[i], *ROBOT.masses[i], *ROBOT.centers[i], *ROBOT.inertias[i],
                    ROBOT.rotor_inertia[i], ROBOT.load if i == 1 else 0.0]
         values |= dict(zip(arm.parameters, numbers, strict=True))
     values |= dict(zip(GRAVITY, ROBOT.gravity, strict=True))
-    return {name: sp.lambdify([q, qd], expression.subs(values), "numpy")
+    tips = [a.tip.subs(values) for a in arms]
+    h = sp.Matrix.vstack(tips[0] - tips[1], tips[2] - tips[1])
+    J = h.jacobian(q)
+    J_dot = sum((J.diff(x) * xd for x, xd in zip(q, qd, strict=True)), sp.zeros(*J.shape))
+    kinetic, potential = (sum(energies).subs(values) for energies in (
+        [a.kinetic() for a in arms], [a.potential(GRAVITY) for a in arms]))
+    G, C, Q = lagrange(q, qd, kinetic, potential)
+    return {name: sp.lambdify([q, qd], expression, "numpy")
             for name, expression in {"h": h, "J": J, "J_dot": J_dot, "G": G, "C": C, "Q": Q}.items()}
 
 
