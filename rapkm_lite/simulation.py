@@ -7,20 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from . import engine
-from ._arguments import ConvergenceError, bounded, matvec, positive_number, real_array
-from .control import (
-    APD,
-    CTC,
-    PD,
-    AntagonismFilter,
-    CommandFilter,
-    Controller,
-    Law,
-    RedundantAPD,
-    RedundantCTC,
-    SwitchedCTC,
-)
+from ._arguments import bounded, matvec, positive_number, real_array
+from ._closed_loop import Loop, encode, growth, run_lockstep, run_model_based
+from .control import PD, Law
+from .engine import tables
 from .kinematics import ee_complement, inverse_kinematics
 from .manipulator import Manipulator, load, read_toml
 from .trajectory import Trajectory, triangle
@@ -96,8 +86,8 @@ class Run:
         return f"Run({self.t[-1]:g} s, {type(self.law).__name__}, energy ({joules}) J)"
 
 
-def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encoder=None, model: Manipulator | None = None,
-             velocity_filter: float | None = None) -> Run:
+def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encoder=None,
+             model: Manipulator | None = None, velocity_filter: float | None = None) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
     The run starts at rest at the first point of the path.  The controller measures q_a + offset and the true rates.
@@ -111,36 +101,57 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
     Raises ValueError for bad arguments, SimulationError with the time when the run leaves the workspace, loses its
     pose or meets a singularity of its coordinates.
     """
-    model = robot if model is None else model
-    if model.n_arms != robot.n_arms:
-        raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
-    N = robot.n_arms
-    offset = _per_drive("offset", offset, N)
-    quantum = 0.0 if encoder is None else 2 * np.pi / positive_number("encoder", encoder)
-    tau = -1.0 if velocity_filter is None else float(bounded("velocity_filter", real_array(
-        "velocity_filter", velocity_filter), 0.0, strict=False))
+    model, quantum, tau = check_setup(robot, encoder, model, velocity_filter)
+    offset = _per_drive("offset", offset, robot.n_arms)
     trajectory = trajectory.for_robot(model)
     inverse_kinematics(robot, trajectory.x[0])
-    coded = encode(law, model) if isinstance(law, Law) else None
-    arrays = _allocate(len(trajectory), N)
-    if coded is not None:
-        status, k = engine.closed_loop(
-            engine.arm_table(robot), engine.environment(robot), engine.arm_table(model), engine.environment(model),
-            engine.motion_table(trajectory), trajectory.dt, *coded, offset, quantum, tau, *arrays)
-        if status != engine.DONE:
-            raise SimulationError(trajectory.t[k], _REASONS[status])
+    arrays = states, q_a, qd_a, c, pairs = _allocate(len(trajectory), robot.n_arms)
+    code = encode(law, model, robot) if isinstance(law, Law) else None
+    note = ""
+    if code is None:
+        status, k, note = Loop(robot, law, model, trajectory, offset, quantum, tau).run(*arrays)
     else:
-        _python_loop(robot, law, model, trajectory, offset, quantum, tau, *arrays)
-    states, q_a, qd_a, c, pairs = arrays
+        run = run_lockstep if code.lockstep else run_model_based
+        status, k = run(robot, model, trajectory, code, offset, quantum, tau, *arrays)
+    if status != tables.DONE:
+        reason = note or explain(status, k, robot, law, model, trajectory, offset)
+        raise SimulationError(trajectory.t[k], reason)
     return Run(robot, law, trajectory, offset, trajectory.t, states[:, :2], states[:, 2:], q_a, qd_a, c, pairs)
 
 
+def check_setup(robot, encoder, model, velocity_filter) -> tuple[Manipulator, float, float]:
+    """The controller's model, the angle of one encoder count in rad (0: ideal) and the filter time in s (-1: none)."""
+    model = robot if model is None else model
+    if model.n_arms != robot.n_arms:
+        raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
+    quantum = 0.0 if encoder is None else 2 * np.pi / positive_number("encoder", encoder)
+    if velocity_filter is None:
+        return model, quantum, -1.0
+    tau = real_array("velocity_filter", velocity_filter)
+    if tau.ndim:
+        raise ValueError(f"velocity_filter has shape {tau.shape}; allowed: one number")
+    return model, quantum, float(bounded("velocity_filter", tau, 0.0, strict=False))
+
+
 _REASONS = {
-    engine.LEFT_WORKSPACE: "the machine left the workspace: an unstable gain, a too large offset, or a path too near the "
-                           "boundary",
-    engine.NO_POSE: "the measured base angles fit no pose of the controller's model",
-    engine.SINGULAR: "the independent coordinates of the law became singular",
+    tables.LEFT_WORKSPACE: "the machine left the workspace",
+    tables.NO_POSE: "the measured base angles fit no pose of the controller's model",
+    tables.SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
 }
+
+
+def explain(status: int, k: int, robot, law, model, trajectory, offset) -> str:
+    """What went wrong at sample k, and whether the sampled loop is unstable there or was led astray."""
+    factor = growth((robot, law, model, trajectory, offset), k)
+    if factor is not None and factor > 1.0 + 1e-6:
+        cause = (f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
+                 f"sample of {trajectory.dt:g} s")
+    elif factor is not None:
+        cause = (f"the sampled loop is stable near the desired state (factor {factor:.3g} per sample), so look at "
+                 "offsets, a weak gain, or a path too near the boundary")
+    else:
+        cause = "look at gains, offsets and the path"
+    return f"{_REASONS[status]} ({cause})"
 
 
 def _per_drive(name: str, value, N: int) -> np.ndarray:
@@ -151,84 +162,8 @@ def _per_drive(name: str, value, N: int) -> np.ndarray:
 
 
 def _allocate(samples: int, N: int):
-    states, q_a, qd_a, c = np.empty((samples, 4)), *(np.empty((samples, N)) for _ in range(3))
+    states, q_a, qd_a, c = np.zeros((samples, 4)), *(np.empty((samples, N)) for _ in range(3))
     return states, q_a, qd_a, c, np.full((samples, 2), -1)
-
-
-def encode(law: Law, model: Manipulator):
-    """The engine's arguments (law, form, pose, K_P, K_D, pair, hysteresis) for a law, or None where it has no code.
-
-    The engine knows diagonal gains and W = I; everything else runs through the textbook layer.
-    """
-    N, form, pose = model.n_arms, engine.NO_FILTER, engine.TRUE if law.pose == "true" else engine.MEASURED
-    if isinstance(law, (AntagonismFilter, CommandFilter)) and isinstance(law.law, PD):
-        form = engine.FORCE_FILTER if isinstance(law, AntagonismFilter) else engine.COMMAND_FILTER
-        law = law.law
-    codes = {PD: engine.PD, APD: engine.APD, CTC: engine.CTC, SwitchedCTC: engine.SWITCHED,
-             RedundantAPD: engine.REDUNDANT_APD, RedundantCTC: engine.REDUNDANT_CTC}
-    code = codes.get(type(law))
-    if code is None or getattr(law, "W", None) is not None:
-        return None
-    if code == engine.REDUNDANT_CTC and not law.projected:
-        code = engine.REDUNDANT_CTC_LINE2
-    size = N if code == engine.PD else 2 * N if isinstance(law, RedundantAPD) else 2
-    gains = []
-    for name in ("K_P", "K_D"):
-        K = getattr(law, name)
-        if K.ndim == 2:
-            return None
-        if K.ndim == 1 and K.shape != (size,) and not (size == 2 * N and K.shape == (N,)):
-            raise ValueError(f"{name} has shape {K.shape}; allowed: one number or ({size},)")
-        gains.append(np.resize(np.concatenate([K, np.zeros(size - len(K))]), size) if K.ndim else np.full(size, float(K)))
-    pair = np.array([-1, -1])
-    if isinstance(law, APD) and law.independent is not None:
-        if max(law.independent) >= 2 * N:
-            raise ValueError(f"independent = {law.independent}; allowed: joint indices from 0 to {2 * N - 1}")
-        pair = np.array(law.independent)
-    return code, form, pose, *gains, pair, float(getattr(law, "hysteresis", 1.0))
-
-
-def _python_loop(robot, law, model, trajectory, offset, quantum, tau, states, q_a, qd_a, c, pairs) -> None:
-    """The sampled loop with a law in Python and the compiled plant."""
-    N, dt = robot.n_arms, trajectory.dt
-    arms, env, table = engine.arm_table(robot), engine.environment(robot), engine.motion_table(trajectory)
-    controller = Controller(law, model) if isinstance(law, Law) else None
-    x = np.concatenate([trajectory.x[0], trajectory.xd[0]])
-    last, slow = None, np.zeros(N)
-    for k, t in enumerate(trajectory.t):
-        engine.sense(arms, table[k], *x, q_a[k], qd_a[k])
-        states[k] = x
-        angle, rate = q_a[k] + offset, qd_a[k].copy()
-        if quantum > 0.0:
-            angle = quantum * np.floor(angle / quantum + 0.5)
-        if tau >= 0.0:
-            slow = slow if last is None else slow + dt / (tau + dt) * ((angle - last) / dt - slow)
-            last, rate = angle, slow
-        try:
-            if controller is not None:
-                c[k] = controller(t, angle, rate, trajectory[k], truth=(x[:2], x[2:]))
-                pairs[k] = pairs[k] if controller.pair is None else controller.pair
-            else:
-                c[k] = _student_torque(law, t, angle, rate, trajectory[k])
-        except ConvergenceError as error:
-            raise SimulationError(t, str(error)) from error
-        if k + 1 < len(trajectory):
-            x = np.array(engine.advance(arms, env, *x, c[k], dt))
-            if not np.all(np.isfinite(x)) or not all(np.isfinite(engine.arm_geometry(arm, x[0], x[1])[5]) for arm in arms):
-                raise SimulationError(t, _REASONS[engine.LEFT_WORKSPACE])
-
-
-def _student_torque(law, t, q_a, qd_a, desired) -> np.ndarray:
-    """Call a law written by a user and say what to change when the answer does not fit."""
-    if not callable(law):
-        raise ValueError(f"law = {law!r}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
-    c = law(t, q_a, qd_a, desired)
-    if c is None:
-        raise ValueError("law returned None; allowed: the drive torques c, an array (N,) in N m (is a return missing?)")
-    c = real_array(f"law(t = {t:.4f} s, ...)", c)
-    if c.shape != q_a.shape:
-        raise ValueError(f"law returned the shape {c.shape}; allowed: {q_a.shape}, one torque in N m per drive")
-    return c
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,4 +198,5 @@ def experiment(source="testbed") -> Experiment:
     control, sensor = tables["control"], tables.get("sensor", {})
     path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])
     law = PD(control["K_P"], control["K_D"])
-    return Experiment(robot, law, path, _per_drive("offset", sensor.get("offset", 0.0), robot.n_arms), sensor.get("encoder"))
+    offset = _per_drive("offset", sensor.get("offset", 0.0), robot.n_arms)
+    return Experiment(robot, law, path, offset, sensor.get("encoder"))
