@@ -266,7 +266,7 @@ def test_one_pose_and_a_trajectory_are_the_same_call():
     for robot in (TESTBED, MACHINES["asymmetric"], MACHINES["four_arms"]):
         q, qd, _, _ = random_motion(robot, 12)
         c = np.random.default_rng(0).normal(0, 0.1, (12, robot.n_arms))
-        pair = lambda f: lambda *a: f(*a, (0, 2))  # noqa: E731
+        pair = lambda f: lambda *v: f(*v, (0, 2))  # noqa: E731
         calls = [(rk.mass_matrix, q), (rk.coriolis_matrix, q, qd), (rk.generalized_forces, q, qd),
                  (rk.orthogonal_complement, q), (pair(rk.orthogonal_complement), q), (rk.nullspace_projector, q),
                  (rk.orthogonal_complement_dot, q, qd), (pair(rk.orthogonal_complement_dot), q, qd),
