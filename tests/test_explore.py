@@ -244,11 +244,11 @@ def test_one_output_holds_the_widget_and_the_picture():
 
 def test_axes_are_drawn_once_for_the_same_limits():
     explorer = light()
-    before = explorer.picture.full_draws
+    before = explorer.picture.panel_draws
     for _ in range(5):
         explorer.set(slope=3.0)
         explorer.set(slope=1.0)
-    assert explorer.picture.full_draws - before <= 2
+    assert explorer.picture.panel_draws - before <= 2
 
 
 def test_thinned_traces_keep_every_extreme():
@@ -277,7 +277,7 @@ def steps(count):
     return sys.getallocatedblocks(), len(gc.get_objects()), len(explorer.picture.axes["a"].get_children())
 blocks, objects, artists = (b - a for a, b in zip(steps(500), steps(1000)))
 assert blocks < 200 and objects < 20 and artists == 0, (blocks, objects, artists)
-assert len(explorer.picture._backgrounds) <= 16 and len(slider._trait_notifiers["value"]["change"]) == 1
+assert len(explorer.picture._panels["a"]) <= 12 and len(slider._trait_notifiers["value"]["change"]) == 1
 from matplotlib import pyplot
 assert pyplot.get_fignums() == []
 """

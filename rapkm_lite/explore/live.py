@@ -30,7 +30,7 @@ class LivePicture:
 
     A draw function calls `line`, `text`, `bar`, `polygon`, `arrow` and `image`.  The k-th line of a panel in one step
     is the k-th line of that panel in the next one: artists are made once and updated; those not drawn disappear.
-    What the set-up painted, with axes and ticks, is kept as a bitmap and drawn anew only for limits not met before.
+    Axes, ticks and what the set-up painted are kept as a bitmap per panel, drawn anew only for limits not met before.
     """
 
     def __init__(self, panels: dict, layout=None, widths=None, size=(9.4, 3.3), setup=None):
@@ -47,9 +47,10 @@ class LivePicture:
         self._pools: dict[tuple, list] = {}
         self._used: dict[tuple, int] = {}
         self._drawn: list = []
-        # Bitmaps of the axes for the last few limits: a slider dragged to and fro finds them again.
-        self._backgrounds: OrderedDict[tuple, object] = OrderedDict()
-        self.full_draws = 0
+        self._blank = None
+        # Bitmaps of each panel for the last few limits: a slider dragged to and fro finds them again.
+        self._panels: dict[str, OrderedDict] = {name: OrderedDict() for name in self.axes}
+        self.panel_draws = 0
 
     def line(self, panel: str, x, y, **style) -> None:
         """A curve, or markers with ``linestyle="none"``."""
@@ -144,9 +145,10 @@ class LivePicture:
 
     def png(self) -> bytes:
         """Draw the step and return it as a PNG."""
-        self.canvas.restore_region(self._background())
+        renderer = self.canvas.get_renderer()
+        self._draw_background(renderer)
         for artist in sorted(self._drawn, key=lambda a: a.get_zorder()):
-            artist.draw(self.canvas.get_renderer())
+            artist.draw(renderer)
         image = Image.frombuffer("RGBA", self.canvas.get_width_height(), self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
         file = io.BytesIO()
         # 64 colours are enough for lines on white, and half the size and time of all colours.
@@ -154,23 +156,45 @@ class LivePicture:
             file, "PNG", compress_level=1)
         return file.getvalue()
 
-    def _background(self):
-        """Bitmap of what does not change under the present limits."""
-        key = tuple((*ax.get_xlim(), *ax.get_ylim()) for ax in self.axes.values())
-        if key in self._backgrounds:
-            self._backgrounds.move_to_end(key)
-            return self._backgrounds[key]
-        with mpl.rc_context(_RC):
-            self.canvas.draw()
-            if self.figure.get_layout_engine() is not None:
+    def _draw_background(self, renderer) -> None:
+        """Put together what does not change under the present limits."""
+        if self._blank is None:
+            with mpl.rc_context(_RC):
+                self.canvas.draw()
                 # From here on panels stay where they are, whatever the numbers at their ticks.
                 self.figure.set_layout_engine("none")
+                for ax in self.axes.values():
+                    ax.set_visible(False)
                 self.canvas.draw()
-        self.full_draws += 1
-        self._backgrounds[key] = self.canvas.copy_from_bbox(self.figure.bbox)
-        if len(self._backgrounds) > 16:
-            self._backgrounds.popitem(last=False)
-        return self._backgrounds[key]
+                for ax in self.axes.values():
+                    ax.set_visible(True)
+            self._blank = np.array(self.canvas.buffer_rgba())
+        images = [self._panel_image(renderer, name) for name in self.axes]
+        pixels = np.asarray(self.canvas.buffer_rgba())
+        pixels[:] = self._blank
+        for where, image in images:
+            # Dark on white: the darker pixel is the drawn one, should labels of two panels touch.
+            np.minimum(pixels[where], image, out=pixels[where])
+
+    def _panel_image(self, renderer, name: str):
+        """Axes and ticks of one panel: where they are in the picture, and their pixels."""
+        ax, known = self.axes[name], self._panels[name]
+        key = (*ax.get_xlim(), *ax.get_ylim())
+        if key not in known:
+            renderer.clear()
+            with mpl.rc_context(_RC):
+                self.figure.patch.draw(renderer)
+                ax.draw(renderer)
+                box = ax.get_tightbbox(renderer)
+            width, height = self.canvas.get_width_height()
+            rows = slice(max(0, height - int(box.y1) - 3), max(0, height - int(box.y0) + 3))
+            where = rows, slice(max(0, int(box.x0) - 3), int(box.x1) + 4)
+            known[key] = where, np.asarray(self.canvas.buffer_rgba())[where].copy()
+            self.panel_draws += 1
+            if len(known) > 12:
+                known.popitem(last=False)
+        known.move_to_end(key)
+        return known[key]
 
     def _artist(self, panel: str, kind: str, style: dict, make):
         """The next artist of its kind in this step, made when there is none, with the style asked for."""
