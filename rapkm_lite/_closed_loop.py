@@ -21,7 +21,7 @@ from .control import (
     RedundantCTC,
     SwitchedCTC,
 )
-from .engine import tables
+from .engine import lanes, tables
 
 LANES = 16
 _motions = weakref.WeakKeyDictionary()
@@ -102,9 +102,11 @@ def motion(trajectory):
     return _motions[trajectory]
 
 
-def lockstep(robot, model, trajectory, code: Code, K_P, K_D, offsets, quantum, tau, history):
-    """Run L = len(offsets) runs side by side; returns the work table (rows, L) and its blocks (blocks, N, L)."""
-    from .engine import lanes
+def lockstep(robot, model, trajectory, code: Code, K_P, K_D, offsets, quantum, tau, history=None):
+    """Run L = len(offsets) runs side by side; returns the work table (rows, L) and its blocks (blocks, N, L).
+
+    history : for L = 1 the arrays that take the run, states, q_a, qd_a and c; None sums it up instead.
+    """
     from .engine.lockstep import closed_loops
 
     L, N = offsets.shape
@@ -117,9 +119,11 @@ def lockstep(robot, model, trajectory, code: Code, K_P, K_D, offsets, quantum, t
     blocks[lanes.OFFSET], blocks[lanes.GAIN_P], blocks[lanes.GAIN_D] = offsets.T, K_P.T, K_D.T
     blocks[lanes.WEIGHT] = (robot.resistance / robot.torque_constant**2)[:, None]
     extra, work = tables.extra(robot), _plain(w.ravel())
+    keep = tables.sizes(int(history is not None))
+    history = history or [np.empty((0, 0))] * 4
     with patience("lockstep", L, N, extra), np.errstate(all="ignore"):
         try:
-            closed_loops(tables.sizes(L), tables.sizes(N), extra, *_machine(robot), _machine(model)[0],
+            closed_loops(tables.sizes(L), tables.sizes(N), extra, keep, *_machine(robot), _machine(model)[0],
                          motion(trajectory), trajectory.dt, code.form, code.pose, quantum, tau, work, *history)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
@@ -134,8 +138,6 @@ def _machine(robot):
 
 def run_lockstep(robot, model, trajectory, code, offset, quantum, tau, states, q_a, qd_a, c, pairs) -> tuple[int, int]:
     """One run of a decentralized law with its history; returns status and sample."""
-    from .engine import lanes
-
     w, _ = lockstep(robot, model, trajectory, code, code.K_P[None], code.K_D[None], offset[None], quantum, tau,
                     (states, q_a, qd_a, c))
     status, k = int(w[lanes.STATUS, 0]), int(w[lanes.SAMPLE, 0])

@@ -1,4 +1,4 @@
-"""A word to the user while the engine compiles for the first time: seen, but in no stored output."""
+"""A word to the user while something takes time: seen, but in no stored output."""
 
 from __future__ import annotations
 
@@ -34,19 +34,63 @@ def patience(*kind, after: float = 0.7):
             action()
 
 
+def _notebook() -> bool:
+    """True under a Jupyter kernel."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return getattr(shell, "kernel", None) is not None
+
+
+def _display(widget) -> None:
+    """Show a widget without the text that `display` would leave in the notebook."""
+    from IPython.display import display
+
+    view = {"version_major": 2, "version_minor": 0, "model_id": widget.model_id}
+    display({"application/vnd.jupyter.widget-view+json": view}, raw=True)
+
+
+def _terminal(text: str) -> None:
+    """Write over the line of a terminal."""
+    sys.stderr.write("\r" + text)
+    sys.stderr.flush()
+
+
 def _show():
     """Show the line and return the function that takes it away."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    if getattr(shell, "kernel", None) is not None:
-        from IPython.display import display
+    if _notebook():
         from ipywidgets import Label
 
         label = Label(_TEXT)
-        view = {"version_major": 2, "version_minor": 0, "model_id": label.model_id}
-        display({"application/vnd.jupyter.widget-view+json": view}, raw=True)
+        _display(label)
         return label.close
     if sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write(_TEXT)
-        sys.stderr.flush()
-        return lambda: (sys.stderr.write("\r" + " " * len(_TEXT) + "\r"), sys.stderr.flush())
+        _terminal(_TEXT)
+        return lambda: _terminal(" " * len(_TEXT) + "\r")
     return lambda: None
+
+
+@contextlib.contextmanager
+def progress_bar(total: int):
+    """A bar over `total` chunks (0: none) that goes away at its end; yields the function that advances it."""
+    done = 0
+    notebook, terminal = total and _notebook(), total and sys.stderr is not None and sys.stderr.isatty()
+    if notebook:
+        from ipywidgets import IntProgress
+
+        bar = IntProgress(max=total, description="runs")
+        _display(bar)
+
+    def advance():
+        nonlocal done
+        done += 1
+        if notebook:
+            bar.value = done
+        elif terminal:
+            _terminal(f"runs [{'#' * (40 * done // total):40}] {100 * done // total} %")
+
+    try:
+        yield advance
+    finally:
+        if notebook:
+            bar.close()
+        elif terminal:
+            _terminal(" " * 60 + "\r")

@@ -17,14 +17,17 @@ from .trajectory import Trajectory, triangle
 
 
 class SimulationError(RuntimeError):
-    """A run that could not be finished; `time` in s says when, `reason` what went wrong, `run` which row of a sweep."""
+    """A run that could not be finished.
 
-    def __init__(self, time: float, reason: str, run: int | None = None):
+    `time` in s says when, `reason` what went wrong, `run` which row of a sweep; `status` is the engine's code.
+    """
+
+    def __init__(self, time: float, reason: str, run: int | None = None, status: int = tables.LEFT_WORKSPACE):
         super().__init__(f"{'' if run is None else f'run {run}: '}at t = {time:.4f} s {reason}")
-        self.time, self.reason, self.run = float(time), reason, run
+        self.time, self.reason, self.run, self.status = float(time), reason, run, status
 
     def __reduce__(self):
-        return SimulationError, (self.time, self.reason, self.run)
+        return SimulationError, (self.time, self.reason, self.run, self.status)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +118,7 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
         status, k = run(robot, model, trajectory, code, offset, quantum, tau, *arrays)
     if status != tables.DONE:
         reason = note or explain(status, k, robot, law, model, trajectory, offset)
-        raise SimulationError(trajectory.t[k], reason)
+        raise SimulationError(trajectory.t[k], reason, status=status)
     return Run(robot, law, trajectory, offset, trajectory.t, states[:, :2], states[:, 2:], q_a, qd_a, c, pairs)
 
 
@@ -133,7 +136,7 @@ def check_setup(robot, encoder, model, velocity_filter) -> tuple[Manipulator, fl
     return model, quantum, float(bounded("velocity_filter", tau, 0.0, strict=False))
 
 
-_REASONS = {
+REASONS = {
     tables.LEFT_WORKSPACE: "the machine left the workspace",
     tables.NO_POSE: "the measured base angles fit no pose of the controller's model",
     tables.SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
@@ -151,7 +154,7 @@ def explain(status: int, k: int, robot, law, model, trajectory, offset) -> str:
                  "offsets, a weak gain, or a path too near the boundary")
     else:
         cause = "look at gains, offsets and the path"
-    return f"{_REASONS[status]} ({cause})"
+    return f"{REASONS[status]} ({cause})"
 
 
 def _per_drive(name: str, value, N: int) -> np.ndarray:

@@ -9,10 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import real_array
+from ._closed_loop import LANES, encode, lockstep
+from ._patience import progress_bar
 from .control import Law
 from .energy import antagonistic_energy
+from .engine import COMPILED, lanes, tables
+from .kinematics import inverse_kinematics
 from .manipulator import Manipulator
-from .simulation import SimulationError, simulate
+from .simulation import REASONS, SimulationError, check_setup, simulate
 from .trajectory import Trajectory
 
 
@@ -47,6 +51,8 @@ class Sweep:
         return len(self.failed)
 
     def __array__(self, dtype=None, copy=None):
+        if self.failed.any():
+            raise ValueError(f"{int(self.failed.sum())} runs failed; take the masked array `energies` instead")
         return np.array(self.energies, dtype=dtype)
 
     def __repr__(self):
@@ -57,36 +63,48 @@ class Sweep:
 
 def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None, model: Manipulator | None = None,
           velocity_filter: float | None = None, executor: Executor | None = None, failed: str = "raise",
-          chunk: int = 256) -> Sweep:
+          chunk: int = 64, progress: bool = False) -> Sweep:
     """Run a law on the machine along a trajectory once per row of `offsets`, many runs at a time.
 
     law : one law for all runs, or a sequence of k laws, such as PD with other gains.
     offsets : calibration offsets (k, N) in rad, or (N,) for all runs; the other arguments are those of `simulate`.
     executor : any `concurrent.futures` executor to spread the chunks of `chunk` runs; default: one thread per core.
     failed : "raise" stops at the first run that fails; "mask" masks the rows of such runs.
-    The numbers do not depend on executor, chunk or the order of the rows, to the last bit.
+    progress : show a bar.
+    Decentralized laws run 16 side by side; other laws one by one.  The numbers do not depend on executor, chunk or the
+    order of the rows, to the last bit.
     Raises ValueError for bad arguments, SimulationError naming the run and the time.
     """
     if failed not in ("raise", "mask"):
         raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
-    if int(chunk) != chunk or chunk < 1:
+    if not isinstance(chunk, (int, np.integer)) or chunk < 1:
         raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
     laws, offsets = _rows(law, offsets, robot.n_arms)
+    setup = (encoder, model, velocity_filter)
+    trajectory = trajectory.for_robot(check_setup(robot, *setup)[0])
+    inverse_kinematics(robot, trajectory.x[0])
     own = executor or ThreadPoolExecutor(os.cpu_count())
+    parts = []
     try:
-        jobs = [own.submit(run_chunk, robot, laws[i:i + chunk], trajectory, offsets[i:i + chunk], encoder, model,
-                           velocity_filter) for i in range(0, len(offsets), chunk)]
-        parts = [job.result() for job in jobs]
+        jobs = [own.submit(run_chunk, robot, laws[i : i + chunk], trajectory, offsets[i : i + chunk], setup)
+                for i in range(0, len(offsets), chunk)]
+        with progress_bar(len(jobs) if progress else 0) as advance:
+            for job in jobs:
+                parts.append(job.result())
+                advance()
     finally:
         if executor is None:
             own.shutdown(cancel_futures=True)
-    results = [np.concatenate(column) for column in zip(*(part[:-1] for part in parts), strict=True)]
-    *numbers, times = results
-    reasons = [reason for part in parts for reason in part[-1]]
-    broken = np.array([reason is not None for reason in reasons])
+    *numbers, times, status = (np.concatenate(column) for column in zip(*parts, strict=True))
+    broken = status != tables.DONE
     if failed == "raise" and broken.any():
         i = int(np.argmax(broken))
-        raise SimulationError(times[i], reasons[i], run=i)
+        reason = REASONS[status[i]]
+        try:
+            simulate(robot, laws[i], trajectory, offsets[i], *setup)
+        except SimulationError as error:
+            reason = error.reason
+        raise SimulationError(times[i], reason, run=i)
     if failed == "mask":
         numbers = [np.ma.array(v, mask=np.broadcast_to(broken.reshape(-1, *[1] * (v.ndim - 1)), v.shape))
                    for v in numbers]
@@ -108,18 +126,46 @@ def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
     return laws if several else laws * k, np.array(np.broadcast_to(offsets, (k, N)))
 
 
-def run_chunk(robot, laws, trajectory, offsets, encoder, model, velocity_filter) -> tuple:
-    """Energies, torque norm, antagonistic energy, final position, failure time and reason of some runs, one by one."""
-    k, N = offsets.shape
-    energies, norm, antagonism, x_final, times = (np.zeros(s) for s in ((k, N), k, k, (k, 2), k))
-    reasons = [None] * k
-    for i, (law, offset) in enumerate(zip(laws, offsets, strict=True)):
-        try:
-            run = simulate(robot, law, trajectory, offset, encoder, model, velocity_filter)
-        except SimulationError as error:
-            times[i], reasons[i] = error.time, error.reason
-            continue
-        energies[i], x_final[i] = run.energy, run.x[-1]
-        norm[i] = np.sqrt(np.mean(np.sum(run.c[:-1] ** 2, axis=-1)))
-        antagonism[i] = antagonistic_energy(run)
-    return energies, norm, antagonism, x_final, times, reasons
+def run_chunk(robot, laws, trajectory, offsets, setup) -> tuple:
+    """Energies, torque norm, antagonistic energy, final position, failure time and status of some runs.
+
+    A function of values only, so that any executor can send it to another process.
+    """
+    model, quantum, tau = check_setup(robot, *setup)
+    own = {id(law): encode(law, model, robot) if isinstance(law, Law) else None for law in laws}
+    codes = [own[id(law)] for law in laws]
+    first = codes[0]
+    together = all(code is not None and code.lockstep and (code.form, code.pose) == (first.form, first.pose)
+                   for code in codes)
+    if not together:
+        rows = [_single(robot, law, trajectory, offset, setup) for law, offset in zip(laws, offsets, strict=True)]
+        return tuple(np.array(column) for column in zip(*rows, strict=True))
+    K_P, K_D = np.array([code.K_P for code in codes]), np.array([code.K_D for code in codes])
+    width = LANES if COMPILED else 1
+    # The last runs fill up with copies of themselves: a lane does not feel its neighbours.
+    index = np.minimum(np.arange(-(-len(laws) // width) * width), len(laws) - 1).reshape(-1, width)
+    parts = [_lockstep(robot, model, trajectory, first, K_P[i], K_D[i], offsets[i], quantum, tau) for i in index]
+    return tuple(np.concatenate(column)[: len(laws)] for column in zip(*parts, strict=True))
+
+
+def _lockstep(robot, model, trajectory, code, K_P, K_D, offsets, quantum, tau) -> tuple:
+    """`run_chunk` for as many runs as the engine takes side by side."""
+    w, blocks = lockstep(robot, model, trajectory, code, K_P, K_D, offsets, quantum, tau)
+    dt = trajectory.dt
+    status, sample = w[lanes.STATUS].astype(int), w[lanes.SAMPLE].astype(int)
+    done = status == tables.DONE
+    weight = robot.resistance / robot.torque_constant**2
+    energies = blocks[lanes.COPPER].T * weight * dt + blocks[lanes.WORK].T
+    norm = np.sqrt(np.where(done, w[lanes.TORQUE2], 0.0) / (len(trajectory) - 1))
+    return (np.where(done[:, None], energies, 0.0), norm, np.where(done, w[lanes.ANTAGONISM] * dt, 0.0),
+            np.where(done[:, None], w[[lanes.X, lanes.Y]].T, 0.0), trajectory.t[np.where(done, 0, sample)], status)
+
+
+def _single(robot, law, trajectory, offset, setup) -> tuple:
+    """The same for one run of any law."""
+    try:
+        run = simulate(robot, law, trajectory, offset, *setup)
+    except SimulationError as error:
+        return np.zeros(robot.n_arms), 0.0, 0.0, np.zeros(2), error.time, error.status
+    norm = np.sqrt(np.mean(np.sum(run.c[:-1] ** 2, axis=-1)))
+    return run.energy, norm, antagonistic_energy(run), run.x[-1], 0.0, tables.DONE

@@ -41,9 +41,8 @@ from .lanes import (
     Q,
     X,
     Y,
-    at,
 )
-from .plant import add_arm, add_torque, drive, geometry, runge_kutta, small_angle, solve2
+from .plant import add_arm, add_torque, at, drive, geometry, runge_kutta, small_angle, solve2
 from .pose import measured_pose, true_pose
 from .tables import (
     COLUMNS,
@@ -228,8 +227,13 @@ def move(lanes, drives, arms, env, extra, w, dt, k):
 
 
 @kernel
-def closed_loops(lanes, drives, extra, plant, env, model, table, dt, form, pose, quantum, tau, w, states, q_a, qd_a, c):
-    """Sampled runs in lockstep; leaves sums, final state and status in w, and the history of a single run in arrays."""
+def closed_loops(lanes, drives, extra, keep, plant, env, model, table, dt, form, pose, quantum, tau, w,
+                 states, q_a, qd_a, c):
+    """Sampled runs in lockstep: leaves final state and status in w, and sums.
+
+    With an entry in `keep` it writes, instead of the sums, the history of a single run to states (k, 4), q_a, qd_a and
+    c (k, N).
+    """
     L, N = len(lanes), len(drives)
     samples = len(table)
     for k in range(samples):
@@ -240,7 +244,7 @@ def closed_loops(lanes, drives, extra, plant, env, model, table, dt, form, pose,
             if w[STATUS] != DONE:
                 return
             w[SAMPLE] = k
-        else:
+        if len(keep) == 0:
             for i in range(N):
                 for j in range(L):
                     angle = w[at(Q, i, j, N, L)]
@@ -253,10 +257,10 @@ def closed_loops(lanes, drives, extra, plant, env, model, table, dt, form, pose,
                 true_pose(lanes, drives, model, pose == TRUE_SAME, w)
             else:
                 measured_pose(lanes, drives, model, row, w, k, quantum == 0.0)
-        if L > 1 and k + 1 == samples:
+        if len(keep) == 0 and k + 1 == samples:
             return
         command(lanes, drives, form, w)
-        if L == 1:
+        if len(keep) > 0:
             states[k, 0], states[k, 1], states[k, 2], states[k, 3] = w[X], w[Y], w[VX], w[VY]
             for i in range(N):
                 q_a[k, i], qd_a[k, i], c[k, i] = w[at(Q, i, 0, N, 1)], w[at(QD, i, 0, N, 1)], w[at(C, i, 0, N, 1)]

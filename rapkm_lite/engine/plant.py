@@ -15,7 +15,14 @@ from __future__ import annotations
 import math
 
 from .jit import kernel, leaf
+from .lanes import SINGLES
 from .tables import BX, BY, COLUMNS, FRICTION, HALF, L1SQ, L2SQ, MEAN, MODE, S1, S2, SCALE, W1, W2
+
+
+@leaf
+def at(block, i, j, N, L):
+    """Index of lane j in row i of a block."""
+    return (SINGLES + block * N + i) * L + j
 
 
 @leaf

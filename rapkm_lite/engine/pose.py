@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .lanes import A1, A2, DX, DY, FAR, INV, PX, PX1, PX2, PY, PY1, PY2, SAMPLE, STATUS, TODO, E, X, Y, at
-from .plant import geometry, small_angle, solve2
+from .lanes import A1, A2, DX, DY, FAR, INV, PX, PX1, PX2, PY, PY1, PY2, SAMPLE, STATUS, TODO, E, X, Y
+from .plant import at, geometry, small_angle, solve2
 from .tables import COLUMNS, DONE, L2SQ, NO_POSE, SCALE
 
 
