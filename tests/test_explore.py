@@ -1,6 +1,7 @@
 """The explorers: drawn at corners and defaults of their controls, honest about mistakes, and without leaks."""
 
 import base64
+import importlib.util
 import inspect
 import io
 import itertools
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import ipywidgets as widgets
 import matplotlib
+import nbformat
 import numpy as np
 import pytest
 from PIL import Image
@@ -240,6 +242,19 @@ def test_one_output_holds_the_widget_and_the_picture():
     assert set(bundle) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}
     assert base64.b64decode(bundle["image/png"]) == explorer.png
     assert bundle["text/plain"] == "Explorer(line: slope = 1, power = 1)\nslope: 1"
+
+
+def test_stored_notebooks_keep_the_picture_and_drop_the_widget():
+    file = Path(__file__).parents[1] / "notebooks" / "build.py"
+    spec = importlib.util.spec_from_file_location("build", file)
+    build = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(build)
+    bundle = light()._repr_mimebundle_()
+    bare = {k: v for k, v in bundle.items() if k != "image/png"}
+    outputs = [nbformat.v4.new_output("display_data", data=data) for data in (bundle, bare, {"text/plain": "5"})]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("x", outputs=outputs)])
+    build.tidy(notebook)
+    assert [set(o.data) for o in notebook.cells[0].outputs] == [{"image/png", "text/plain"}, {"text/plain"}]
 
 
 def test_axes_are_drawn_once_for_the_same_limits():

@@ -204,4 +204,5 @@ class Explorer:
 
     def __repr__(self):
         setting = ", ".join(f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}" for k, v in self.values.items())
-        return f"Explorer({self.draw.__name__}: {setting})"
+        # The draw function of a ready-made explorer is local to the function that bears its name.
+        return f"Explorer({self.draw.__qualname__.split('.')[0]}: {setting})"
