@@ -1,0 +1,163 @@
+"""The compiled engine against the textbook layer: an independent integration of (4)-(7) under the laws of `control`."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import rapkm_lite as rk
+from rapkm_lite.kinematics import ee_complement
+
+ANGLES = {2: [200.0, -20.0], 3: [210.0, 330.0, 90.0], 4: [225.0, 315.0, 45.0, 135.0]}
+OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
+PD = rk.PD(7.05, 0.225)
+LAWS = {
+    "pd": PD,
+    "force": rk.AntagonismFilter(PD),
+    "force_true": rk.AntagonismFilter(PD, pose="true"),
+    "command": rk.CommandFilter(PD),
+    "ctc": rk.CTC(900.0, 60.0, (0, 1)),
+    "ctc_ee": rk.CTC(900.0, 60.0, None),
+    "apd": rk.APD(7.0, 0.2, (0, 1)),
+    "switched": rk.SwitchedCTC(900.0, 60.0),
+    "redundant_ctc": rk.RedundantCTC(900.0, 60.0),
+    "redundant_ctc_line2": rk.RedundantCTC(900.0, 60.0, projected=False),
+    "redundant_apd": rk.RedundantAPD(5.0, 0.2),
+}
+
+
+def machine(N, **values):
+    """N arms on a circle of radius 0.23 m."""
+    angle = np.deg2rad(ANGLES[N])
+    base = 0.23 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return rk.Manipulator(base=base, lengths=0.2, masses=0.134, rotor_inertia=3.35e-6, **values)
+
+
+def reference(robot, law, trajectory, offset, model=None):
+    """States and torques: DOP853 at tolerance 1e-12 in every hold, minimal coordinates x, textbook controller."""
+    model = model or robot
+    controller, independent = rk.Controller(law, model), None
+    trajectory = trajectory.for_robot(model)
+    N, state = robot.n_arms, np.concatenate([trajectory.x[0], trajectory.xd[0]])
+    path = rk.inverse_kinematics(robot, trajectory.x)[:, :N]
+    states, torques, angles = [], [], []
+
+    def rhs(t, state, c):
+        q = rk.inverse_kinematics(robot, state[:2])
+        qd = ee_complement(robot, q) @ state[2:]
+        G, C, Q = rk.minimal_dynamics(robot, q, qd, independent)
+        force = rk.control_matrix(robot, q, independent).T @ c - C @ state[2:] - Q
+        return np.concatenate([state[2:], np.linalg.solve(G, force)])
+
+    for k, t in enumerate(trajectory.t):
+        q = rk.inverse_kinematics(robot, state[:2])
+        qd = ee_complement(robot, q) @ state[2:]
+        q_a = path[k] + (q[:N] - path[k] + np.pi) % (2 * np.pi) - np.pi
+        # Angles near the desired ones, without a jump at +-pi.
+        q_a = q_a + 2 * np.pi * np.round((trajectory.q_a[k] - q_a) / (2 * np.pi))
+        c = controller(t, q_a + offset, qd[:N], trajectory[k], truth=(state[:2], state[2:]))
+        states.append(state)
+        torques.append(c)
+        angles.append(q_a)
+        if k + 1 < len(trajectory):
+            end = solve_ivp(rhs, (0.0, trajectory.dt), state, "DOP853", rtol=1e-12, atol=1e-14, args=(c,))
+            state = end.y[:, -1]
+    return np.array(states), np.array(angles), np.array(torques)
+
+
+def agrees(robot, law, model=None, duration=0.2):
+    offset = OFFSET[: robot.n_arms]
+    # Up to 8 m/s^2, sixteen times the chapter: the engine's Runge-Kutta step of 1 ms is at rounding level there.
+    trajectory = rk.circle(robot, radius=0.1 * duration**2, duration=duration)
+    run = rk.simulate(robot, law, trajectory, offset, model=model)
+    states, q_a, c = reference(robot, law, trajectory, offset, model)
+    np.testing.assert_allclose(run.q_a, q_a, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(run.c, c, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(run.x, states[:, :2], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_three_arms(name):
+    agrees(machine(3), LAWS[name])
+
+
+@pytest.mark.parametrize("N", [2, 4])
+@pytest.mark.parametrize("name", ["pd", "force", "ctc", "redundant_ctc"])
+def test_two_and_four_arms(N, name):
+    agrees(machine(N), LAWS[name], duration=0.1)
+
+
+@pytest.mark.parametrize("name", ["force", "command", "redundant_ctc_line2"])
+def test_gravity_load_friction_and_a_wrong_model(name):
+    # v0 wide enough for a Runge-Kutta step of 1 ms to resolve the friction law.
+    robot = machine(3, gravity=(0.0, -9.81), load=0.1, friction=4.2e-3, friction_velocity=5.0)
+    model = robot.replace(lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]], load=0.05)
+    agrees(robot, LAWS[name], model=model, duration=0.1)
+
+
+def test_every_drive_its_own_gain():
+    law = rk.PD([7.0, 5.0, 9.0], [0.2, 0.3, 0.1])
+    for law in (law, rk.AntagonismFilter(law), rk.CommandFilter(law)):
+        agrees(machine(3), law, duration=0.1)
+
+
+def test_smooth_sign_is_tanh():
+    from rapkm_lite.engine.plant import smooth_sign
+
+    z = np.concatenate([np.linspace(-30, 30, 2001), np.logspace(-12, 2, 200)])
+    tanh = np.array([getattr(smooth_sign, "py_func", smooth_sign)(float(v)) for v in z])
+    np.testing.assert_allclose(tanh, np.tanh(z), rtol=2e-14, atol=0)
+
+
+def test_small_angle_is_arcsin():
+    from rapkm_lite.engine.plant import small_angle
+
+    s = np.linspace(-0.1, 0.1, 401)
+    # The series of arcsin cut after s^17 leaves less than 0.01 |s|^19.
+    angle = np.array([getattr(small_angle, "py_func", small_angle)(float(v)) for v in s])
+    np.testing.assert_allclose(angle, np.arcsin(s), rtol=4e-16, atol=1e-19)
+
+
+SHORT = """
+import numpy as np, rapkm_lite as rk
+robot = rk.load().replace(gravity=(0.0, -1.0))
+path = rk.circle(robot, radius=0.03, duration=0.2)
+laws = [rk.PD(7.05, 0.225), rk.AntagonismFilter(rk.PD(7.05, 0.225)), rk.CommandFilter(rk.PD([7, 6, 5], 0.2)),
+        rk.CTC(900.0, 60.0), rk.RedundantCTC(900.0, 60.0)]
+runs = [rk.simulate(robot, law, path, [4e-3, -2e-3, 5e-3]) for law in laws]
+study = rk.sweep(robot, laws[1], path, 1e-3 * np.arange(6.0).reshape(2, 3))
+print(" ".join(float(v).hex() for run in runs for v in np.concatenate([run.x, run.q_a, run.c], axis=1).ravel()))
+print(" ".join(float(v).hex() for v in np.concatenate([study.energies.ravel(), study.antagonistic_energy])))
+"""
+
+
+def numbers(**environment):
+    done = subprocess.run([sys.executable, "-c", SHORT], env={**os.environ, **environment}, capture_output=True, text=True,
+                          check=True)
+    assert done.stderr == ""
+    return np.array([float.fromhex(v) for v in done.stdout.split()])
+
+
+def test_without_numba_the_same_numbers():
+    pytest.importorskip("numba")
+    np.testing.assert_allclose(numbers(RAPKM_LITE_NUMBA="0"), numbers(), rtol=0, atol=1e-12)
+
+
+def test_read_only_package_folder(tmp_path):
+    pytest.importorskip("numba")
+    import shutil
+    from pathlib import Path
+
+    package = Path(rk.__file__).parent
+    shutil.copytree(package, tmp_path / "rapkm_lite", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(package.parent / "data", tmp_path / "data")
+    code = "import rapkm_lite as rk; r = rk.load(); rk.simulate(r, rk.PD(7.0, 0.2), rk.hold(r, (0.0, 0.0), 0.01))"
+    (tmp_path / "rapkm_lite" / "__pycache__").write_text("no folder, so nothing can be written here")
+    (tmp_path / "rapkm_lite" / "engine" / "__pycache__").write_text("nor here")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path / "c")}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
