@@ -335,6 +335,14 @@ def test_maps_of_all_modes_at_once_hold_no_nan():
     assert (x[0], x[-1], y[0], y[-1]) == box and not value.mask.any()
 
 
+def test_maps_mask_the_boundary_where_an_arm_is_stretched():
+    # Box corners that lie on the boundary up to rounding, on either side of it.
+    for angle in np.linspace(0.35, 0.9, 40):
+        px, py = TESTBED.base[0] + 0.4 * np.array([np.cos(angle), np.sin(angle)])
+        _, _, sigma = rk.actuation_map(TESTBED, n=2, box=(px - 0.1, px, py - 0.1, py))
+        assert sigma.mask[1, 1] and not sigma.mask[0, 0]
+
+
 def test_map_masks_the_input_singularity_of_a_mixed_mode():
     mode, box = next((m, p) for m in MIXED for p in MIDPOINTS
                      if rk.degree_of_actuation(TESTBED, rk.inverse_kinematics(TESTBED, p, m)) == 1)

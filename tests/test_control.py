@@ -132,6 +132,26 @@ def test_ctc_makes_the_error_of_its_coordinates_linear(pair):
     assert_allclose(edd + 30 * ed + np.array([300.0, 500.0]) * e, 0, atol=1e-8 * np.abs(qdd).max())
 
 
+@pytest.mark.parametrize("pair", [(0, 1), None])
+def test_closed_loop_of_the_apd(pair):
+    # Gbar e2dd + (Cbar + K_D) e2d + K_P e2 = 0 follows from (5) and (19).
+    q, qd, desired = state_and_target(ROBOT)
+    k = np.abs(rk.distal_cross_products(ROBOT, q))[:, 0] > 0.05
+    q, qd, desired = q[k], qd[k], part(desired, k)
+    K_P, K_D = np.array([30.0, 50.0]), np.array([3.0, 4.0])
+    qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(rk.APD(K_P, K_D, pair), ROBOT, q, qd, desired))
+    G, C, _ = rk.minimal_dynamics(ROBOT, q, qd, pair)
+    if pair is None:
+        back = np.linalg.pinv(rk.orthogonal_complement(ROBOT, q))
+        xd = mv(back, qd)
+        e, ed = rk.forward_kinematics(ROBOT, q) - desired.x, xd - desired.xd
+        edd = mv(back, qdd - mv(rk.orthogonal_complement_dot(ROBOT, q, qd), xd)) - desired.xdd
+    else:
+        e, ed, edd = ((a - b)[:, list(pair)] for a, b in ((q, desired.q), (qd, desired.qd), (qdd, desired.qdd)))
+    terms = [mv(G, edd), mv(C, ed), K_D * ed, K_P * e]
+    assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
+
+
 # Switching.
 def test_switching_takes_the_best_pair_and_hysteresis_saves_switches():
     path = rk.triangle(FRICTIONLESS)
@@ -147,6 +167,20 @@ def test_switching_takes_the_best_pair_and_hysteresis_saves_switches():
     assert np.mean(chosen[i, j.astype(int)] == best) > 0.98
     law = rk.SwitchedCTC(400, 40, hysteresis=1.5)
     assert law.choose(FRICTIONLESS, path.q[0], (1, 0)) in rk.drive_pairs(FRICTIONLESS)
+
+
+@pytest.mark.parametrize("hysteresis", [1.0, 1.3, 2.0])
+def test_switching_waits_for_the_factor_of_its_hysteresis(hysteresis):
+    path = rk.triangle(FRICTIONLESS)
+    chosen = rk.SwitchedCTC(400, 40, hysteresis).pairs(FRICTIONLESS, path.q)
+    measure = np.abs(rk.distal_cross_products(FRICTIONLESS, path.q))
+    index = np.array([rk.drive_pairs(FRICTIONLESS).index(tuple(p)) for p in chosen.tolist()])
+    k = np.arange(1, len(path))
+    held = measure[k, index[:-1]]  # what the pair in use before this sample is worth now
+    switched = index[1:] != index[:-1]
+    assert switched.sum() >= 2
+    assert np.all(measure[k].max(axis=-1)[switched] > hysteresis * held[switched])
+    assert np.all(measure[k].max(axis=-1)[~switched] <= hysteresis * held[~switched])
 
 
 def test_switched_torques_along_a_path_are_those_of_the_pair_in_use():
@@ -228,6 +262,21 @@ def test_lyapunov_function_falls_at_the_rate_of_the_damping():
 
 
 # (32)-(35): the redundant CTC law.
+def test_closed_loop_of_the_redundant_ctc():
+    # (33): N_J G N_J (edd + K_D ed + K_P e) = 0 for line 1, and N_J G (...) = 0 for line 2.
+    q, qd, desired = state_and_target(ROBOT)
+    K_P, K_D = np.linspace(200, 500, 6), np.linspace(20, 50, 6)
+    v = desired.qdd - K_D * (qd - desired.qd) - K_P * (q - desired.q)
+    N, G = rk.nullspace_projector(ROBOT, q), rk.mass_matrix(ROBOT, q)
+    qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(rk.RedundantCTC(K_P, K_D), ROBOT, q, qd, desired))
+    terms = [mv(N @ G @ N, qdd), -mv(N @ G @ N, v)]
+    assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
+    line_2 = rk.RedundantCTC(K_P, K_D, projected=False)
+    qdd, _ = rk.forward_dynamics(ROBOT, q, qd, torque(line_2, ROBOT, q, qd, desired))
+    terms = [mv(N @ G, qdd), -mv(N @ G, v)]
+    assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
+
+
 def stiffness(law, robot, x):
     """-d(q2dd)/d(x) at rest in the desired pose x, in end-effector coordinates, by central differences."""
     target = rk.inverse_kinematics(robot, x)
@@ -287,6 +336,7 @@ def test_controller_uses_the_least_squares_pose_of_the_measurement():
         q = rk.estimate_pose(FRICTIONLESS, q_a, path.x[k])
         A = rk.control_matrix(FRICTIONLESS, q)
         c = controller(path.t[k], q_a, qd_a, path[k])
+        assert_allclose(controller.x, rk.forward_kinematics(FRICTIONLESS, q), atol=1e-12)  # the next guess
         assert_allclose(c, rk.antagonism_filter(A) @ (-7.05 * offset), atol=1e-12)
     true = rk.Controller(rk.AntagonismFilter(rk.PD(7.05, 0.225), pose="true"), FRICTIONLESS)
     A = rk.control_matrix(FRICTIONLESS, path.q[5])

@@ -39,6 +39,14 @@ def test_centroid_pose_from_trigonometry():
     assert_allclose(np.cos(q[:3] - (towards - q[3:] / 2)), 1.0, atol=1e-15)
 
 
+def test_angles_are_wrapped_to_the_half_open_turn():
+    turns = np.array([-3, -1, 0, 1, 3]) * np.pi
+    assert_allclose(rk.kinematics.wrap(turns), [np.pi, np.pi, 0, np.pi, np.pi], atol=1e-15)
+    # Arm 1 stretched along the negative x axis: its angle is +pi.
+    robot = TESTBED.with_arms((0, 1)).replace(base=[[0.4, 0.0], [0.0, 0.1]])
+    assert rk.inverse_kinematics(robot, [0.0, 0.0])[0] == np.pi
+
+
 # Derivatives against finite differences.
 @machines
 def test_jacobian_is_the_derivative_of_the_constraints(robot):
