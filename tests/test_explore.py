@@ -149,6 +149,23 @@ def test_zonotope_holds_every_force_of_limited_torques():
     assert area == pytest.approx(4 * minors, rel=1e-12)
 
 
+def test_feedback_map_is_the_textbook_one_where_the_pair_is_regular():
+    robot = rk.load()
+    path = rk.triangle(robot, 0.17, dt=0.1)
+    for pair in rk.drive_pairs(robot):
+        A = rk.control_matrix(robot, path.q, pair)
+        Gbar, _, _ = rk.minimal_dynamics(robot, path.q, path.qd, pair)
+        norm = np.linalg.norm(rk.weighted_pseudoinverse(A) @ Gbar, 2, axis=(-2, -1))
+        found = explore.torque.feedback_norm(robot, rk.CTC(1.0, 1.0, pair), path)
+        np.testing.assert_allclose(found, norm, rtol=1e-9)
+
+
+def test_singular_curves_keep_the_distance_from_the_centroid_that_the_reference_states():
+    curves = explore.torque.singular_curves(rk.load())
+    gaps = [min(np.linalg.norm(line, axis=-1).min() for line in lines) for lines in curves.values()]
+    np.testing.assert_allclose(gaps, 0.1012, atol=2e-4)
+
+
 def line(picture, slope, power=1.0):
     if slope < -2:
         raise ValueError(f"slope = {slope:g}; allowed: >= -2")

@@ -160,10 +160,15 @@ class LivePicture:
         """Put together what does not change under the present limits."""
         if self._blank is None:
             with mpl.rc_context(_RC):
+                for ax in self.axes.values():
+                    # Room for numbers one digit longer than the first ones.
+                    ax.yaxis.labelpad += 8
                 self.canvas.draw()
-                # From here on panels stay where they are, whatever the numbers at their ticks.
+                # From here on panels and labels stay where they are, whatever the numbers at the ticks.
                 self.figure.set_layout_engine("none")
                 for ax in self.axes.values():
+                    x, _ = ax.yaxis.label.get_position()
+                    ax.yaxis.set_label_coords((x - ax.bbox.x0) / ax.bbox.width, 0.5)
                     ax.set_visible(False)
                 self.canvas.draw()
                 for ax in self.axes.values():

@@ -39,14 +39,13 @@ def feedback_norm(robot: Manipulator, law, t) -> np.ndarray:
     return norm
 
 
-def singular_distance(robot: Manipulator, pair, points, curve) -> float:
-    """Smallest distance in m of points (k, 2) from the singular curve (j, 2) of a pair."""
-    gaps = np.linalg.norm(points[:, None] - curve[None], axis=-1)
-    return float(gaps.min())
+def distance(points, curve) -> float:
+    """Smallest distance in m between points (k, 2) and points (j, 2)."""
+    return float(np.linalg.norm(points[:, None] - curve[None], axis=-1).min())
 
 
 def singular_curves(robot: Manipulator) -> dict:
-    """Points (j, 2) in m of the curve on which the distal links of each pair are parallel, from a contour."""
+    """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
     from contourpy import contour_generator
 
     gx, gy = plane_grid(robot, 161)
@@ -87,7 +86,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             for line in curve:
                 picture.line("plane", *line.T, color=pair_style(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
             if curve:
-                gap = singular_distance(robot, fixed[law], t.x, np.concatenate(curve))
+                gap = distance(t.x, np.concatenate(curve))
                 numbers["distance from its singular curve"] = "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
         norm = norms(law, side)
         picture.line("map", t.t, norms("redundant coordinates", side), color=NEUTRAL, linewidth=1.2, linestyle="--")
