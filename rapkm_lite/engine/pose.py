@@ -53,7 +53,9 @@ def newton_step(lanes, drives, model, row, w, tolerance):
                                                           w[at(E, i, j, N, L)], px, py)
             m11, m12, m22, fx, fy = m11 + p11, m12 + p12, m22 + p22, fx + gx, fy + gy
             flag = min(flag, f)
-            w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = a1, a2
+            # A run that is done keeps its matrix, whatever its neighbours still need.
+            w[at(A1, i, j, N, L)] = a1 if todo > 0.0 else w[at(A1, i, j, N, L)]
+            w[at(A2, i, j, N, L)] = a2 if todo > 0.0 else w[at(A2, i, j, N, L)]
         sx, sy = solve2(m11, m12, m22, fx, fy)
         flag = min(min(flag, m11), m11 * m22 - m12 * m12)
         size = max(abs(sx), abs(sy))

@@ -1,0 +1,130 @@
+"""Studies: the same numbers as single runs, to the last bit the same in whatever company, failures never counted."""
+
+import pickle
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+
+ROBOT = rk.load().replace(friction=0.0)
+PATH = rk.circle(ROBOT, radius=0.05, duration=0.4)
+PD = rk.PD(7.05, 0.225)
+OFFSETS = np.random.default_rng(1).normal(0.0, 5e-3, (37, 3))
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+
+
+def same(a, b):
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+
+
+@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true"), rk.CommandFilter(PD),
+                                 rk.RedundantCTC(900.0, 60.0)], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("sensors", [{}, {"encoder": 2000, "velocity_filter": 2e-3}], ids=["ideal", "encoder"])
+def test_rows_are_single_runs(law, sensors):
+    robot = ROBOT.replace(friction=4.2e-3, gravity=(0.0, -0.5))
+    study = rk.sweep(robot, law, PATH, OFFSETS[:5], **sensors)
+    for i in range(5):
+        run = rk.simulate(robot, law, PATH, OFFSETS[i], **sensors)
+        np.testing.assert_allclose(study.energies[i], run.energy, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(study.antagonistic_energy[i], rk.antagonistic_energy(run), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(study.x_final[i], run.x[-1], rtol=0, atol=1e-12)
+        mean_square = np.mean(np.sum(run.c[:-1] ** 2, axis=1))
+        np.testing.assert_allclose(study.torque_norm[i], np.sqrt(mean_square), rtol=1e-10)
+
+
+def test_bits_do_not_depend_on_chunks_threads_or_order():
+    law = rk.AntagonismFilter(PD)
+    study = rk.sweep(ROBOT, law, PATH, OFFSETS)
+    for chunk in (1, 5, 16, 1000):
+        same(study, rk.sweep(ROBOT, law, PATH, OFFSETS, chunk=chunk))
+    with ThreadPoolExecutor(3) as executor:
+        same(study, rk.sweep(ROBOT, law, PATH, OFFSETS, executor=executor, chunk=4))
+    order = np.random.default_rng(2).permutation(len(OFFSETS))
+    turned = rk.sweep(ROBOT, law, PATH, OFFSETS[order])
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(turned, name), getattr(study, name)[order])
+
+
+def test_other_processes():
+    with ProcessPoolExecutor(2) as executor:
+        same(rk.sweep(ROBOT, PD, PATH, OFFSETS), rk.sweep(ROBOT, PD, PATH, OFFSETS, executor=executor, chunk=20))
+
+
+def test_dask_cluster():
+    distributed = pytest.importorskip("distributed", reason="needs the optional extra [cluster]")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            executor = client.get_executor()
+            same(rk.sweep(ROBOT, PD, PATH, OFFSETS), rk.sweep(ROBOT, PD, PATH, OFFSETS, executor=executor, chunk=20))
+
+
+def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
+    gains = [rk.PD(p, 0.225) for p in (7.0, 1e4, 6.0, 5.0)]
+    study = rk.sweep(ROBOT, gains, PATH, OFFSETS[0], failed="mask")
+    assert study.failed.tolist() == [False, True, False, False]
+    assert study.energies.mask[1].all() and not study.energies.mask[[0, 2, 3]].any()
+    assert 0.0 < study.failure_time[1] < 0.4
+    assert all(np.all(np.isfinite(getattr(study, name).data)) for name in COLUMNS)
+    same(rk.sweep(ROBOT, [gains[i] for i in (0, 2, 3)], PATH, OFFSETS[0]),
+         rk.Sweep(*[None] * 3, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None))
+    with pytest.raises(ValueError, match="1 runs failed"):
+        np.asarray(study)
+    with pytest.raises(rk.SimulationError, match=r"run 1: at t = 0\.\d+ s .*unstable gain") as caught:
+        rk.sweep(ROBOT, gains, PATH, OFFSETS[0])
+    assert caught.value.run == 1
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_pythagoras():
+    """reference.md, fact 6: of every torque c a true-pose filter R saves (R / k_t^2) int ||c_null||^2 dt."""
+    study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])
+    for i in range(3):
+        run = rk.simulate(ROBOT, PD, PATH, OFFSETS[i])
+        R = rk.antagonism_filter(rk.control_matrix(ROBOT, run.q[:-1]))
+        kept = np.einsum("kij,kj->ki", R, run.c[:-1])
+        saved = rk.copper_loss(ROBOT, run.c[:-1], run.dt) - rk.copper_loss(ROBOT, kept, run.dt)
+        np.testing.assert_allclose(study.antagonistic_energy[i], saved.sum(), rtol=1e-9)
+    filtered = rk.sweep(ROBOT, rk.AntagonismFilter(PD, pose="true"), PATH, OFFSETS[:3])
+    assert np.all(filtered.antagonistic_energy < 1e-20)
+
+
+def test_turning_the_machine_permutes_the_energies():
+    """A third of a turn maps the testbed and a triangle about its centre onto themselves."""
+    path = rk.triangle(ROBOT, side=0.2, duration=0.9)
+    turned = rk.triangle(ROBOT, side=0.2, duration=0.9, angle=2 * np.pi / 3)
+    first = rk.sweep(ROBOT, PD, path, OFFSETS[:4])
+    second = rk.sweep(ROBOT, PD, turned, np.roll(OFFSETS[:4], 1, axis=1))
+    np.testing.assert_allclose(second.energies, np.roll(first.energies, 1, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(second.torque_norm, first.torque_norm, rtol=1e-9)
+
+
+def test_a_law_of_a_student():
+    def law(t, q_a, qd_a, desired):
+        return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
+
+    np.testing.assert_allclose(rk.sweep(ROBOT, law, PATH, OFFSETS[:2]).energies,
+                               rk.sweep(ROBOT, PD, PATH, OFFSETS[:2]).energies, rtol=0, atol=1e-11)
+
+
+def test_result_is_an_array_of_energies():
+    study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])
+    assert len(study) == 3 and np.asarray(study).shape == (3, 3) and study.energy is study.energies
+    assert repr(study).startswith("Sweep(3 runs, 0 failed, total energy ")
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"offsets": np.zeros((4, 2))}, r"offsets has shape \(4, 2\); allowed: \(k, 3\)"),
+    ({"offsets": np.zeros((0, 3))}, "allowed: at least one run"),
+    ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
+    ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
+    ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
+    ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise' or 'mask'"),
+    ({"chunk": 0}, "chunk = 0; allowed: a whole number >= 1"),
+    ({"encoder": -5}, "encoder = -5; allowed: > 0"),
+])
+def test_bad_arguments(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        rk.sweep(**{"robot": ROBOT, "law": PD, "trajectory": PATH, "offsets": np.zeros((2, 3))} | arguments)
