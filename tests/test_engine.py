@@ -99,8 +99,8 @@ def test_gravity_load_friction_and_a_wrong_model(name):
 
 
 def test_every_drive_its_own_gain():
-    law = rk.PD([7.0, 5.0, 9.0], [0.2, 0.3, 0.1])
-    for law in (law, rk.AntagonismFilter(law), rk.CommandFilter(law)):
+    pd = rk.PD([7.0, 5.0, 9.0], [0.2, 0.3, 0.1])
+    for law in (pd, rk.AntagonismFilter(pd), rk.CommandFilter(pd)):
         agrees(machine(3), law, duration=0.1)
 
 
@@ -135,8 +135,8 @@ print(" ".join(float(v).hex() for v in np.concatenate([study.energies.ravel(), s
 
 
 def numbers(**environment):
-    done = subprocess.run([sys.executable, "-c", SHORT], env={**os.environ, **environment}, capture_output=True, text=True,
-                          check=True)
+    done = subprocess.run([sys.executable, "-c", SHORT], env={**os.environ, **environment}, capture_output=True,
+                          text=True, check=True)
     assert done.stderr == ""
     return np.array([float.fromhex(v) for v in done.stdout.split()])
 
@@ -157,7 +157,7 @@ def test_read_only_package_folder(tmp_path):
     code = "import rapkm_lite as rk; r = rk.load(); rk.simulate(r, rk.PD(7.0, 0.2), rk.hold(r, (0.0, 0.0), 0.01))"
     (tmp_path / "rapkm_lite" / "__pycache__").write_text("no folder, so nothing can be written here")
     (tmp_path / "rapkm_lite" / "engine" / "__pycache__").write_text("nor here")
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path / "c")}
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""

@@ -1,9 +1,10 @@
-"""Numba where it is installed; without it the same source runs as plain Python, slower, with the same numbers.
-
-Numba's cache looks at the file of a kernel only: after a change in another file of this folder, touch the kernel's.
-"""
+"""Numba where it is installed; without it the same source runs as plain Python, slower, with the same numbers."""
 
 from __future__ import annotations
+
+import functools
+import hashlib
+from pathlib import Path
 
 from . import COMPILED
 
@@ -15,9 +16,20 @@ _OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
 
 
+@functools.cache
+def _sources() -> str:
+    """Fingerprint of the sources in this folder."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
+
+
 def kernel(function):
     """Compile a function that Python calls: cached on disk, and running without the interpreter lock."""
-    return njit(cache=True, nogil=True, **_OPTIONS)(function) if COMPILED else function
+    if not COMPILED:
+        return function
+    # Numba's cache looks at the file of the kernel only, but its parts live in all files of this folder.
+    function.__qualname__ += "_" + _sources()
+    return njit(cache=True, nogil=True, **_OPTIONS)(function)
 
 
 def leaf(function):
