@@ -154,7 +154,12 @@ def test_read_only_package_folder(tmp_path):
     package = Path(rk.__file__).parent
     shutil.copytree(package, tmp_path / "rapkm_lite", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(package.parent / "data", tmp_path / "data")
-    code = "import rapkm_lite as rk; r = rk.load(); rk.simulate(r, rk.PD(7.0, 0.2), rk.hold(r, (0.0, 0.0), 0.01))"
+    code = """if True:
+        import os, rapkm_lite as rk
+        assert rk.__path__[0].startswith(os.getcwd())
+        robot = rk.load()
+        rk.simulate(robot, rk.PD(7.0, 0.2), rk.hold(robot, (0.0, 0.0), 0.01))
+    """
     (tmp_path / "rapkm_lite" / "__pycache__").write_text("no folder, so nothing can be written here")
     (tmp_path / "rapkm_lite" / "engine" / "__pycache__").write_text("nor here")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}

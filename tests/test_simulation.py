@@ -1,0 +1,124 @@
+"""Runs end well or say when and why; sensors against a few lines of NumPy; energies against what must be conserved."""
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+
+ROBOT = rk.load().replace(friction=0.0)
+PD = rk.PD(7.05, 0.225)
+OFFSET = np.array([4e-3, -2e-3, 5e-3])
+
+
+def ends_well_or_says_why(*arguments, **options):
+    """A finite result, or an error with a time inside the run."""
+    try:
+        run = rk.simulate(*arguments, **options)
+    except rk.SimulationError as error:
+        assert 0.0 <= error.time <= arguments[2].t[-1]
+        assert f"at t = {error.time:.4f} s" in str(error)
+        return error
+    for array in (run.x, run.xd, run.q, run.qd, run.c, run.energy):
+        assert np.all(np.isfinite(array))
+    assert np.abs(rk.loop_constraints(run.robot, run.q)).max() < 1e-10
+    return run
+
+
+@pytest.mark.parametrize("K_P", np.logspace(-1, 4, 11))
+@pytest.mark.parametrize("law", [lambda pd: pd, rk.AntagonismFilter, rk.CommandFilter], ids=["pd", "force", "command"])
+def test_gains_over_five_decades(K_P, law):
+    path = rk.triangle(ROBOT, duration=1.5)
+    end = ends_well_or_says_why(ROBOT, law(rk.PD(K_P, 0.225)), path, OFFSET)
+    if K_P >= 1e4:
+        # K_P dt^2 / J = 5.6 with J = m l^2 / 3; a sampled PD loop needs less than 4.
+        assert isinstance(end, rk.SimulationError) and "unstable gain" in end.reason
+
+
+def test_unstable_damping():
+    end = ends_well_or_says_why(ROBOT, rk.PD(7.05, 50.0), rk.triangle(ROBOT), OFFSET)
+    assert isinstance(end, rk.SimulationError) and "unstable gain" in end.reason
+
+
+@pytest.mark.parametrize("size", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.CommandFilter(PD), rk.CTC(900.0, 60.0),
+                                 rk.RedundantCTC(900.0, 60.0)], ids=lambda law: type(law).__name__)
+def test_large_offsets(size, law):
+    path = rk.circle(ROBOT, radius=0.05, duration=1.0)
+    for signs in ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, -1)):
+        ends_well_or_says_why(ROBOT, law, path, size * np.array(signs))
+
+
+def test_fixed_pair_through_its_singularity():
+    """The triangle crosses the singular curves of all three pairs (reference.md, fact 5)."""
+    for pair in ((0, 1), (0, 2), (1, 2)):
+        ends_well_or_says_why(ROBOT, rk.CTC(900.0, 60.0, pair), rk.triangle(ROBOT), OFFSET)
+
+
+def test_a_minute():
+    run = ends_well_or_says_why(ROBOT, rk.AntagonismFilter(PD), rk.circle(ROBOT, duration=60.0, turns=10), OFFSET)
+    assert isinstance(run, rk.Run) and len(run.t) == 60001
+
+
+def test_a_jump_over_the_boundary_is_seen():
+    """An arm that passes its stretched pose within one hold comes back mirrored in these coordinates."""
+    def push(t, q_a, qd_a, desired):
+        return np.array([0.3, 0.0, 0.0])
+
+    end = ends_well_or_says_why(ROBOT, push, rk.hold(ROBOT, (0.0, 0.0), 1.0))
+    assert isinstance(end, rk.SimulationError) and "left the workspace" in end.reason
+    # A constant push feeds nothing back: the gain is not to blame.
+    assert "unstable" not in end.reason and "factor 1 " in end.reason
+
+
+def test_work_without_friction_is_the_kinetic_energy():
+    run = rk.simulate(ROBOT, PD, rk.triangle(ROBOT, duration=1.5), OFFSET)
+    kinetic = rk.kinetic_energy(ROBOT, run.q, run.qd)
+    # Relative to the largest energy; a Runge-Kutta step of 1 ms is good to (rate dt)^5, about 1e-10 here.
+    np.testing.assert_allclose(rk.mechanical_work(run).sum(), kinetic[-1], rtol=0, atol=1e-9)
+
+
+def test_quantized_angles_and_filtered_rates():
+    seen = []
+
+    def law(t, q_a, qd_a, desired):
+        seen.append((q_a.copy(), qd_a.copy()))
+        return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
+
+    path = rk.circle(ROBOT, radius=0.05, duration=0.5)
+    sensors = {"encoder": 2000, "velocity_filter": 3e-3}
+    run = rk.simulate(ROBOT, law, path, OFFSET, **sensors)
+    q = np.round((run.q_a + OFFSET) * 2000 / (2 * np.pi)) * 2 * np.pi / 2000
+    rate = np.zeros_like(q)
+    for k in range(1, len(q)):
+        rate[k] = rate[k - 1] + 1e-3 / (3e-3 + 1e-3) * ((q[k] - q[k - 1]) / 1e-3 - rate[k - 1])
+    np.testing.assert_allclose(np.array([s[0] for s in seen]), q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.array([s[1] for s in seen]), rate, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run.c, rk.simulate(ROBOT, PD, path, OFFSET, **sensors).c, rtol=0, atol=1e-9)
+
+
+def test_mirrored_machine():
+    """Mirroring x -> -x swaps arms 1 and 2 and turns every working mode sign."""
+    mirror = ROBOT.replace(mode=[-1, -1, -1])
+    path = rk.triangle(ROBOT, duration=1.5)
+    back = rk.follow(mirror, path.t, path.x * [-1, 1], path.xd * [-1, 1], path.xdd * [-1, 1])
+    one, two = rk.simulate(ROBOT, PD, path, OFFSET), rk.simulate(mirror, PD, back, -OFFSET[[1, 0, 2]])
+    np.testing.assert_allclose(two.energy, one.energy[[1, 0, 2]], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"offset": [0.0, 0.0]}, r"offset has shape \(2,\); allowed: one number or \(3,\)"),
+    ({"offset": np.nan}, "offset = nan; allowed: finite numbers"),
+    ({"encoder": 0}, "encoder = 0; allowed: > 0"),
+    ({"velocity_filter": -1.0}, "velocity_filter = -1; allowed: >= 0"),
+    ({"model": rk.load("five_bar")}, "model has 2 arms, the machine 3"),
+    ({"law": "PD"}, "law = 'PD'; allowed: a law of this package or a function"),
+    ({"law": lambda *a: None}, "law returned None"),
+    ({"law": lambda *a: [1.0]}, r"law returned the shape \(1,\); allowed: \(3,\)"),
+    ({"law": lambda *a: [1.0, np.inf, 0.0]}, r"\[1\] = inf; allowed: finite numbers"),
+    ({"law": rk.PD([1.0, 2.0], 0.1)}, r"K_P has shape \(2,\); allowed: one number or \(3,\)"),
+    ({"law": rk.CTC(9.0, 6.0, (0, 7))}, r"independent = \(0, 7\); allowed: joint indices from 0 to 5"),
+])
+def test_bad_arguments(options, message):
+    arguments = {"robot": ROBOT, "law": PD, "trajectory": rk.hold(ROBOT, (0.0, 0.0), 0.01)} | options
+    with pytest.raises(ValueError, match=message):
+        rk.simulate(**arguments)
