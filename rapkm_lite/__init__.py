@@ -3,42 +3,37 @@
 from ._arguments import ConvergenceError
 from .actuation import (
     actuation_type,
-    antagonism_filter,
-    command_filter,
     control_matrix,
     control_vector_fields,
     degree_of_actuation,
     distal_cross_products,
     drive_pairs,
-    explicit_pseudoinverse,
     inverse_dynamics,
-    null_vector,
     prestress_projector,
     redundant_control_matrix,
     required_wrench,
-    rest_exists,
-    select_independent,
     singular_values,
-    steady_state_error,
-    steady_state_torque,
     weighted_pseudoinverse,
 )
-from .control import (
+from .antagonism import (
+    antagonism_filter,
+    command_filter,
+    null_vector,
+    rest_exists,
+    steady_state_error,
+    steady_state_torque,
+)
+from .closure import close_loops, estimate_pose
+from .computed_torque import (
     APD,
     CTC,
-    PD,
-    AntagonismFilter,
-    CommandFilter,
-    Controller,
-    Desired,
-    Law,
     RedundantAPD,
     RedundantCTC,
     SwitchedCTC,
-    closed_loop_projector,
-    effective_gain,
-    lyapunov_function,
 )
+from .control import PD, AntagonismFilter, CommandFilter, Desired, Law
+from .controller import Controller
+from .datafiles import data_path
 from .dynamics import (
     constraint_rank,
     coriolis_matrix,
@@ -56,9 +51,9 @@ from .dynamics import (
     redundant_dynamics,
 )
 from .energy import (
+    antagonism_form,
     antagonistic_energy,
     antagonistic_torque,
-    antagonism_form,
     copper_loss,
     measured_energies,
     mechanical_work,
@@ -66,10 +61,8 @@ from .energy import (
 )
 from .kinematics import (
     arm_vectors,
-    close_loops,
     constraint_jacobian,
     constraint_jacobian_dot,
-    estimate_pose,
     forward_kinematics,
     inverse_kinematics,
     loop_constraints,
@@ -79,9 +72,11 @@ from .kinematics import (
     working_modes,
 )
 from .logs import Log, mystery_run
-from .manipulator import Manipulator, data_path, load
+from .manipulator import Manipulator, load
 from .maps import actuation_map, sampling_box, switching_map, workspace_grid
+from .partition import explicit_pseudoinverse, select_independent
 from .simulation import Experiment, Run, SimulationError, experiment, simulate
+from .stability import closed_loop_projector, effective_gain, lyapunov_function
 from .studies import Sweep, sweep
 from .trajectory import Trajectory, circle, follow, hold, polygon, triangle
 

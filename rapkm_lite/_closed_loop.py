@@ -9,22 +9,14 @@ import numpy as np
 
 from ._arguments import ConvergenceError, real_array
 from ._patience import patience
-from .control import (
-    APD,
-    CTC,
-    PD,
-    AntagonismFilter,
-    CommandFilter,
-    Controller,
-    Law,
-    RedundantAPD,
-    RedundantCTC,
-    SwitchedCTC,
-)
+from .computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
+from .control import PD, AntagonismFilter, CommandFilter, Law
+from .controller import Controller
 from .engine import lanes, tables
 
 LANES = 16
 _motions = weakref.WeakKeyDictionary()
+_machines = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +125,10 @@ def lockstep(robot, model, trajectory, code: Code, K_P, K_D, offsets, quantum, t
 
 
 def _machine(robot):
-    return _plain(tables.arm_table(robot)), _plain(tables.environment(robot))
+    """Arm table and environment of a machine, made once."""
+    if robot not in _machines:
+        _machines[robot] = _plain(tables.arm_table(robot)), _plain(tables.environment(robot))
+    return _machines[robot]
 
 
 def run_lockstep(robot, model, trajectory, code, offset, quantum, tau, states, q_a, qd_a, c, pairs) -> tuple[int, int]:

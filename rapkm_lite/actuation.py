@@ -10,19 +10,14 @@ import itertools
 import numpy as np
 
 from ._arguments import (
-    bounded,
     check_leading,
-    exact_array,
-    joint_indices,
     joint_vectors,
     matvec,
-    one_of,
     positive_definite,
     positive_number,
     real_array,
     tall_matrix,
     transpose,
-    wide_matrix,
 )
 from .dynamics import minimal_dynamics, nullspace_projector, orthogonal_complement
 from .kinematics import arm_vectors, cross, ee_complement_dot
@@ -103,7 +98,7 @@ def singular_values(A) -> np.ndarray:
     return np.stack([largest, smallest], axis=-1)
 
 
-def _full_rank_qr(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def full_rank_qr(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Q, R = np.linalg.qr(A)
     pivots = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
     measure = pivots.min(axis=-1) / np.maximum(pivots.max(axis=-1), 1e-300)
@@ -123,11 +118,11 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     """
     A = tall_matrix("A", A)
     if W is None:
-        Q, R = _full_rank_qr("A", A)
+        Q, R = full_rank_qr("A", A)
         return Q @ np.linalg.inv(transpose(R))
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    Q, R = _full_rank_qr("A", np.linalg.solve(L, A))
+    Q, R = full_rank_qr("A", np.linalg.solve(L, A))
     return np.linalg.solve(transpose(L), Q) @ np.linalg.inv(transpose(R))
 
 
@@ -135,50 +130,6 @@ def prestress_projector(A, W=None) -> np.ndarray:
     """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing."""
     A = tall_matrix("A", A)
     return np.eye(A.shape[-2]) - weighted_pseudoinverse(A, W) @ transpose(A)
-
-
-def antagonism_filter(A) -> np.ndarray:
-    """R = (A^T)^+ A^T of (15), (..., m, m): removes the part of the torques that only prestresses; A^T R = A^T.
-
-    Raises ValueError at input singularities.
-    """
-    Q, _ = _full_rank_qr("A", tall_matrix("A", A))
-    return Q @ transpose(Q)
-
-
-def command_filter(A, K) -> np.ndarray:
-    """R_K = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
-
-    -K R_K e has the same end-effector force as the filtered -R K e, and the same torques only for K = k I.
-    """
-    A = tall_matrix("A", A)
-    K = positive_definite("K", K, A.shape[-2])
-    check_leading(A=A.shape[:-2], K=K.shape[:-2])
-    return antagonism_filter(K @ A)
-
-
-def null_vector(robot: Manipulator, q) -> np.ndarray:
-    """Unit null vector of A^T for three arms in closed form, (..., 3): n_i ~ (a_i x d_i) (d_j x d_k), i, j, k cyclic.
-
-    Raises ValueError for another number of arms, and at input singularities, where the null space has two dimensions.
-    """
-    n = null_direction(robot, q)
-    size = np.linalg.norm(n, axis=-1, keepdims=True)
-    if np.any(size < 1e-12 * robot.lengths[:, 0].max()):
-        raise ValueError(
-            "q is an input singularity (all distal links parallel), where the null space of A^T is a plane; allowed: "
-            "poses with degree of actuation 2"
-        )
-    return n / size
-
-
-def null_direction(robot: Manipulator, q) -> np.ndarray:
-    """The numerators (a_i x d_i) (d_j x d_k) of `null_vector`, (..., 3) in m, d of unit length; zero where it fails."""
-    if robot.n_arms != 3:
-        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (prestress_projector takes any number)")
-    a, d = arm_vectors(robot, q)
-    d = d / robot.lengths[:, 1:]
-    return cross(a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
 
 
 def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> np.ndarray:
@@ -211,105 +162,3 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
     xd = matvec(np.linalg.pinv(F), qd)
     xdd = matvec(np.linalg.pinv(F), qdd - matvec(F_dot, xd))
     return matvec(Gbar, xdd) + matvec(Cbar, xd) + Qbar
-
-
-def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
-    """Error e_a = q_a - q_a^d (..., m) in rad at rest under PD with offsets, (14) corrected:
-
-    e_a = -A (A^T K_P A)^-1 (A^T K_P offset + wrench).  The chapter's formula has shapes that do not fit.  It solves the
-    equilibrium (13), A^T K_P (e_a + offset) + wrench = 0, for small errors e_a = A e_x.
-
-    offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
-    wrench : static control force A^T c (..., 2) that gravity and load demand (Qbar at rest); default none.
-    """
-    A = tall_matrix("A", A)
-    _full_rank_qr("A", A)
-    offset = real_array("offset", offset, A.shape[-2])
-    K = positive_definite("K_P", K_P, A.shape[-2])
-    wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
-    check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
-    force = matvec(transpose(A) @ K, offset) + wrench
-    return -matvec(A, np.linalg.solve(transpose(A) @ K @ A, force[..., None])[..., 0])
-
-
-def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
-    """Torques c = -K_P (e_a + offset) (..., m) in N m at rest, from (12)-(14); all antagonism without wrench.
-
-    Arguments and errors: see `steady_state_error`.  The text after (14) prints the opposite sign.
-    """
-    e_a = steady_state_error(A, K_P, offset, wrench)
-    return -matvec(positive_definite("K_P", K_P, e_a.shape[-1]), e_a + np.asarray(offset, dtype=float))
-
-
-def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: float) -> bool:
-    """Can PD drives with stepped angles rest near the desired pose q (2N,) of three arms, held by Coulomb friction?
-
-    True when counts exist that a pose of the closed loops reads, and whose torques differ from a prestress by no more
-    than the friction of each drive; certain for K_P quantum <= 2 friction.  First order about q.
-    K_P : number or (3,), N m/rad.  offset : (3,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
-    Raises ValueError for another number of arms, at input singularities, and for values out of range.
-    """
-    n, desired = null_vector(robot, q), exact_array("q", q, robot.n_joints)[:3]
-    offset, quantum = exact_array("offset", offset, 3), positive_number("quantum", quantum)
-    friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
-    ideal = desired + steady_state_error(control_matrix(robot, q), K_P, offset) + offset
-    counts = np.rint(ideal / quantum) + np.array(list(itertools.product(range(-4, 5), repeat=3)))
-    read = np.abs((quantum * counts - desired - offset) @ n) <= quantum / 2 * np.abs(n).sum()
-    c = -real_array("K_P", K_P) * (quantum * counts[read] - desired)
-    with np.errstate(divide="ignore"):
-        ends = np.sort([(c - friction) / n, (c + friction) / n], axis=0)  # levels of prestress that each drive can hold
-    return bool(np.any(ends[0].max(axis=-1) <= ends[1].min(axis=-1)))
-
-
-def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
-    """(A~^T)^+ of (27), (..., m, n), from the partition (26) of A~ into the rows A~_1 and the others, A~_2 = B A~_1:
-
-    (A~^T)^+ = [I; B] (I + B^T B)^-1 (A~_1^T)^+, the same for every partition with regular A~_1.
-    A_tilde : (..., m, n).  rows : the delta = 2 row indices of A~_1, a pair or (..., 2).
-    Raises ValueError where A~_1 has lost rank.
-    """
-    A_tilde = wide_matrix("A_tilde", A_tilde)
-    rows = _row_choice(rows, A_tilde)
-    A1 = np.take_along_axis(A_tilde, rows[..., None], axis=-2)
-    Q, R = _full_rank_qr("A~_1 of this partition", transpose(A1))
-    A1T_pinv = np.linalg.solve(R, transpose(Q))
-    B_all = A_tilde @ transpose(A1T_pinv)  # the identity in `rows`, B in the others
-    return B_all @ np.linalg.solve(transpose(B_all) @ B_all, A1T_pinv)
-
-
-def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
-    m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
-    if np.ndim(rows) < 2:
-        return np.broadcast_to(joint_indices("rows", rows, m), (*lead, 2))
-    rows = np.asarray(rows)
-    if rows.dtype.kind not in "iu" or rows.shape != (*lead, 2):
-        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: a pair of indices or {(*lead, 2)}")
-    bad = np.any((rows < 0) | (rows >= m), axis=-1) | (rows[..., 0] == rows[..., 1])
-    if np.any(bad):
-        raise ValueError(f"rows holds the pair {rows[bad][0].tolist()}; allowed: two different ones from 0 to {m - 1}")
-    return rows
-
-
-def _inverse_condition(A: np.ndarray) -> np.ndarray:
-    sigma = singular_values(A)
-    return sigma[..., 1] / np.maximum(sigma[..., 0], 1e-300)
-
-
-PARTITION_RULES = {
-    "sigma_min": lambda A1: singular_values(transpose(A1))[..., 1],
-    "condition": lambda A1: _inverse_condition(transpose(A1)),
-    "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
-}
-
-
-def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
-    """Rows (..., 2) of A~ (..., m, n) that make the best A~_1 for (27).
-
-    rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
-    is the chapter's smallest row-sum norm, for study only: it is the wrong way round.
-    """
-    A_tilde = wide_matrix("A_tilde", A_tilde)
-    one_of("rule", rule, PARTITION_RULES)
-    pairs = np.array(list(itertools.combinations(range(A_tilde.shape[-2]), 2)))
-    merit = np.stack([PARTITION_RULES[rule](A_tilde[..., pair, :]) for pair in pairs], axis=-1)
-    return pairs[np.argmax(merit, axis=-1)]

@@ -16,13 +16,7 @@ from ._arguments import (
     real_array,
     transpose,
 )
-from .kinematics import (
-    arm_vectors,
-    constraint_jacobian,
-    constraint_jacobian_dot,
-    ee_complement,
-    ee_complement_dot,
-)
+from .kinematics import arm_vectors, constraint_jacobian, constraint_jacobian_dot, ee_complement, ee_complement_dot
 from .manipulator import Manipulator
 
 

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import matvec, positive_number, real_array
-from .actuation import control_matrix, prestress_projector, steady_state_torque
+from .actuation import control_matrix, prestress_projector
+from .antagonism import steady_state_torque
 from .control import AntagonismFilter
-from .manipulator import Manipulator, data_path
+from .datafiles import data_path
+from .manipulator import Manipulator
 from .simulation import Run, experiment
 from .trajectory import Trajectory
 

@@ -11,15 +11,9 @@ import itertools
 import numpy as np
 
 from ._arguments import (
-    ConvergenceError,
     check_leading,
     joint_vectors,
-    matvec,
-    positive_number,
     real_array,
-    solve,
-    transpose,
-    whole_number,
 )
 from .manipulator import Manipulator
 
@@ -200,92 +194,3 @@ def _driving_lever(robot: Manipulator, a: np.ndarray, d: np.ndarray) -> np.ndarr
             "position is no coordinate; allowed: poses inside, or independent joints instead of the end-effector"
         )
     return den
-
-
-def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
-    """The configuration in V nearest to a rough q, (..., 2N) in rad.
-
-    Minimizes ||q' - q||^2 / 2 subject to h(q') = 0 by sequential quadratic programming with the exact Hessian of the
-    Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
-    a local one: from a q more than half a radian off, another configuration may be nearer.
-
-    tolerance : largest closure error relative to the link length, and largest tangential remainder in rad.
-    Raises ConvergenceError with the residual and the pose.
-    """
-    q0 = real_array("q", q, robot.n_joints)
-    q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
-    scale, tolerance = robot.lengths.max(), positive_number("tolerance", tolerance)
-    for _ in range(whole_number("iterations", iterations, 1)):
-        h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
-        Q, R = np.linalg.qr(transpose(J), mode="complete")
-        if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
-            break
-        range_, tangent = Q[..., :r], Q[..., r:]
-        back = -matvec(range_, np.linalg.solve(transpose(R[..., :r, :]), h[..., None])[..., 0])
-        gradient = q - q0
-        multiplier = -np.linalg.solve(R[..., :r, :], matvec(transpose(range_), gradient)[..., None])[..., 0]
-        hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
-        reduced = transpose(tangent) @ hessian @ tangent
-        convex = np.linalg.eigvalsh(reduced)[..., 0] > 0.1
-        reduced = np.where(convex[..., None, None], reduced, np.eye(2))
-        remainder = matvec(transpose(tangent), gradient)
-        rhs = remainder + np.where(convex[..., None], matvec(transpose(tangent), matvec(hessian, back)), 0.0)
-        if max(np.abs(h).max(initial=0.0) / scale, np.abs(remainder).max(initial=0.0)) < tolerance:
-            return q
-        step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
-        size = np.linalg.norm(step, axis=-1, keepdims=True)
-        q = q + step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
-    worst = np.unravel_index(np.argmax(np.abs(loop_constraints(robot, q)).max(axis=-1)), q.shape[:-1])
-    h = np.abs(loop_constraints(robot, q[worst])).max()
-    raise ConvergenceError(
-        f"close_loops found no configuration near q = {q0[worst].round(6).tolist()}: the closure error is {h:.3g} m at "
-        f"{q[worst].round(6).tolist()}; allowed: a q near a regular configuration of this machine"
-    )
-
-
-def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """sum_k lambda_k d2 h_k / dq2, (..., 2N, 2N)."""
-    a, d = arm_vectors(robot, q)
-    N = robot.n_arms
-    force = multiplier.reshape(*multiplier.shape[:-1], N - 1, 2)
-    force = np.insert(force, 1, -force.sum(axis=-2), axis=-2)
-    base, link = -(force * (a + d)).sum(axis=-1), -(force * d).sum(axis=-1)
-    H = np.zeros((*q.shape[:-1], 2 * N, 2 * N))
-    i = np.arange(N)
-    H[..., i, i] = base
-    H[..., i, N + i] = H[..., N + i, i] = H[..., N + i, N + i] = link
-    return H
-
-
-def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 50) -> np.ndarray:
-    """The configuration whose base angles are nearest to the measured ones, (..., 2N) in rad.
-
-    N measured angles over-determine the two coordinates of the pose, and calibration offsets make them contradict each
-    other.  The pose taken is the least-squares one, min_x sum_i (q_i(x) - q_a,i)^2, found by Gauss-Newton steps with
-    the control matrix A = d q_a / d x from the end-effector position `guess` (..., 2) in m; its working mode is
-    ``robot.mode``.  For N = 2 this is the forward kinematics of the five-bar.
-    Raises ConvergenceError with the residual and the pose, also where the iteration leaves the workspace.
-    """
-    q_a, guess = real_array("q_a", q_a, robot.n_arms), real_array("guess", guess, 2)
-    lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
-    q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
-    step, limit = np.full(x.shape, np.inf), positive_number("tolerance", tolerance) * robot.lengths.max()
-    for _ in range(whole_number("iterations", iterations, 1)):
-        if not np.all(reachable(robot, x)):
-            break
-        q = inverse_kinematics(robot, x)
-        A = ee_complement(robot, q)[..., : robot.n_arms, :]
-        residual = wrap(q_a - q[..., : robot.n_arms])
-        gradient = matvec(transpose(A), residual)
-        step = solve("A^T A (an input singularity)", transpose(A) @ A, gradient[..., None])[..., 0]
-        if np.abs(step).max(initial=0.0) < limit:
-            return q
-        x = x + step
-    bad = np.where(reachable(robot, x), np.abs(step).max(axis=-1), np.inf)
-    worst = np.unravel_index(np.argmax(bad), lead)
-    where = "inside" if reachable(robot, x[worst]) else "outside"
-    raise ConvergenceError(
-        f"estimate_pose found no pose for q_a = {q_a[worst].round(6).tolist()} in working mode {robot.mode.tolist()}: "
-        f"a step of {np.abs(step[worst]).max():.3g} m led to x = {x[worst].round(6).tolist()} {where} the workspace; "
-        "allowed: angles near a closed pose, and a guess near it"
-    )

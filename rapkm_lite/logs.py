@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .manipulator import data_path
+from .datafiles import data_path
 
 
 @dataclass(frozen=True, eq=False)

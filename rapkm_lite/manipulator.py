@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ._arguments import bounded, real_array
-
-_UNITS = {
-    "base": "m", "lengths": "m", "masses": "kg", "centers": "m", "inertias": "kg m^2", "rotor_inertia": "kg m^2",
-    "resistance": "ohm", "torque_constant": "N m/A", "friction": "N m", "friction_velocity": "rad/s",
-    "gravity": "m/s^2", "load": "kg", "mode": "1",
-}
+from .datafiles import UNITS, known, read_toml
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,7 +148,7 @@ class Manipulator:
         Raises ValueError for an unknown name.
         """
         for key in changes:
-            _known("argument", key, [f.name for f in dataclasses.fields(self)])
+            known("argument", key, [f.name for f in dataclasses.fields(self)])
         rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
         middles = np.array_equal(self.centers, self.lengths / 2)
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
@@ -226,56 +219,6 @@ def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
     return bool(np.any(np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)))
 
 
-def _known(what: str, key: str, allowed) -> None:
-    if key not in allowed:
-        close = difflib.get_close_matches(key, allowed, n=1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
-        raise ValueError(f"unknown {what} {key!r}{hint}; allowed: {', '.join(sorted(allowed))}")
-
-
-def data_path(name: str) -> Path:
-    """Path of a data file shipped with the package, in an installed copy as well as in a checkout.
-
-    Raises ValueError when there is none of this name.
-    """
-    here = Path(__file__).resolve().parent
-    for folder in (here / "data", here.parent / "data"):
-        if (folder / name).exists():
-            return folder / name
-    raise ValueError(f"there is no data file {name!r}; allowed: a file name from the folder data")
-
-
-def read_toml(source: str | Path) -> dict:
-    """Tables of a data file by name (``"testbed"``) or path, each {value, unit, source} reduced to its number.
-
-    Raises ValueError for an unreadable file or a unit other than SI.
-    """
-    if not isinstance(source, str | Path):
-        raise ValueError(f"source = {source!r}; allowed: a name such as 'testbed', or a path that ends in .toml")
-    path = Path(source)
-    if path.suffix != ".toml":
-        path = data_path(f"{source}.toml")
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"the file {str(path)!r} cannot be read ({error.strerror}); allowed: a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"the file {str(path)!r} is not valid TOML: {error}") from None
-    return {key: _plain(key, value) for key, value in tables.items()}
-
-
-def _plain(key: str, value):
-    if isinstance(value, dict) and "value" in value:
-        for part in value:
-            _known(f"entry of {key!r}", part, ["value", "unit", "source"])
-        if key in _UNITS and value.get("unit", _UNITS[key]) != _UNITS[key]:
-            raise ValueError(f"{key} has the unit {value['unit']!r}; allowed: {_UNITS[key]!r}")
-        return value["value"]
-    if isinstance(value, dict):
-        return {k: _plain(k, v) for k, v in value.items()}
-    return value
-
-
 def load(source: str | Path = "testbed") -> Manipulator:
     """Read a machine from ``data/<source>.toml`` or from a path that ends in ``.toml``.
 
@@ -290,12 +233,12 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """
     tables = read_toml(source)
     for key in tables:
-        _known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
+        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
     values = tables.get("manipulator", {})
     if not isinstance(values, dict):
         raise ValueError(f"manipulator = {values!r} in {str(source)!r}; allowed: a table [manipulator]")
     for key in values:
-        _known("TOML key", key, list(_UNITS))
+        known("TOML key", key, list(UNITS))
     for key in ("base", "lengths", "masses"):
         if key not in values:
             raise ValueError(f"the table [manipulator] of {str(source)!r} lacks {key!r}; needed: base, lengths, masses")

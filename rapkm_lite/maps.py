@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from ._arguments import exact_array, joint_indices, one_of, real_array, whole_number
-from .actuation import PARTITION_RULES, distal_cross_products, drive_pairs, null_direction, singular_values
+from .actuation import distal_cross_products, drive_pairs, singular_values
+from .antagonism import null_direction
 from .kinematics import ee_complement, inverse_kinematics
 from .manipulator import Manipulator
+from .partition import PARTITION_RULES
 
 
 def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:

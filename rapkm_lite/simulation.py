@@ -10,9 +10,10 @@ import numpy as np
 from ._arguments import bounded, matvec, positive_number, real_array
 from ._closed_loop import Loop, encode, growth, run_lockstep, run_model_based
 from .control import PD, Law
+from .datafiles import read_toml
 from .engine import tables
 from .kinematics import ee_complement, inverse_kinematics
-from .manipulator import Manipulator, load, read_toml
+from .manipulator import Manipulator, load
 from .trajectory import Trajectory, triangle
 
 

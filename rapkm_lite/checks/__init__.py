@@ -1,4 +1,4 @@
-"""Self-checks of the exercises: a student's answer against the package at seeded random poses and against an invariant."""
+"""Self-checks of the exercises: an answer against the package at seeded random poses and against an invariant."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def examine(name: str, answer) -> tuple[str, str]:
 
 
 def check(name: str, answer):
-    """Check an answer, print one line, and return what the lesson goes on with: the answer if right, else the package's.
+    """Check an answer, print one line, and return what the lesson goes on with: the answer if right, or the package's.
 
     Prints OK, TODO or NOT YET RIGHT with the measured number and a hint.  Raises AssertionError instead when the
     environment variable RAPKM_LITE_STRICT is 1 and the answer is not right.

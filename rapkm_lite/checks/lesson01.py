@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..actuation import null_vector
+from ..antagonism import null_vector
 from ..dynamics import coriolis_matrix, forward_dynamics, generalized_forces, mass_matrix, orthogonal_complement
 from ..kinematics import (
     constraint_jacobian,

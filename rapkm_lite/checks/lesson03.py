@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..actuation import control_matrix, null_vector, steady_state_error, steady_state_torque
-from ..kinematics import estimate_pose, inverse_kinematics
+from ..actuation import control_matrix
+from ..antagonism import null_vector, steady_state_error, steady_state_torque
+from ..closure import estimate_pose
+from ..kinematics import inverse_kinematics
 from ..logs import mystery_run
 from ..manipulator import load
 from . import Exercise

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..actuation import (
-    control_matrix,
-    drive_pairs,
-    explicit_pseudoinverse,
-    redundant_control_matrix,
-    select_independent,
-    weighted_pseudoinverse,
-)
-from ..control import effective_gain
+from ..actuation import control_matrix, drive_pairs, redundant_control_matrix, weighted_pseudoinverse
 from ..dynamics import forward_dynamics, minimal_dynamics, nullspace_projector, orthogonal_complement
 from ..kinematics import inverse_kinematics
 from ..manipulator import load
+from ..partition import explicit_pseudoinverse, select_independent
+from ..stability import effective_gain
 from . import Exercise
 
 

@@ -53,16 +53,15 @@ def newton_step(lanes, drives, model, row, w, tolerance):
                                                           w[at(E, i, j, N, L)], px, py)
             m11, m12, m22, fx, fy = m11 + p11, m12 + p12, m22 + p22, fx + gx, fy + gy
             flag = min(flag, f)
-            # A run that is done keeps its matrix, whatever its neighbours still need.
-            w[at(A1, i, j, N, L)] = a1 if todo > 0.0 else w[at(A1, i, j, N, L)]
-            w[at(A2, i, j, N, L)] = a2 if todo > 0.0 else w[at(A2, i, j, N, L)]
+            w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = a1, a2
         sx, sy = solve2(m11, m12, m22, fx, fy)
         flag = min(min(flag, m11), m11 * m22 - m12 * m12)
         size = max(abs(sx), abs(sy))
         more = todo if flag > 0.0 and size >= tolerance else 0.0
         w[FAR * L + j] += 0.0 if flag > 0.0 else todo
-        w[PX * L + j] = px + sx if todo > 0.0 else px
-        w[PY * L + j] = py + sy if todo > 0.0 else py
+        # A run that is done stays where it is and finds the same matrix again, whatever its neighbours still need.
+        w[PX * L + j] = px + sx if more > 0.0 else px
+        w[PY * L + j] = py + sy if more > 0.0 else py
         w[TODO * L + j] = more
         count += 1 if more > 0.0 else 0
     return count

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from .. import actuation as act
-from ..control import CTC, RedundantCTC, SwitchedCTC
+from ..computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..dynamics import minimal_dynamics, redundant_dynamics
 from ..kinematics import inverse_kinematics, reachable
 from ..manipulator import Manipulator

@@ -6,13 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import patheffects
 
-from ..actuation import (
-    control_matrix,
-    control_vector_fields,
-    distal_cross_products,
-    drive_pairs,
-    singular_values,
-)
+from ..actuation import control_matrix, control_vector_fields, distal_cross_products, drive_pairs, singular_values
 from ..kinematics import arm_vectors, inverse_kinematics, working_modes
 from ..manipulator import Manipulator
 from ..maps import workspace_grid

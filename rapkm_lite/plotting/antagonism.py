@@ -5,7 +5,8 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..actuation import control_matrix, null_vector, steady_state_error, steady_state_torque
+from ..actuation import control_matrix
+from ..antagonism import null_vector, steady_state_error, steady_state_torque
 from ..kinematics import inverse_kinematics
 from ..maps import workspace_grid
 from .machine import plane_axes, plot_path

@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..actuation import drive_pairs
-from ..kinematics import arm_vectors, estimate_pose, forward_kinematics, inverse_kinematics, reachable, working_modes
+from ..closure import estimate_pose
+from ..kinematics import arm_vectors, forward_kinematics, inverse_kinematics, reachable, working_modes
 from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 
 

@@ -6,19 +6,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from .._arguments import transpose
-from ..actuation import (
-    control_matrix,
-    drive_pairs,
-    explicit_pseudoinverse,
-    redundant_control_matrix,
-    select_independent,
-    singular_values,
-    weighted_pseudoinverse,
-)
-from ..control import effective_gain
+from ..actuation import control_matrix, drive_pairs, redundant_control_matrix, singular_values, weighted_pseudoinverse
 from ..dynamics import minimal_dynamics, orthogonal_complement, redundant_dynamics
 from ..kinematics import inverse_kinematics
 from ..maps import workspace_grid
+from ..partition import explicit_pseudoinverse, select_independent
+from ..stability import effective_gain
 from .actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
 from .machine import plot_path, plot_workspace
 from .runs import plot_errors, plot_torques

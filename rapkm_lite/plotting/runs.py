@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..actuation import null_vector
+from ..antagonism import null_vector
 from ..energy import antagonistic_torque
 from .style import AFTER, ALARM, BEFORE, arm_colour, arm_line, axes_or_new
 

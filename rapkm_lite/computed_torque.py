@@ -1,0 +1,229 @@
+"""Model-based laws: APD (19), CTC (20), switched CTC, and the redundant forms of both (28), (32)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arguments import (
+    bounded,
+    check_leading,
+    exact_array,
+    joint_indices,
+    joint_vectors,
+    matvec,
+    one_of,
+    positive_definite,
+    real_array,
+)
+from .actuation import (
+    control_matrix,
+    distal_cross_products,
+    drive_pairs,
+    redundant_control_matrix,
+    weighted_pseudoinverse,
+)
+from .control import Desired, Law, gain, measured
+from .dynamics import (
+    coriolis_matrix,
+    generalized_forces,
+    mass_matrix,
+    minimal_dynamics,
+    redundant_dynamics,
+)
+from .kinematics import ee_complement, forward_kinematics
+from .manipulator import Manipulator
+from .partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
+
+
+@dataclass(frozen=True, eq=False)
+class APD(Law):
+    """Augmented PD in minimal coordinates (19): c = (A^T)_W^+ (Gbar q2dd^d + Cbar q2d^d + Qbar - K_P e2 - K_D e2d).
+
+    K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
+    independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
+    Raises ValueError at run time where the independent coordinates are singular.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    independent: tuple[int, int] | None = (0, 1)
+    W: np.ndarray | None = None
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
+        if self.W is not None:
+            object.__setattr__(self, "W", gain("W", self.W))
+        if self.independent is not None:
+            object.__setattr__(self, "independent", joint_indices("independent", self.independent, 2**31))
+
+    def _feedback(self, model, q, qd, q_a, qd_a, desired):
+        """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
+        state = _joint_state(model, q, qd, q_a, qd_a, desired)
+        if self.independent is None:
+            xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
+            e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
+            return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
+        j = list(joint_indices("independent", self.independent, model.n_joints))
+        e, ed = state[0][..., j] - desired.q[..., j], state[1][..., j] - desired.qd[..., j]
+        return e, ed, desired.qd[..., j], desired.qdd[..., j], qd[..., j], control_matrix(model, q, j)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        e, ed, rate, acceleration, _, A = self._feedback(model, q, qd, q_a, qd_a, desired)
+        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
+        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
+        force = matvec(Gbar, acceleration) + matvec(Cbar, rate) + Qbar - matvec(K_P, e) - matvec(K_D, ed)
+        return matvec(weighted_pseudoinverse(A, self.W), force)
+
+
+class CTC(APD):
+    """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
+
+    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; K_P in 1/s^2, K_D in 1/s.
+    """
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        e, ed, _, acceleration, rate, A = self._feedback(model, q, qd, q_a, qd_a, desired)
+        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
+        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
+        v = acceleration - matvec(K_D, ed) - matvec(K_P, e)
+        return matvec(weighted_pseudoinverse(A, self.W), matvec(Gbar, v) + matvec(Cbar, rate) + Qbar)
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchedCTC(Law):
+    """CTC (20) that switches its pair of independent base joints (section 4.5); K_P in 1/s^2, K_D in 1/s.
+
+    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    hysteresis: float = 1.2
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
+        bounded("hysteresis", exact_array("hysteresis", self.hysteresis), 1.0, strict=False)
+
+    def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
+        """The pair to use at one pose q (2N,), given the current one."""
+        measure = np.abs(distal_cross_products(model, exact_array("q", q, model.n_joints)))
+        pairs, best = drive_pairs(model), int(np.argmax(measure))
+        if current is not None:
+            current = tuple(sorted(joint_indices("current", current, model.n_arms)))
+            if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
+                return current
+        return pairs[best]
+
+    def pairs(self, model: Manipulator, q) -> np.ndarray:
+        """The pairs (k, 2) used along the poses q (k, 2N); `Run.switches` counts the changes."""
+        q, current, chosen = real_array("q", q, model.n_joints), None, []
+        if q.ndim != 2:
+            raise ValueError(f"q has shape {q.shape}; allowed: (k, {model.n_joints}), poses in the order of time")
+        for pose in q:
+            current = self.choose(model, pose, current)
+            chosen.append(current)
+        return np.array(chosen, dtype=int).reshape(-1, 2)
+
+    def fixed(self, pair) -> CTC:
+        """The CTC law in force while `pair` is used."""
+        return CTC(self.K_P, self.K_D, pair, pose=self.pose)
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""
+        q_a, qd_a = _joint_state(model, q, qd, q_a, qd_a, desired)
+        q_a, qd_a = q_a[..., : model.n_arms], qd_a[..., : model.n_arms]
+        if np.ndim(q) == 1:
+            return self.fixed(self.choose(model, q)).torque(model, q, qd, q_a, qd_a, desired)
+        chosen = self.pairs(model, q)
+        c = np.empty_like(q_a)
+        for pair in {tuple(p) for p in chosen.tolist()}:
+            k = np.all(chosen == pair, axis=-1)
+            part = Desired(desired.n_arms, *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd,
+                                                            desired.qdd)))
+            c[k] = self.fixed(pair).torque(model, q[k], qd[k], q_a[k], qd_a[k], part)
+        return c
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantAPD(Law):
+    """Augmented PD in redundant coordinates (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
+
+    The errors then obey (29)-(30), G~ edd + (C~ + D K_D) ed + D K_P e = 0 with D of `closed_loop_projector`.
+
+    K_P, K_D : one number for all 2N joints, (N,) for the driven joints only, (2N,) or (2N, 2N); N m/rad, N m s/rad.
+    rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
+    """
+
+    K_P: np.ndarray
+    K_D: np.ndarray
+    rule: str = "sigma_min"
+    pose: str = "measured"
+
+    def __post_init__(self):
+        self._check_pose()
+        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
+        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
+        one_of("rule", self.rule, PARTITION_RULES)
+
+    def _feedback(self, model, q, qd, q_a, qd_a, desired):
+        """K_P e + K_D ed in all joints, and (A~^T)^+."""
+        state = _joint_state(model, q, qd, q_a, qd_a, desired)
+        K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
+        feedback = matvec(K_P, state[0] - desired.q) + matvec(K_D, state[1] - desired.qd)
+        A_tilde = redundant_control_matrix(model, q)
+        return feedback, explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
+        G, C, Q = redundant_dynamics(model, q, qd)
+        return matvec(pinv, matvec(G, desired.qdd) + matvec(C, desired.qd) + Q - feedback)
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantCTC(RedundantAPD):
+    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; K_P in 1/s^2, K_D in 1/s.
+
+    Line 1 leads to G~ (edd + K_D ed + K_P e) = 0 (33); with tangential errors, ed = F e2d (34), that is (35): see
+    `effective_gain`.
+
+    projected : True reads line 1, c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
+    c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
+    """
+
+    projected: bool = True
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
+        v = desired.qdd - feedback
+        if self.projected:
+            G, C, Q = redundant_dynamics(model, q, qd)
+        else:
+            # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
+            G, C, Q = mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd)
+        return matvec(pinv, matvec(G, v) + matvec(C, qd) + Q)
+
+
+def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles and rates as known: driven joints as measured, elbows from the pose."""
+    N = model.n_arms
+    q, qd = joint_vectors(model.n_joints, q=q, qd=qd)
+    q_a, qd_a = measured(model, q_a, qd_a, desired)
+    check_leading(q=q.shape[:-1], q_a=q_a.shape[:-1])
+    elbows, rates = q[..., N:], qd[..., N:]
+    return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
+
+
+def joint_gain(name: str, K, N: int) -> np.ndarray:
+    """A gain in redundant coordinates as (2N, 2N); (N,) acts on the driven joints only."""
+    K = real_array(name, K)
+    if K.shape == (N,):
+        return np.diag(np.concatenate([bounded(name, K, 0.0, strict=True), np.zeros(N)]))
+    return positive_definite(name, K, 2 * N)

@@ -1,0 +1,56 @@
+"""What the closed loop of the redundant laws obeys: (30), the Lyapunov function (31), the effective gain (35)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._arguments import (
+    check_leading,
+    joint_vectors,
+    real_array,
+    solve,
+    tall_matrix,
+    transpose,
+    wide_matrix,
+)
+from .computed_torque import joint_gain
+from .dynamics import (
+    redundant_dynamics,
+)
+from .manipulator import Manipulator
+from .partition import explicit_pseudoinverse, select_independent
+
+
+def closed_loop_projector(A_tilde) -> np.ndarray:
+    """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta.
+
+    A_tilde : (..., m, 2N).  Raises ValueError at input singularities.
+    """
+    A_tilde = wide_matrix("A_tilde", A_tilde)
+    return transpose(A_tilde) @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
+
+
+def effective_gain(F, K) -> np.ndarray:
+    """(F^T F)^-1 F^T K F of (35) corrected, (..., 2, 2): the gain that the error e2 feels under `RedundantCTC`.
+
+    F : (..., 2N, 2).  K : one number, or a matrix (..., 2N, 2N), which may be singular (drives only: diag(k, 0)).
+    Raises ValueError where F has lost rank.
+    """
+    F = tall_matrix("F", F)
+    n = F.shape[-2]
+    K = real_array("K", K)
+    K = K * np.eye(n) if K.ndim == 0 else real_array("K", K, n, n)
+    check_leading(F=F.shape[:-2], K=K.shape[:-2])
+    return solve("F^T F", transpose(F) @ F, transpose(F) @ K @ F)
+
+
+def lyapunov_function(robot: Manipulator, q, e, ed, K_P) -> np.ndarray:
+    """V = (ed^T G~ ed + e^T K_P e) / 2 of (31), (...,) in J, for errors e, ed (..., 2N) in redundant coordinates.
+
+    At a fixed desired pose it falls under `RedundantAPD` at the rate -ed^T K_D ed.
+    """
+    q, e, ed = joint_vectors(robot.n_joints, q=q, e=e, ed=ed)
+    Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
+    K = joint_gain("K_P", K_P, robot.n_arms)
+    kinetic = np.einsum("...i,...ij,...j->...", ed, Gt, ed)
+    return (kinetic + np.einsum("...i,...ij,...j->...", e, K, e)) / 2
