@@ -6,13 +6,16 @@
 typedef double real;
 static inline real root(real v) { return sqrt(v); }
 static inline int any_above(real v, double limit) { return v > limit; }
+static inline real smaller(real a, real b) { return a < b ? a : b; }
 #else
 typedef double real __attribute__((vector_size(8 * LANES)));
 #if defined(__AVX512F__) && LANES == 8
 #include <immintrin.h>
 static inline real root(real v) { return (real)_mm512_sqrt_pd((__m512d)v); }
+static inline real smaller(real a, real b) { return (real)_mm512_min_pd((__m512d)a, (__m512d)b); }
 #else
 static inline real root(real v) { for (int l = 0; l < LANES; l++) v[l] = sqrt(v[l]); return v; }
+static inline real smaller(real a, real b) { for (int l = 0; l < LANES; l++) a[l] = a[l] < b[l] ? a[l] : b[l]; return a; }
 #endif
 static inline int any_above(real v, double limit) {
     int found = 0;
@@ -23,7 +26,7 @@ static inline int any_above(real v, double limit) {
 #define N 3
 #define EACH for (int i = 0; i < N; i++)
 
-typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction, scale, tip; } arm;
+typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, tip, w1, w2, friction, scale; } arm;
 typedef struct { real ax, ay, ad, bx, by, lx, ly, inv, area2; } geo;
 
 static inline geo geometry(const arm *m, real x, real y) {
@@ -45,11 +48,11 @@ static inline real small_angle(real s) {
 
 static inline void dynamics(const arm *arms, const geo *g, real vx, real vy, const real *c, real *kx, real *ky,
                             real *low) {
-    real m11 = arms->tip + (real){0}, m12 = {0}, m22 = m11, fx = {0}, fy = {0};
+    real m11 = arms[0].tip + arms[1].tip + arms[2].tip + (real){0}, m12 = {0}, m22 = m11, fx = {0}, fy = {0};
     EACH {
         const arm *m = arms + i;
         const geo q = g[i];
-        *low = *low < q.area2 ? *low : q.area2;
+        *low = smaller(*low, q.area2);
         real base = q.bx * vx + q.by * vy, back = q.lx * vx + q.ly * vy;
         real b2 = base * base * q.inv, k2 = back * back * q.inv;
         real ba = b2 * q.ad + k2 * m->l2sq, la = b2 * m->l1sq + k2 * q.ad;
@@ -139,7 +142,7 @@ long closed_loop(const arm *arms, const double *table, long samples, double dt, 
         real low = 1e300 + (real){0};
         EACH {
             real ahead = 1.0 - dt * g[i].ad * g[i].inv * ((g[i].bx + g[i].lx) * vx + (g[i].by + g[i].ly) * vy);
-            low = low < ahead ? low : ahead;
+            low = smaller(low, ahead);
         }
         real h2 = 0.5 * dt + (real){0}, k1x, k1y, k2x, k2y, k3x, k3y, k4x, k4y;
         dynamics(arms, g, vx, vy, c, &k1x, &k1y, &low);
