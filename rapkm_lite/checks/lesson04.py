@@ -71,13 +71,13 @@ def _log_cases(rng):
 def _pythagoras(got, robot, A, c, dt):
     along = np.sum(_null(A) * c, axis=-1)
     total = float((robot.resistance[0] / robot.torque_constant[0] ** 2) * dt * np.sum(along**2))
-    return abs(got.sum() - total), "the total differs from R/k_t^2 times the integral of the squared antagonism (J)"
+    return abs(got.sum() - total), "the total differs from R_el/k_t^2 times the integral of the squared antagonism (J)"
 
 
 EXERCISES = {
     "04.filtered_torques": Exercise(
         filtered_torques,
-        "c_eff = A f must give the same wrench, A^T A f = A^T c: solve for f, then multiply by A.",
+        "c_eff = A f must give the same force, A^T A f = A^T c: solve for f, then multiply by A.",
         "N m", _torque_cases, _torque_law, 1e-10),
     "04.filtered_command": Exercise(
         filtered_command,

@@ -59,7 +59,7 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
         ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
     ax.set(xlabel="time in s", title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear",
-           ylabel="norm of the torques in " + ("N m" if log else "mN m"))
+           ylabel=f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}")
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return ax
 
