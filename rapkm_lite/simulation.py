@@ -147,9 +147,11 @@ REASONS = {
 def explain(status: int, k: int, robot, law, model, trajectory, offset) -> str:
     """What went wrong at sample k, and whether the sampled loop is unstable there or was led astray."""
     factor = growth((robot, law, model, trajectory, offset), k)
-    if factor is not None and factor > 1.001:
+    if factor is not None and factor > 1.05:
         cause = (f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
                  f"sample of {trajectory.dt:g} s")
+    elif factor is not None and factor > 1.001:
+        cause = f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
     elif factor is not None:
         cause = (f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
                  "offsets, a weak gain, or a path too near the boundary")

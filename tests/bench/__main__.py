@@ -93,7 +93,8 @@ def start_up() -> None:
     with tempfile.TemporaryDirectory() as cache:
         times = [float(subprocess.run([sys.executable, "-c", START], env={**os.environ, "NUMBA_CACHE_DIR": cache},
                                       capture_output=True, text=True, check=True).stdout) for _ in range(4)]
-    print(f"\nfirst result, import included: {times[0]:.2f} s with an empty cache, {statistics.median(times[1:]):.2f} s from it")
+    cached = statistics.median(times[1:])
+    print(f"\nfirst result, import included: {times[0]:.2f} s with an empty cache, {cached:.2f} s from it")
 
 
 def peers(robot, path) -> None:

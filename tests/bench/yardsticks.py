@@ -53,7 +53,7 @@ def c_run(function, lanes, robot, path, offsets, measured, filtered):
 
 
 def mujoco_rollout(robot, path, offset, integrator):
-    """PD control of the same machine in MuJoCo, loops closed by connect constraints; returns the function that runs it."""
+    """PD control of the same machine in MuJoCo, loops closed by connect constraints; returns its run."""
     import mujoco
     from mujoco import rollout
 
