@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import actuation, energy
+from .. import actuation, antagonism, energy
 from .._arguments import matvec
 from ..kinematics import inverse_kinematics
 from ..manipulator import Manipulator, load
@@ -27,17 +27,17 @@ def _null(A: np.ndarray) -> np.ndarray:
 
 def filtered_torques(A, c) -> np.ndarray:
     """c_eff = (A^T)^+ A^T c (3,) in N m of (16), the part of the torques c (3,) that moves the machine; A is (3, 2)."""
-    return actuation.antagonism_filter(A) @ c
+    return antagonism.antagonism_filter(A) @ c
 
 
 def filtered_command(A, K_P, q_measured, q_desired) -> np.ndarray:
     """The command (18) for PD drives, (3,) in rad: measured angles minus the filtered error; K_P (3,) in N m/rad."""
-    return q_measured - actuation.command_filter(A, K_P) @ (q_measured - q_desired)
+    return q_measured - antagonism.command_filter(A, K_P) @ (q_measured - q_desired)
 
 
 def saved_energy(robot: Manipulator, A, c, dt) -> np.ndarray:
     """Copper loss (3,) in J that the filter saves on a log of torques c (k, 3) in N m, with A (k, 3, 2), dt in s."""
-    kept = matvec(actuation.antagonism_filter(A), c)
+    kept = matvec(antagonism.antagonism_filter(A), c)
     return energy.copper_loss(robot, c, dt) - energy.copper_loss(robot, kept, dt)
 
 
