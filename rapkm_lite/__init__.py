@@ -8,6 +8,7 @@ from .actuation import (
     degree_of_actuation,
     distal_cross_products,
     drive_pairs,
+    force_polygon,
     inverse_dynamics,
     prestress_projector,
     redundant_control_matrix,
@@ -76,7 +77,7 @@ from .manipulator import Manipulator, load
 from .maps import actuation_map, sampling_box, switching_map, workspace_grid
 from .partition import explicit_pseudoinverse, select_independent
 from .simulation import Experiment, Run, SimulationError, experiment, simulate
-from .stability import closed_loop_projector, effective_gain, lyapunov_function
+from .stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
 from .studies import Sweep, sweep
 from .trajectory import Trajectory, circle, follow, hold, polygon, triangle
 

@@ -136,9 +136,7 @@ def run_lockstep(robot, model, trajectory, code, offset, quantum, tau, states, q
     w, _ = lockstep(robot, model, trajectory, code, code.K_P[None], code.K_D[None], offset[None], quantum, tau,
                     (states, q_a, qd_a, c))
     status, k = int(w[lanes.STATUS, 0]), int(w[lanes.SAMPLE, 0])
-    if status == tables.DONE and not np.all(np.isfinite(c[-1])):
-        return tables.SINGULAR, len(c) - 1
-    return status, k
+    return status if np.all(np.isfinite(c[k])) else tables.SINGULAR, k
 
 
 def run_model_based(robot, model, trajectory, code, offset, quantum, tau, *arrays) -> tuple[int, int]:

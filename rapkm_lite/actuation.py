@@ -162,3 +162,12 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
     xd = matvec(np.linalg.pinv(F), qd)
     xdd = matvec(np.linalg.pinv(F), qdd - matvec(F_dot, xd))
     return matvec(Gbar, xdd) + matvec(Cbar, xd) + Qbar
+
+
+def force_polygon(A, torque: float) -> np.ndarray:
+    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise."""
+    edges = 2 * torque * real_array("A", A)
+    edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
+    edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]
+    half = -edges.sum(axis=0) / 2 + np.cumsum(np.vstack([np.zeros(2), edges[:-1]]), axis=0)
+    return np.vstack([half, -half])

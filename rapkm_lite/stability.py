@@ -1,4 +1,4 @@
-"""What the closed loop of the redundant laws obeys: (30), the Lyapunov function (31), the effective gain (35)."""
+"""What closed loops obey: projector (30), Lyapunov function (31), effective gain (35), size of the feedback map."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from ._arguments import (
     transpose,
     wide_matrix,
 )
+from .actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
 from .computed_torque import joint_gain
-from .dynamics import (
-    redundant_dynamics,
-)
+from .dynamics import minimal_dynamics, redundant_dynamics
 from .manipulator import Manipulator
 from .partition import explicit_pseudoinverse, select_independent
 
@@ -54,3 +53,24 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P) -> np.ndarray:
     K = joint_gain("K_P", K_P, robot.n_arms)
     kinetic = np.einsum("...i,...ij,...j->...", ed, Gt, ed)
     return (kinetic + np.einsum("...i,...ij,...j->...", e, K, e)) / 2
+
+
+def feedback_norm(robot, q, pair=None) -> np.ndarray:
+    """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
+
+    pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
+    (A~^T)^+ G~.
+    """
+    still = np.zeros(robot.n_joints)
+    if pair is None:
+        A = redundant_control_matrix(robot, q)
+        M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
+    else:
+        # In end-effector coordinates first, so that a grid point on the curve is no special case.
+        A = control_matrix(robot, q)
+        a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
+        det = a * d - b * c
+        det = np.where(np.abs(det) < 1e-9, 1e-9, det)
+        to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
+        M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
+    return np.linalg.norm(M, 2, axis=(-2, -1))

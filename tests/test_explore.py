@@ -138,7 +138,7 @@ def test_reading_of_table_1_is_reproduced_by_the_run_explorer():
 
 def test_zonotope_holds_every_force_of_limited_torques():
     A = rk.control_matrix(rk.load(), rk.inverse_kinematics(rk.load(), [0.05, -0.03]))
-    corners = explore.geometry.zonotope(0.085 * A)
+    corners = rk.force_polygon(A, 0.085)
     forces = np.array(list(itertools.product([-0.085, 0.085], repeat=3))) @ A
     edges = np.roll(corners, -1, axis=0) - corners
     gap = forces[:, None] - corners
@@ -156,7 +156,7 @@ def test_feedback_map_is_the_textbook_one_where_the_pair_is_regular():
         A = rk.control_matrix(robot, path.q, pair)
         Gbar, _, _ = rk.minimal_dynamics(robot, path.q, path.qd, pair)
         norm = np.linalg.norm(rk.weighted_pseudoinverse(A) @ Gbar, 2, axis=(-2, -1))
-        found = explore.torque.feedback_norm(robot, rk.CTC(1.0, 1.0, pair), path)
+        found = explore.torque.feedback_along(robot, rk.CTC(1.0, 1.0, pair), path)
         np.testing.assert_allclose(found, norm, rtol=1e-9)
 
 

@@ -52,7 +52,6 @@ from .tables import (
     MEASURED,
     NO_FILTER,
     SCALE,
-    SINGULAR,
     TRUE_SAME,
 )
 
@@ -211,14 +210,10 @@ def move(lanes, drives, arms, env, extra, w, dt, k):
         first = at(C, 0, j, N, L)
         sums = drive(drives, g0, g1, g2, g3, w, first, L, sums)
         m11, m12, m22, fx, fy, low = sums
-        size = abs(w[at(C, 0, j, N, L)])
-        for i in range(1, N):
-            size += abs(w[at(C, i, j, N, L)])
         k1x, k1y = solve2(m11, m12, m22, fx, fy)
         x, y, vx, vy, low = runge_kutta(drives, arms, env, extra, x, y, vx, vy, k1x, k1y, low, w, first, L, dt)
         w[X * L + j], w[Y * L + j], w[VX * L + j], w[VY * L + j] = x, y, vx, vy
         status = DONE if low > 0.0 and abs(x) + abs(y) + abs(vx) + abs(vy) < 1e300 else LEFT_WORKSPACE
-        status = status if size < 1e300 else SINGULAR
         running = w[STATUS * L + j] == DONE
         w[SAMPLE * L + j] = k if running else w[SAMPLE * L + j]
         w[STATUS * L + j] = status if running else w[STATUS * L + j]

@@ -10,8 +10,10 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from .. import actuation as act
 from .._arguments import matvec
+from ..antagonism import null_vector
 from ..kinematics import inverse_kinematics, reachable, working_modes
 from ..manipulator import Manipulator
+from ..plotting.actuation import pair_line, pair_name
 from ..plotting.machine import plane_grid, plot_workspace
 from ..plotting.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..trajectory import circle, triangle
@@ -30,21 +32,10 @@ def mode_word(mode) -> str:
     return " ".join("+" if s > 0 else "−" for s in mode)
 
 
-def pair_word(pair) -> str:
-    """A pair of drives (0-based) as printed, counted from 1."""
-    return f"({pair[0] + 1},{pair[1] + 1})"
-
-
-def pair_style(robot: Manipulator, pair) -> dict:
-    """Line of a pair: that of the arm left out, because that drive carries no prestress where the pair is singular."""
-    left_out = [i for i in range(robot.n_arms) if i not in pair]
-    return arm_line(left_out[0] if left_out else 0)
-
-
 def pair_legend(ax, robot: Manipulator) -> None:
     """A legend of the first pairs' lines."""
     pairs = act.drive_pairs(robot)[:4]
-    legend(ax, [("pair " * (i == 0) + pair_word(p), pair_style(robot, p)) for i, p in enumerate(pairs)])
+    legend(ax, [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)])
 
 
 def sigma_pairs(robot: Manipulator, q) -> np.ndarray:
@@ -58,7 +49,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     pairs = act.drive_pairs(robot)[:3]
     modes = {mode_word(m): m for m in working_modes(robot)}
-    which = ["all drives", *(f"pair {pair_word(p)}" for p in pairs)]
+    which = ["all drives", *(f"pair {pair_name(p)}" for p in pairs)]
     gx, gy = plane_grid(robot, 121)
     grid = np.stack([gx, gy], axis=-1)
     extent = gx[0, 0], gx[0, -1], gy[0, 0], gy[-1, 0]
@@ -87,9 +78,9 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         for pair, name, value in zip(pairs, "abc", sigma_pairs(robot, q), strict=False):
             weak = value < WEAK
             draw_machine(picture, name, robot, q, arms=pair)
-            picture.text(name, 0.5, 1.02, f"{pair_word(pair)}: {value:.2f} rad/m", inside=True, ha="center",
+            picture.text(name, 0.5, 1.02, f"{pair_name(pair)}: {value:.2f} rad/m", inside=True, ha="center",
                          fontsize=10, fontweight="bold" if weak else "normal", color=ALARM if weak else AFTER)
-            numbers[f"σ_min of {pair_word(pair)}"] = f"{value:.2f} rad/m"
+            numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"
         return numbers
 
     plane = plane_limits(robot)
@@ -106,15 +97,6 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=rows, widths=[2.7, 1], size=(8.2, 5.4), setup=setup, live=True)
 
 
-def zonotope(generators: np.ndarray) -> np.ndarray:
-    """Corners (2m, 2) of the set of all sums of t_i g_i with |t_i| <= 1, for generators g (m, 2), counter-clockwise."""
-    x, y = generators[:, :1], generators[:, 1:]
-    up = np.where((y < 0) | ((y == 0) & (x < 0)), -generators, generators)
-    up = up[np.argsort(np.arctan2(up[:, 1], up[:, 0]))]
-    half = -up.sum(axis=0) + 2 * np.cumsum(up, axis=0)
-    return np.concatenate([half, -half])
-
-
 def actuation(robot: Manipulator | None = None) -> Explorer:
     """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce."""
     robot = frictionless(robot)
@@ -127,7 +109,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         t = triangle(robot, size, dt=0.01) if path == "triangle" else circle(robot, size / 2, dt=0.01)
         A = act.control_matrix(robot, t.q)
         if robot.n_arms == 3:
-            null = act.null_vector(robot, t.q)
+            null = null_vector(robot, t.q)
         else:
             # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
             share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
@@ -141,7 +123,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
         draw_machine(picture, "plane", robot, t.q[k])
         for i, pair in enumerate(pairs):
-            style = pair_style(robot, pair)
+            style = pair_line(robot, pair)
             picture.line("sigma", share, sigma[:, i], **style)
             picture.line("sigma", place, sigma[k, i], marker="o", markersize=6, color=style["color"], zorder=4)
         for i in range(robot.n_arms):
@@ -149,10 +131,10 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             picture.line("null", place, null[k, i], marker="o", markersize=6, color=arm_colour(i), zorder=4)
         for panel in ("sigma", "null"):
             picture.line(panel, [place, place], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.8, zorder=1)
-        corners = zonotope(torque * 1e-3 * A[k])
+        corners = act.force_polygon(A[k], 1e-3 * torque)
         for pair in pairs:
-            picture.polygon("force", zonotope(torque * 1e-3 * A[k][list(pair)]), fill=False, linewidth=1.5,
-                            edgecolor=pair_style(robot, pair)["color"], linestyle=pair_style(robot, pair)["linestyle"])
+            picture.polygon("force", act.force_polygon(A[k][list(pair)], 1e-3 * torque), fill=False, linewidth=1.5,
+                            edgecolor=pair_line(robot, pair)["color"], linestyle=pair_line(robot, pair)["linestyle"])
         picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
         bound = np.abs(corners).max()
         picture.fit("force", bound)
@@ -161,7 +143,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         return {"point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
                 "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
                 "σ_min of the pairs": per_drive(sigma[k], 2) + " rad/m",
-                "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_word(pairs[worst[1]])}",
+                "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
                 "null vector": per_drive(null[k], 2)}
 
     def setup(axes):

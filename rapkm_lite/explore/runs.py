@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from .. import actuation as act
+from ..antagonism import steady_state_error, steady_state_torque
 from ..control import PD, AntagonismFilter, CommandFilter
 from ..energy import measured_energies
 from ..kinematics import inverse_kinematics
@@ -44,8 +45,8 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
         K_D = 0.225 * np.sqrt(K_P / 7.05)
         A = act.control_matrix(robot, inverse_kinematics(robot, points[place]))
-        theory = 1e3 * act.steady_state_error(A, K_P, offset)
-        torque = 1e3 * act.steady_state_torque(A, K_P, offset)
+        theory = 1e3 * steady_state_error(A, K_P, offset)
+        torque = 1e3 * steady_state_torque(A, K_P, offset)
         run = simulate(robot, PD(K_P, K_D), still(place), offset)
         error = 1e3 * run.error
         for i in range(N):

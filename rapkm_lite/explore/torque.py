@@ -8,34 +8,28 @@ import numpy as np
 
 from .. import actuation as act
 from ..computed_torque import CTC, RedundantCTC, SwitchedCTC
-from ..dynamics import minimal_dynamics, redundant_dynamics
 from ..kinematics import inverse_kinematics, reachable
 from ..manipulator import Manipulator
+from ..plotting.actuation import pair_line, pair_name
 from ..plotting.machine import plane_grid, plot_workspace
 from ..plotting.style import AFTER, NEUTRAL, arm_line
 from ..simulation import simulate
+from ..stability import feedback_norm
 from ..trajectory import triangle
 from .builder import Explorer, choice, explorer, slider
-from .geometry import pair_legend, pair_style, pair_word
+from .geometry import pair_legend
 from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive
 
 
-def feedback_norm(robot: Manipulator, law, t) -> np.ndarray:
-    """Largest torque per unit of commanded acceleration along a path, N m s^2/rad, (k,): the norm of the map v -> c."""
+def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
+    """Norm of the feedback map of a law along a path, N m per rad/s^2, (k,)."""
     if isinstance(law, RedundantCTC):
-        A_tilde = act.redundant_control_matrix(robot, t.q)
-        G, _, _ = redundant_dynamics(robot, t.q, t.qd)
-        maps = act.explicit_pseudoinverse(A_tilde, act.select_independent(A_tilde)) @ G
-        return np.linalg.norm(maps, 2, axis=(-2, -1))
+        return feedback_norm(robot, t.q)
     chosen = law.pairs(robot, t.q) if isinstance(law, SwitchedCTC) else np.tile(law.independent, (len(t), 1))
     norm = np.empty(len(t))
     for pair in {tuple(p) for p in chosen.tolist()}:
         k = np.all(chosen == pair, axis=-1)
-        # In end-effector coordinates A and Gbar are regular; the pair enters through the 2 x 2 part of A alone.
-        A = act.control_matrix(robot, t.q[k])
-        Gbar, _, _ = minimal_dynamics(robot, t.q[k], t.qd[k])
-        to_ee = np.linalg.inv(A[:, list(pair)])
-        norm[k] = np.linalg.norm(act.weighted_pseudoinverse(A) @ Gbar @ to_ee, 2, axis=(-2, -1))
+        norm[k] = feedback_norm(robot, t.q[k], pair)
     return norm
 
 
@@ -63,7 +57,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
     pairs = act.drive_pairs(robot)
     curves = singular_curves(robot)
-    fixed = {f"fixed pair {pair_word(p)}": p for p in pairs}
+    fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     words = [*fixed, "switched pair", "redundant coordinates"]
     path = lru_cache(maxsize=8)(lambda side: triangle(robot, 1e-3 * side))
     coarse = lru_cache(maxsize=8)(lambda side: triangle(robot, 1e-3 * side, dt=0.01))
@@ -75,7 +69,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             return CTC(*gains, fixed[word])
         return SwitchedCTC(*gains) if word == "switched pair" else RedundantCTC(*gains)
 
-    norms = lru_cache(maxsize=64)(lambda word, side: feedback_norm(robot, law_of(word, 1.0), coarse(side)))
+    norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side)))
 
     def draw(picture, law, side, rate, **offsets):
         t = coarse(side)
@@ -84,7 +78,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         if law in fixed:
             curve = curves[fixed[law]]
             for line in curve:
-                picture.line("plane", *line.T, color=pair_style(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
+                picture.line("plane", *line.T, color=pair_line(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
             if curve:
                 gap = distance(t.x, np.concatenate(curve))
                 numbers["distance from its singular curve"] = "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
@@ -111,7 +105,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         axes["plane"].set(**plane)
         for pair, lines in curves.items():
             for line in lines:
-                axes["plane"].plot(*line.T, linewidth=1.0, **pair_style(robot, pair))
+                axes["plane"].plot(*line.T, linewidth=1.0, **pair_line(robot, pair))
         pair_legend(axes["plane"], robot)
         axes["map"].set_yscale("log")
         axes["map"].set_ylim(1e-3, 1e2)

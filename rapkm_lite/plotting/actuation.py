@@ -6,7 +6,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import patheffects
 
-from ..actuation import control_matrix, control_vector_fields, distal_cross_products, drive_pairs, singular_values
+from ..actuation import (
+    control_matrix,
+    control_vector_fields,
+    distal_cross_products,
+    drive_pairs,
+    force_polygon,
+    singular_values,
+)
 from ..kinematics import arm_vectors, inverse_kinematics, working_modes
 from ..manipulator import Manipulator
 from ..maps import workspace_grid
@@ -167,15 +174,6 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
         ax.label_outer()
     axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |n_i| of the prestress", shrink=0.85)
     return axes
-
-
-def force_polygon(A, torque: float) -> np.ndarray:
-    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise."""
-    edges = 2 * torque * np.asarray(A, dtype=float)
-    edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
-    edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]
-    half = -edges.sum(axis=0) / 2 + np.cumsum(np.vstack([np.zeros(2), edges[:-1]]), axis=0)
-    return np.vstack([half, -half])
 
 
 def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=None, drives=True):

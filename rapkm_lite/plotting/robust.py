@@ -6,12 +6,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from .._arguments import transpose
-from ..actuation import control_matrix, drive_pairs, redundant_control_matrix, singular_values, weighted_pseudoinverse
-from ..dynamics import minimal_dynamics, orthogonal_complement, redundant_dynamics
+from ..actuation import drive_pairs, redundant_control_matrix, singular_values
+from ..dynamics import orthogonal_complement
 from ..kinematics import inverse_kinematics
 from ..maps import workspace_grid
-from ..partition import explicit_pseudoinverse, select_independent
-from ..stability import effective_gain
+from ..partition import select_independent
+from ..stability import effective_gain, feedback_norm
 from .actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
 from .machine import plot_path, plot_workspace
 from .runs import plot_errors, plot_torques
@@ -44,27 +44,6 @@ def _field(inside, values):
     field = np.ma.masked_all(inside.shape)
     field[inside] = values
     return field
-
-
-def feedback_norm(robot, q, pair=None) -> np.ndarray:
-    """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
-
-    pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
-    (A~^T)^+ G~.
-    """
-    still = np.zeros(robot.n_joints)
-    if pair is None:
-        A = redundant_control_matrix(robot, q)
-        M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
-    else:
-        # In end-effector coordinates first, so that a grid point on the curve is no special case.
-        A = control_matrix(robot, q)
-        a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
-        det = a * d - b * c
-        det = np.where(np.abs(det) < 1e-9, 1e-9, det)
-        to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
-        M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
-    return np.linalg.norm(M, 2, axis=(-2, -1))
 
 
 def plot_feedback_map(robot, pair, ax=None, n: int = 220):
