@@ -121,7 +121,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(ax)
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", aspect="auto", title="enlarged, y stretched")
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", aspect="auto", title="enlarged, axes unequal")
     axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
 
