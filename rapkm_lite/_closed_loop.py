@@ -136,7 +136,9 @@ def run_lockstep(robot, model, trajectory, code, offset, quantum, tau, states, q
     w, _ = lockstep(robot, model, trajectory, code, code.K_P[None], code.K_D[None], offset[None], quantum, tau,
                     (states, q_a, qd_a, c))
     status, k = int(w[lanes.STATUS, 0]), int(w[lanes.SAMPLE, 0])
-    return status if np.all(np.isfinite(c[k])) else tables.SINGULAR, k
+    if status != tables.NO_POSE and not np.all(np.isfinite(c[k])):
+        status = tables.SINGULAR
+    return status, k
 
 
 def run_model_based(robot, model, trajectory, code, offset, quantum, tau, *arrays) -> tuple[int, int]:

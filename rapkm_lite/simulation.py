@@ -168,7 +168,7 @@ def _per_drive(name: str, value, N: int) -> np.ndarray:
 
 
 def _allocate(samples: int, N: int):
-    states, q_a, qd_a, c = np.zeros((samples, 4)), *(np.empty((samples, N)) for _ in range(3))
+    states, q_a, qd_a, c = np.zeros((samples, 4)), *(np.zeros((samples, N)) for _ in range(3))
     return states, q_a, qd_a, c, np.full((samples, 2), -1)
 
 

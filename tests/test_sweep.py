@@ -20,8 +20,11 @@ def same(a, b):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true"), rk.CommandFilter(PD),
-                                 rk.RedundantCTC(900.0, 60.0)], ids=lambda law: type(law).__name__)
+LAWS = [PD, rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true"), rk.CommandFilter(PD),
+        rk.RedundantCTC(900.0, 60.0)]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
 @pytest.mark.parametrize("sensors", [{}, {"encoder": 2000, "velocity_filter": 2e-3}], ids=["ideal", "encoder"])
 def test_rows_are_single_runs(law, sensors):
     robot = ROBOT.replace(friction=4.2e-3, gravity=(0.0, -0.5))

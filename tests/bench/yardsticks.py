@@ -60,16 +60,17 @@ def mujoco_rollout(robot, path, offset, integrator):
     bodies, loops, drives = "", "", ""
     for i in range(robot.n_arms):
         (l1, l2), (m1, m2) = robot.lengths[i], robot.masses[i]
-        rod = "".join  # each link a slender rod about its middle
-        inner = rod([f'<body name="d{i}" pos="{l1} 0 0"><joint name="e{i}" axis="0 0 1"/>',
-                     f'<inertial pos="{l2 / 2} 0 0" mass="{m2}" diaginertia="1e-6 1e-3 {m2 * l2**2 / 12}"/></body>'])
-        bodies += rod([f'<body name="p{i}" pos="{robot.base[i, 0]} {robot.base[i, 1]} 0">',
-                       f'<joint name="b{i}" axis="0 0 1" armature="{robot.rotor_inertia[i]}"/>',
-                       f'<inertial pos="{l1 / 2} 0 0" mass="{m1}" diaginertia="1e-6 1e-3 {m1 * l1**2 / 12}"/>',
-                       inner, "</body>"])
+        # Each link is a slender rod about its middle.
+        inner = (f'<body name="d{i}" pos="{l1} 0 0"><joint name="e{i}" axis="0 0 1"/>'
+                 f'<inertial pos="{l2 / 2} 0 0" mass="{m2}" diaginertia="1e-6 1e-3 {m2 * l2**2 / 12}"/></body>')
+        bodies += (f'<body name="p{i}" pos="{robot.base[i, 0]} {robot.base[i, 1]} 0">'
+                   f'<joint name="b{i}" axis="0 0 1" armature="{robot.rotor_inertia[i]}"/>'
+                   f'<inertial pos="{l1 / 2} 0 0" mass="{m1}" diaginertia="1e-6 1e-3 {m1 * l1**2 / 12}"/>'
+                   f"{inner}</body>")
         drives += f'<position joint="b{i}" kp="7.05"/><velocity joint="b{i}" kv="0.225"/>'
         if i != 1:
-            loops += f'<connect body1="d{i}" body2="d1" anchor="{l2} 0 0" solref="0.002 1" solimp="0.999 0.9999 0.001"/>'
+            loops += (f'<connect body1="d{i}" body2="d1" anchor="{l2} 0 0" solref="0.002 1" '
+                      'solimp="0.999 0.9999 0.001"/>')
     model = mujoco.MjModel.from_xml_string(f"""
         <mujoco><compiler angle="radian" balanceinertia="true"/>
         <option timestep="{path.dt}" integrator="{integrator}" gravity="0 0 0"><flag contact="disable"/></option>
