@@ -223,9 +223,14 @@ def test_numerics_of_the_pseudoinverse():
     # A~^T has rank 2 by construction: its third singular value is rounding, and the default cut-off may invert it.
     x, modes = random_points(TESTBED, 4000), rk.working_modes(TESTBED)[:, None, :]
     A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, x, modes)).reshape(-1, 3, 6)
-    sigma = np.linalg.svd(A_tilde, compute_uv=False)
-    A_tilde = A_tilde[sigma[:, 1] > 0.05]
-    assert norm(np.linalg.pinv(T(A_tilde))).max() > 1e10
+    left, sigma, right = np.linalg.svd(A_tilde, full_matrices=False)
+    regular = sigma[:, 1] > 0.05
+    A_tilde = A_tilde[regular]
+    assert sigma[regular, 2].max() < 1e-12
+    # An error of 1e-11 along the third singular vectors, above any rounding, so that every LAPACK inverts it.
+    nudged = A_tilde + 1e-11 * (left[..., 2:] * right[:, 2:])[regular]
+    assert norm(np.linalg.pinv(T(nudged))).min() > 1e10
+    assert norm(np.linalg.pinv(T(nudged), rcond=1e-10)).max() < 1 / 0.05
     with_cut_off = np.linalg.pinv(T(A_tilde), rcond=1e-10)
     by_27 = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
     assert norm(with_cut_off).max() < 1 / 0.05
