@@ -22,7 +22,8 @@ from rapkm_lite import explore
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
-NAMES = ["machine", "steady_state", "decentralized_run", "actuation", "computed_torque", "animation", "prestress"]
+NAMES = ["machine", "steady_state", "decentralized_run", "actuation", "computed_torque", "animation", "prestress",
+         "landscape"]
 _made = {}
 
 

@@ -7,6 +7,7 @@
 
 from .builder import Explorer, choice, explorer, log_slider, slider, switch
 from .geometry import actuation, machine, prestress
+from .landscape import landscape
 from .live import LivePicture
 from .motion import animation
 from .parts import draw_machine, drive_legend, legend, offset_sliders, plane_limits
