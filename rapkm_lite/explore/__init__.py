@@ -2,7 +2,7 @@
 
 >>> from rapkm_lite import explore
 >>> explore.prestress().set(level=0).numbers["largest prestress"]
-'0 N mm'
+'0 mN m'
 """
 
 from .builder import Explorer, choice, explorer, log_slider, slider, switch

@@ -161,7 +161,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
                         "xlim": (-2, 2), "ylim": (-2, 2)}}
     controls = {"place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0), "path": choice("path", paths.keys()),
                 "size": slider("side or diameter in mm", 40, 320, 5, 240),
-                "torque": slider("torque limit in N mm", 20, 200, 5, 85)}
+                "torque": slider("torque limit in mN m", 20, 200, 5, 85)}
     return explorer(draw, controls, panels, layout=[["plane", "sigma"], ["force", "null"]], widths=[1, 1.35],
                     size=(9.2, 6.6), setup=setup, live=True)
 
@@ -192,15 +192,15 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
         changes = [sign_changes(v) for v in (least, c)]
         return {"changes of sign without": per_drive(changes[0], 0), "with": per_drive(changes[1], 0),
                 "heat without": f"{energy[0]:.2f} J", "heat with": f"{energy[1]:.2f} J",
-                "largest prestress": f"{1e3 * np.abs(stress).max():.0f} N mm"}
+                "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m"}
 
     def setup(axes):
         drive_legend(axes["without"], robot)
         drive_legend(axes["with"], robot)
 
-    panels = {name: {"title": title, "xlabel": TIME, "ylabel": "torque in N mm", "xlim": (0, 5), "ylim": (-100, 100)}
+    panels = {name: {"title": title, "xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
               for name, title in (("without", "No prestress"), ("with", "With prestress"))}
-    controls = {"level": slider("prestress wished for in N mm", -100, 100, 2, 40),
+    controls = {"level": slider("prestress wished for in mN m", -100, 100, 2, 40),
                 "side": slider("side of the triangle in mm", 60, 300, 5, 240)}
     return explorer(draw, controls, panels, setup=setup, live=True)
 

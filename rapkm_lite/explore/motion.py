@@ -49,7 +49,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
         return {"time": f"{run.t[k]:.2f} s", "force on the end-effector": f"{np.hypot(*total):.2f} N",
                 "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
-                "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} N mm",
+                "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
                 "path error": f"{error[k]:.2f} mm"}
 
     def setup(axes):
@@ -60,7 +60,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
     plane = plane_limits(robot) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
-    panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in N mm", **time},
+    panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
               "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}
     controls = {"time": slider("time in ms", 0, 5000, 40, 400), "filter": choice("antagonism filter", LAWS.keys()),
                 "offsets": switch("calibration offsets −5, −6, 12 mrad", True)}

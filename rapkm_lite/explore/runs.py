@@ -62,7 +62,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         return {"error at rest, theory": per_drive(theory, 2) + " mrad",
                 "simulated": per_drive(error[-1], 2) + " mrad",
                 "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
-                "rest torque": per_drive(torque, 1) + " N mm",
+                "rest torque": per_drive(torque, 1) + " mN m",
                 "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W"}
 
     def setup(axes):
@@ -73,7 +73,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     drives = {"xticks": range(1, N + 1), "xlabel": "drive", "xlim": (0.4, N + 0.6)}
     panels = {"error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
               "rest": {"ylabel": "error at rest in mrad", **drives},
-              "torque": {"ylabel": "torque at rest in N mm", **drives}}
+              "torque": {"ylabel": "torque at rest in mN m", **drives}}
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     controls["place"] = choice("point", points.keys())
@@ -111,8 +111,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         if filter != "off":
             before = plain(path, friction, encoder, K_P, K_D, *offset).sum()
             numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
-        return numbers | {"torque at the end": per_drive(torque[-1], 1) + " N mm",
-                          "largest torque": f"{np.abs(torque).max():.0f} N mm",
+        return numbers | {"torque at the end": per_drive(torque[-1], 1) + " mN m",
+                          "largest torque": f"{np.abs(torque).max():.0f} mN m",
                           "largest error": f"{np.abs(error).max():.1f} mrad"}
 
     def setup(axes):
@@ -121,7 +121,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         measured = [("Table 1", {"color": NEUTRAL, "alpha": 0.4, "linewidth": 7})] if table is not None else []
         legend(axes["energy"], [("this run", {"color": NEUTRAL, "linewidth": 7}), *measured])
 
-    panels = {"torque": {"xlabel": TIME, "ylabel": "torque in N mm", "xlim": (0, 5)},
+    panels = {"torque": {"xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5)},
               "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 5)},
               "energy": {"xlabel": "drive", "ylabel": "electric energy in J", "xlim": (0.4, N + 0.6),
                          "xticks": range(1, N + 1)}}

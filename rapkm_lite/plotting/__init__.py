@@ -40,7 +40,6 @@ from .machine import (
     plot_workspace,
 )
 from .robust import (
-    feedback_norm,
     plot_ee_errors,
     plot_ee_paths,
     plot_effective_gain,
