@@ -1,0 +1,91 @@
+"""The word to the waiting user: seen in a terminal or a notebook, silent elsewhere, gone at the end."""
+
+import io
+import sys
+import time
+import types
+
+import pytest
+
+from rapkm_lite import _patience
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(_patience, "sys", types.SimpleNamespace(stderr=stream, modules=sys.modules))
+    monkeypatch.setattr(_patience, "_notebook", lambda: False)
+    return stream
+
+
+@pytest.fixture
+def notebook(monkeypatch):
+    shown = []
+    monkeypatch.setattr(_patience, "_notebook", lambda: True)
+    monkeypatch.setattr("IPython.display.display", lambda bundle, raw: shown.append((bundle, raw)))
+    return shown
+
+
+def slow(*kind, after=0.01):
+    with _patience.patience(*kind, after=after):
+        time.sleep(0.1)
+
+
+def test_a_terminal_sees_one_line_that_is_wiped_out(terminal):
+    slow("terminal")
+    text = terminal.getvalue()
+    assert "compiles its engine" in text and text.endswith(" \r") and "\n" not in text
+
+
+def test_said_once_per_kind_and_only_when_it_takes_long(terminal):
+    slow("once")
+    slow("quick", after=60.0)
+    said = terminal.getvalue()
+    slow("once")
+    assert terminal.getvalue() == said and said.count("compiles") == 1
+
+
+def test_a_failed_call_is_not_remembered(terminal):
+    with pytest.raises(ZeroDivisionError), _patience.patience("failed", after=60.0):
+        raise ZeroDivisionError
+    slow("failed")
+    assert terminal.getvalue().count("compiles") == 1
+
+
+def test_nothing_is_shown_where_nobody_looks(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(_patience, "sys", types.SimpleNamespace(stderr=stream, modules=sys.modules))
+    monkeypatch.setattr(_patience, "_notebook", lambda: False)
+    slow("file")
+    with _patience.progress_bar(2) as advance:
+        advance()
+    assert stream.getvalue() == ""
+
+
+def test_a_notebook_sees_a_widget_without_text(notebook):
+    slow("notebook")
+    (bundle, raw), = notebook
+    assert raw and list(bundle) == ["application/vnd.jupyter.widget-view+json"]
+
+
+def test_progress_counts_the_chunks(terminal, notebook, monkeypatch):
+    with _patience.progress_bar(4) as advance:
+        for _ in range(4):
+            advance()
+    assert len(notebook) == 1
+    monkeypatch.setattr(_patience, "_notebook", lambda: False)
+    with _patience.progress_bar(4) as advance:
+        advance()
+    assert "25 %" in terminal.getvalue() and terminal.getvalue().endswith(" \r")
+
+
+@pytest.mark.parametrize("shell, found", [(None, False), (types.SimpleNamespace(kernel=None), False),
+                                          (types.SimpleNamespace(kernel=1), True)])
+def test_a_kernel_is_told_from_a_shell(monkeypatch, shell, found):
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    assert _patience._notebook() is found
