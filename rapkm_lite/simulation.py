@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arguments import bounded, matvec, positive_number, real_array
 from ._closed_loop import Loop, encode, growth, run_lockstep, run_model_based
+from .actuation import distal_cross_products, drive_pairs
 from .control import PD, Law
 from .datafiles import read_toml
 from .engine import tables
@@ -147,6 +148,12 @@ REASONS = {
 def explain(status: int, k: int, robot, law, model, trajectory, offset) -> str:
     """What went wrong at sample k, and whether the sampled loop is unstable there or was led astray."""
     factor = growth((robot, law, model, trajectory, offset), k)
+    pair = getattr(law, "independent", None)
+    if pair is not None and tuple(sorted(pair)) in drive_pairs(model):
+        measure = abs(distal_cross_products(model, trajectory.q[k])[drive_pairs(model).index(tuple(sorted(pair)))])
+        if measure < 0.3:
+            return (f"{REASONS[status]} (near a parameterization singularity of its independent drives "
+                    f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)")
     if factor is not None and factor > 1.05:
         cause = (f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
                  f"sample of {trajectory.dt:g} s")

@@ -122,3 +122,11 @@ def test_bad_arguments(options, message):
     arguments = {"robot": ROBOT, "law": PD, "trajectory": rk.hold(ROBOT, (0.0, 0.0), 0.01)} | options
     with pytest.raises(ValueError, match=message):
         rk.simulate(**arguments)
+
+
+def test_a_lost_fixed_pair_names_its_singularity():
+    robot = rk.load().replace(friction=0.0)
+    with pytest.raises(rk.SimulationError, match="singularity of its independent drives 2 and 3") as caught:
+        rk.simulate(robot, rk.CTC(900.0, 60.0, (1, 2)), rk.triangle(robot), offset=[4e-3, -2e-3, 5e-3])
+    # The path crosses the curve of this pair at 2.96 s and 3.53 s.
+    assert 2.7 < caught.value.time < 3.0
