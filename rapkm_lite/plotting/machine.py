@@ -25,10 +25,10 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
         ax.plot(*points[1], "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, alpha=alpha, zorder=4)
         ax.plot(*points[2], "s", mfc="white", mec=NEUTRAL, mew=1.8, ms=8, alpha=alpha, zorder=5)
         if labels:
-            outward = robot.base[i] - robot.base.mean(axis=0)
-            outward = outward / max(np.hypot(*outward), 1e-9)
-            ax.annotate(f"drive {i + 1}", robot.base[i], xytext=outward * (34, 17), textcoords="offset points",
-                        ha="center", va="center", color=arm_colour(i), fontweight="bold", fontsize=9)
+            # Opposite to the proximal link, where the arm itself seldom lies.
+            away = -a[i] / np.hypot(*a[i])
+            ax.annotate(f"drive {i + 1}", robot.base[i], xytext=away * (36, 17), textcoords="offset points",
+                        ha="center", va="center", color=arm_colour(i), fontweight="bold", fontsize=9, zorder=6)
     return plane_axes(robot, ax)
 
 
@@ -110,9 +110,12 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
     for (j, k), corner in zip(points, corners, strict=True):
         ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
-        ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(10, 6), textcoords="offset points", fontsize=9.5)
+        side = np.sign(corner[1] - corners[:, 1].mean())  # the name stands outside the triangle
+        ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), textcoords="offset points",
+                    ha="center", va="center", fontsize=9.5)
     ax.plot(*(1e3 * (estimate - x)), "D", color=NEUTRAL, ms=7)
-    ax.annotate("least squares", 1e3 * (estimate - x), xytext=(10, -4), textcoords="offset points", fontsize=9.5)
+    ax.annotate("least squares", 1e3 * (estimate - x), xytext=(0, -13), textcoords="offset points",
+                ha="center", va="center", fontsize=9.5)
     ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
     ax.annotate("true", (0, 0), xytext=(10, -4), textcoords="offset points", fontsize=9.5)
     ax.set_aspect("equal", adjustable="datalim")
