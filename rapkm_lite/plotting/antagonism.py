@@ -45,16 +45,16 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 
 
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
-    """Drive torques over time, and in thin black the static theory (N,) or (k, N) in N m."""
-    ax = plot_torques(run, ax, title)
-    lines = np.broadcast_to(theory, run.c.shape)
+    """Drive torques over time in mN m, and in thin black the static theory, given as (N,) or (k, N) in N m."""
+    ax = plot_torques(run, ax, title, milli=True)
+    lines = 1e3 * np.broadcast_to(theory, run.c.shape)
     for i in range(run.robot.n_arms):
         ax.plot(run.t, lines[:, i], color=AFTER, lw=0.9, zorder=4)
     return ax
 
 
 def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
-    """Rest torque in N m against a ratio of gains: dots for runs, a line for each theory (label -> values)."""
+    """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m)."""
     ax = axes_or_new(ax)
     looks = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
     for look, (label, values) in zip(looks, theories.items(), strict=True):
@@ -134,13 +134,13 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
 
 
 def plot_log(log, axes=None):
-    """A log: measured minus desired angles above, drive torques below, over time; returns both axes."""
+    """A log: measured minus desired angles above, drive torques in mN m below, over time; returns both axes."""
     if axes is None:
         axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True)
     for i in range(log.c.shape[1]):
         axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
-        axes[1].plot(log.t, log.c[:, i], **arm_line(i))
+        axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))
     axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=(0, log.t[-1]))
-    axes[1].set(xlabel="time in s", ylabel="torque in N m")
+    axes[1].set(xlabel="time in s", ylabel="torque in mN m")
     axes[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     return axes

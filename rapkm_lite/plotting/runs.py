@@ -18,9 +18,10 @@ _RUN_LINES = (
 )
 
 
-def plot_torques(run, ax=None, title: str = ""):
-    """Drive torques over time."""
-    return _per_drive(run, run.c, ax, "torque in N m", title)
+def plot_torques(run, ax=None, title: str = "", milli: bool = False):
+    """Drive torques over time, in N m or, with `milli`, in mN m."""
+    scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
+    return _per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
 
 
 def plot_errors(run, ax=None, title: str = ""):
