@@ -104,7 +104,7 @@ def overview() -> None:
     plotting.plot_machine(robot, path.q[3300], axes[0])
     for ax, run, title in ((axes[1], fight, "three drives, milliradian offsets"), (axes[2], calm, "with the filter")):
         plotting.plot_torques(run, ax, f"{title}: {run.energy.sum():.2f} J")
-        ax.set_ylim(-0.055, 0.055)
+        ax.set_ylim(-55, 55)
     fig.savefig(HERE / "overview.png")
 
 

@@ -46,7 +46,7 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
     """Drive torques over time in mN m, and in thin black the static theory, given as (N,) or (k, N) in N m."""
-    ax = plot_torques(run, ax, title, milli=True)
+    ax = plot_torques(run, ax, title)
     lines = 1e3 * np.broadcast_to(theory, run.c.shape)
     for i in range(run.robot.n_arms):
         ax.plot(run.t, lines[:, i], color=AFTER, lw=0.9, zorder=4)

@@ -75,7 +75,7 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_t
     """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
-    plot_torques(run, axes[0], title)
+    plot_torques(run, axes[0], title, milli=False)
     plot_errors(run, axes[1])
     at = [] if pair is None else curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
     for ax in axes:

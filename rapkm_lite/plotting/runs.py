@@ -18,8 +18,8 @@ _RUN_LINES = (
 )
 
 
-def plot_torques(run, ax=None, title: str = "", milli: bool = False):
-    """Drive torques over time, in N m or, with `milli`, in mN m."""
+def plot_torques(run, ax=None, title: str = "", milli: bool = True):
+    """Drive torques over time, in mN m or, for large ones, in N m."""
     scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
     return _per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
 
@@ -31,7 +31,7 @@ def plot_errors(run, ax=None, title: str = ""):
 
 def plot_antagonism(run, ax=None, title: str = ""):
     """The part N_{A^T} c of the drive torques that moves nothing, over time."""
-    return _per_drive(run, antagonistic_torque(run), ax, "antagonism in N m", title)
+    return _per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
 
 
 def plot_difference(run, other, ax=None, title: str = ""):
