@@ -115,3 +115,12 @@ def test_blanking_keeps_the_signature_and_names():
     source = 'def f(x):\n    """Double."""\n    ### BEGIN SOLUTION\n    return 2 * x\n    ### END SOLUTION\n'
     assert build.blank(source) == 'def f(x):\n    """Double."""\n    raise NotImplementedError'
     assert build.blank("### BEGIN SOLUTION\na = 1\nb = a\n### END SOLUTION\nprint(a)") == "a = ...\nb = ...\nprint(a)"
+
+
+@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+def test_readme_asks_the_question_of_the_lesson(path):
+    title = nbformat.read(path, as_version=4).cells[0].source.splitlines()[0]
+    number, question = title.removeprefix("# ").split(" · ", 1)
+    assert number == path.stem[:2]
+    readme = (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8")
+    assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
