@@ -188,7 +188,7 @@ def sensed(w, j, i, N, L, vx, vy, dt):
     return ax, ay, dx, dy, ad, bx, by, lx, ly, inv, ahead
 
 
-@outlined
+@leaf
 def move(lanes, drives, arms, env, extra, w, dt, k):
     """One hold: Runge-Kutta step of all lanes; returns how many runs have ended."""
     L, N = len(lanes), len(drives)
