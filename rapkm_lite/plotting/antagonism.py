@@ -32,7 +32,7 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     for i in range(len(A)):
         along = np.array([-normal[i, 1], normal[i, 0]])
         foot = centre + (level[i] - normal[i] @ centre) * normal[i]
-        label = f"drive {i + 1}: {np.round(torque[i], 1) + 0.0:.1f} mN m"
+        label = f"drive {i + 1}: {np.round(torque[i], 1) + 0.0:.1f} mN m".replace("-", "−")
         ax.plot(*(foot + np.outer([-4 * half, 4 * half], along)).T, label=label, **arm_line(i))
         target = rest + (level[i] - normal[i] @ rest) * normal[i]
         ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)
@@ -45,11 +45,12 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 
 
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
-    """Drive torques over time in mN m, and in thin black the static theory, given as (N,) or (k, N) in N m."""
+    """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots."""
     ax = plot_torques(run, ax, title)
-    lines = 1e3 * np.broadcast_to(theory, run.c.shape)
-    for i in range(run.robot.n_arms):
-        ax.plot(run.t, lines[:, i], color=AFTER, lw=0.9, zorder=4)
+    dots = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
+    look = dots if np.ndim(theory) == 2 else {"lw": 0.9}
+    for values in 1e3 * np.broadcast_to(theory, run.c.shape).T:
+        ax.plot(run.t, values, color=AFTER, zorder=4, **look)
     return ax
 
 
@@ -125,7 +126,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
     ax.set(xscale="log", title=title,
-           xlabel="step of the torque over width of the friction band, K$_P$ quantum / (2 f$_c$)",
+           xlabel="step of the torque over width of the friction band, $K_P\\Delta / (2f_c)$",
            ylabel="torque jumps per second")
     _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
     ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
