@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import rapkm_lite as rk
-from rapkm_lite.checks.mystery import K_D, hidden, random_numbers
+from rapkm_lite.lessons.mystery import K_D, hidden, random_numbers
 
 HERE = Path(__file__).resolve().parent / "mystery_runs"
 SIDES = {"offset_a": 0.24, "offset_b": 0.06, "offset_c": 0.0, "gain": 0.24}

@@ -1,7 +1,20 @@
 """Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel."""
 
-from ._arguments import ConvergenceError
-from .actuation import (
+from .control.computed_torque import (
+    APD,
+    CTC,
+    RedundantAPD,
+    RedundantCTC,
+    SwitchedCTC,
+)
+from .control.controller import Controller
+from .control.laws import PD, AntagonismFilter, CommandFilter, Law
+from .control.stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
+from .machine.arguments import ConvergenceError
+from .machine.datafiles import data_path
+from .machine.logs import Log, mystery_run
+from .machine.manipulator import Manipulator, load
+from .mechanics.actuation import (
     actuation_type,
     control_matrix,
     control_vector_fields,
@@ -16,7 +29,7 @@ from .actuation import (
     singular_values,
     weighted_pseudoinverse,
 )
-from .antagonism import (
+from .mechanics.antagonism import (
     antagonism_filter,
     command_filter,
     null_vector,
@@ -24,18 +37,8 @@ from .antagonism import (
     steady_state_error,
     steady_state_torque,
 )
-from .closure import close_loops, estimate_pose
-from .computed_torque import (
-    APD,
-    CTC,
-    RedundantAPD,
-    RedundantCTC,
-    SwitchedCTC,
-)
-from .control import PD, AntagonismFilter, CommandFilter, Desired, Law
-from .controller import Controller
-from .datafiles import data_path
-from .dynamics import (
+from .mechanics.closure import close_loops, estimate_pose
+from .mechanics.dynamics import (
     constraint_rank,
     coriolis_matrix,
     degree_of_freedom,
@@ -51,16 +54,7 @@ from .dynamics import (
     potential_energy,
     redundant_dynamics,
 )
-from .energy import (
-    antagonism_form,
-    antagonistic_energy,
-    antagonistic_torque,
-    copper_loss,
-    measured_energies,
-    mechanical_work,
-    table1,
-)
-from .kinematics import (
+from .mechanics.kinematics import (
     arm_vectors,
     constraint_jacobian,
     constraint_jacobian_dot,
@@ -72,13 +66,19 @@ from .kinematics import (
     working_mode,
     working_modes,
 )
-from .logs import Log, mystery_run
-from .manipulator import Manipulator, load
-from .maps import actuation_map, sampling_box, switching_map, workspace_grid
-from .partition import explicit_pseudoinverse, select_independent
-from .simulation import Experiment, Run, SimulationError, experiment, simulate
-from .stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
-from .studies import Sweep, sweep
-from .trajectory import Trajectory, circle, follow, hold, polygon, triangle
+from .mechanics.maps import actuation_map, sampling_box, switching_map, workspace_grid
+from .mechanics.partition import explicit_pseudoinverse, select_independent
+from .mechanics.trajectory import Desired, Trajectory, circle, follow, hold, polygon, triangle
+from .simulation.energy import (
+    antagonism_form,
+    antagonistic_energy,
+    antagonistic_torque,
+    copper_loss,
+    measured_energies,
+    mechanical_work,
+    table1,
+)
+from .simulation.runs import Experiment, Run, SimulationError, experiment, simulate
+from .simulation.sweeps import Sweep, sweep
 
 __version__ = "0.1.0"

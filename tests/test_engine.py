@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
-from rapkm_lite.kinematics import ee_complement
+from rapkm_lite.mechanics.kinematics import ee_complement
 
 ANGLES = {2: [200.0, -20.0], 3: [210.0, 330.0, 90.0], 4: [225.0, 315.0, 45.0, 135.0]}
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])

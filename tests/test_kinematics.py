@@ -7,6 +7,7 @@ from samples import MODES, TESTBED, along, machines, modes, norm, random_motion,
 from scipy.optimize import least_squares, minimize
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.kinematics import wrap
 
 
 # Identities on V.
@@ -41,7 +42,7 @@ def test_centroid_pose_from_trigonometry():
 
 def test_angles_are_wrapped_to_the_half_open_turn():
     turns = np.array([-3, -1, 0, 1, 3]) * np.pi
-    assert_allclose(rk.kinematics.wrap(turns), [np.pi, np.pi, 0, np.pi, np.pi], atol=1e-15)
+    assert_allclose(wrap(turns), [np.pi, np.pi, 0, np.pi, np.pi], atol=1e-15)
     # Arm 1 stretched along the negative x axis: its angle is +pi.
     robot = TESTBED.with_arms((0, 1)).replace(base=[[0.4, 0.0], [0.0, 0.1]])
     assert rk.inverse_kinematics(robot, [0.0, 0.0])[0] == np.pi

@@ -7,7 +7,7 @@ import types
 
 import pytest
 
-from rapkm_lite import _patience
+from rapkm_lite.simulation import patience as _patience
 
 
 class Terminal(io.StringIO):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
-from rapkm_lite.checks.mystery import K_P, hidden
+from rapkm_lite.lessons.mystery import K_P, hidden
 
 ROOT = Path(__file__).parents[1]
 QUANTUM = 2 * np.pi / 2000

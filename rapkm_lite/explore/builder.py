@@ -11,8 +11,8 @@ from collections.abc import Callable
 import ipywidgets as widgets
 
 from .. import engine
-from .._arguments import ConvergenceError
-from ..simulation import SimulationError
+from ..machine.arguments import ConvergenceError
+from ..simulation.runs import SimulationError
 from .live import LivePicture
 
 # As wide as the row allows: a long label leaves a short slider.

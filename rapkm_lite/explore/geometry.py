@@ -8,15 +8,15 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from .. import actuation as act
-from .._arguments import matvec
-from ..antagonism import null_vector
-from ..kinematics import inverse_kinematics, reachable, working_modes
-from ..manipulator import Manipulator
+from ..machine.arguments import matvec
+from ..machine.manipulator import Manipulator
+from ..mechanics import actuation as act
+from ..mechanics.antagonism import null_vector
+from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
+from ..mechanics.trajectory import circle, triangle
 from ..plotting.actuation import pair_line, pair_name
 from ..plotting.machine import plane_grid, plot_workspace
 from ..plotting.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
-from ..trajectory import circle, triangle
 from .builder import Explorer, choice, explorer, slider
 from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive, plane_limits
 

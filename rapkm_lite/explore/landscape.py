@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..energy import antagonism_form
-from ..manipulator import Manipulator
+from ..machine.manipulator import Manipulator
+from ..mechanics.trajectory import triangle
 from ..plotting.style import ALARM, NEUTRAL, arm_colour
-from ..trajectory import triangle
+from ..simulation.energy import antagonism_form
 from .builder import Explorer, explorer, log_slider, slider
 from .parts import frictionless, offset_sliders
 

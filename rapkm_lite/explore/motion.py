@@ -6,13 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from .. import actuation as act
-from ..control import PD
-from ..manipulator import Manipulator
+from ..control.laws import PD
+from ..machine.manipulator import Manipulator
+from ..mechanics import actuation as act
+from ..mechanics.trajectory import triangle
 from ..plotting.machine import plot_path, plot_workspace
 from ..plotting.style import AFTER, NEUTRAL, arm_colour, arm_line
-from ..simulation import simulate
-from ..trajectory import triangle
+from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider, switch
 from .parts import TIME, draw_machine, drive_legend, frictionless, plane_limits
 from .runs import LAWS

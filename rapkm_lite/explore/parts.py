@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.lines import Line2D
 
-from ..kinematics import arm_vectors
-from ..manipulator import Manipulator, load
+from ..machine.manipulator import Manipulator, load
+from ..mechanics.kinematics import arm_vectors
 from ..plotting.style import NEUTRAL, arm_colour, arm_line
 from .builder import slider
 

@@ -6,15 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from .. import actuation as act
-from ..antagonism import steady_state_error, steady_state_torque
-from ..control import PD, AntagonismFilter, CommandFilter
-from ..energy import measured_energies
-from ..kinematics import inverse_kinematics
-from ..manipulator import Manipulator, load
+from ..control.laws import PD, AntagonismFilter, CommandFilter
+from ..machine.manipulator import Manipulator, load
+from ..mechanics import actuation as act
+from ..mechanics.antagonism import steady_state_error, steady_state_torque
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.trajectory import hold, triangle
 from ..plotting.style import NEUTRAL, arm_colour, arm_line
-from ..simulation import experiment, simulate
-from ..trajectory import hold, triangle
+from ..simulation.energy import measured_energies
+from ..simulation.runs import experiment, simulate
 from .builder import Explorer, choice, explorer, log_slider, switch
 from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive
 

@@ -6,16 +6,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from .. import actuation as act
-from ..computed_torque import CTC, RedundantCTC, SwitchedCTC
-from ..kinematics import inverse_kinematics, reachable
-from ..manipulator import Manipulator
+from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
+from ..control.stability import feedback_norm
+from ..machine.manipulator import Manipulator
+from ..mechanics import actuation as act
+from ..mechanics.kinematics import inverse_kinematics, reachable
+from ..mechanics.trajectory import triangle
 from ..plotting.actuation import pair_line, pair_name
 from ..plotting.machine import plane_grid, plot_workspace
 from ..plotting.style import AFTER, NEUTRAL, arm_line
-from ..simulation import simulate
-from ..stability import feedback_norm
-from ..trajectory import triangle
+from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider
 from .geometry import pair_legend
 from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive

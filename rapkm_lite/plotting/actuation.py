@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import patheffects
 
-from ..actuation import (
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import (
     control_matrix,
     control_vector_fields,
     distal_cross_products,
@@ -14,9 +15,8 @@ from ..actuation import (
     force_polygon,
     singular_values,
 )
-from ..kinematics import arm_vectors, inverse_kinematics, working_modes
-from ..manipulator import Manipulator
-from ..maps import workspace_grid
+from ..mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
+from ..mechanics.maps import workspace_grid
 from .machine import plot_machine, plot_path, plot_workspace
 from .style import ALARM, NEUTRAL, arm_line, axes_or_new
 

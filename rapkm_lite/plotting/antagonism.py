@@ -5,10 +5,10 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..actuation import control_matrix
-from ..antagonism import null_vector, steady_state_error, steady_state_torque
-from ..kinematics import inverse_kinematics
-from ..maps import workspace_grid
+from ..mechanics.actuation import control_matrix
+from ..mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.maps import workspace_grid
 from .machine import plane_axes, plot_path
 from .runs import plot_torques
 from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new

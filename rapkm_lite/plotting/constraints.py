@@ -6,8 +6,8 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..dynamics import orthogonal_complement
-from ..kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
+from ..mechanics.dynamics import orthogonal_complement
+from ..mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
 from .machine import plot_machine
 from .style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
 

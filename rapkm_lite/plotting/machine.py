@@ -5,9 +5,9 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..actuation import drive_pairs
-from ..closure import estimate_pose
-from ..kinematics import arm_vectors, forward_kinematics, inverse_kinematics, reachable, working_modes
+from ..mechanics.actuation import drive_pairs
+from ..mechanics.closure import estimate_pose
+from ..mechanics.kinematics import arm_vectors, forward_kinematics, inverse_kinematics, reachable, working_modes
 from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .._arguments import transpose
-from ..actuation import drive_pairs, redundant_control_matrix, singular_values
-from ..dynamics import orthogonal_complement
-from ..kinematics import inverse_kinematics
-from ..maps import workspace_grid
-from ..partition import select_independent
-from ..stability import effective_gain, feedback_norm
+from ..control.stability import effective_gain, feedback_norm
+from ..machine.arguments import transpose
+from ..mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
+from ..mechanics.dynamics import orthogonal_complement
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.maps import workspace_grid
+from ..mechanics.partition import select_independent
 from .actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
 from .machine import plot_path, plot_workspace
 from .runs import plot_errors, plot_torques

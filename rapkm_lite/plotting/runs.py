@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..antagonism import null_vector
-from ..energy import antagonistic_torque
+from ..mechanics.antagonism import null_vector
+from ..simulation.energy import antagonistic_torque
 from .style import AFTER, ALARM, BEFORE, arm_colour, arm_line, axes_or_new
 
 # Colour and dashes of runs that are compared on one axis: they belong to no arm.

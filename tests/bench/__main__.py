@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 import rapkm_lite as rk
-from rapkm_lite import _closed_loop as engine_calls
-from rapkm_lite.energy import antagonistic_energy
+from rapkm_lite.simulation import compiled as engine_calls
+from rapkm_lite.simulation.energy import antagonistic_energy
 
 from . import yardsticks
 

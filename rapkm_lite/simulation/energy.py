@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import matvec, positive_number, real_array
-from .actuation import control_matrix, prestress_projector
-from .antagonism import steady_state_torque
-from .control import AntagonismFilter
-from .datafiles import data_path
-from .manipulator import Manipulator
-from .simulation import Run, experiment
-from .trajectory import Trajectory
+from ..control.laws import AntagonismFilter
+from ..machine.arguments import matvec, positive_number, real_array
+from ..machine.datafiles import data_path
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import control_matrix, prestress_projector
+from ..mechanics.antagonism import steady_state_torque
+from ..mechanics.trajectory import Trajectory
+from .runs import Run, experiment
 
 
 def copper_loss(robot, c, dt) -> np.ndarray:

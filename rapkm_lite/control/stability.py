@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     check_leading,
     joint_vectors,
     real_array,
@@ -13,11 +13,11 @@ from ._arguments import (
     transpose,
     wide_matrix,
 )
-from .actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
+from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
+from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .computed_torque import joint_gain
-from .dynamics import minimal_dynamics, redundant_dynamics
-from .manipulator import Manipulator
-from .partition import explicit_pseudoinverse, select_independent
 
 
 def closed_loop_projector(A_tilde) -> np.ndarray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     check_leading,
     joint_indices,
     joint_vectors,
@@ -16,8 +16,8 @@ from ._arguments import (
     real_array,
     transpose,
 )
+from ..machine.manipulator import Manipulator
 from .kinematics import arm_vectors, constraint_jacobian, constraint_jacobian_dot, ee_complement, ee_complement_dot
-from .manipulator import Manipulator
 
 
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:

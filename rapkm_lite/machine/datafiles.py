@@ -25,7 +25,7 @@ def data_path(name: str) -> Path:
 
     Raises ValueError when there is none of this name.
     """
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     for folder in (here / "data", here.parent / "data"):
         if (folder / name).exists():
             return folder / name

@@ -10,12 +10,12 @@ import itertools
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     check_leading,
     joint_vectors,
     real_array,
 )
-from .manipulator import Manipulator
+from ..machine.manipulator import Manipulator
 
 
 def turn(v: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     ConvergenceError,
     check_leading,
     matvec,
@@ -14,6 +14,7 @@ from ._arguments import (
     transpose,
     whole_number,
 )
+from ..machine.manipulator import Manipulator
 from .kinematics import (
     arm_vectors,
     constraint_jacobian,
@@ -23,7 +24,6 @@ from .kinematics import (
     reachable,
     wrap,
 )
-from .manipulator import Manipulator
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import exact_array, joint_indices, one_of, real_array, whole_number
+from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
+from ..machine.manipulator import Manipulator
 from .actuation import distal_cross_products, drive_pairs, singular_values
 from .antagonism import null_direction
 from .kinematics import ee_complement, inverse_kinematics
-from .manipulator import Manipulator
 from .partition import PARTITION_RULES
 
 

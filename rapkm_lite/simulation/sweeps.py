@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import real_array
-from ._closed_loop import LANES, encode, lockstep
-from ._patience import progress_bar
-from .control import Law
+from ..control.laws import Law
+from ..engine import COMPILED, lanes, tables
+from ..machine.arguments import real_array
+from ..machine.manipulator import Manipulator
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.trajectory import Trajectory
+from .compiled import LANES, encode, lockstep
 from .energy import antagonistic_energy
-from .engine import COMPILED, lanes, tables
-from .kinematics import inverse_kinematics
-from .manipulator import Manipulator
-from .simulation import REASONS, SimulationError, check_setup, simulate
-from .trajectory import Trajectory
+from .patience import progress_bar
+from .runs import REASONS, SimulationError, check_setup, simulate
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     bounded,
     check_leading,
     joint_vectors,
@@ -20,39 +20,12 @@ from ._arguments import (
     positive_definite,
     real_array,
 )
-from .actuation import (
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import (
     control_matrix,
 )
-from .antagonism import antagonism_filter, command_filter
-from .manipulator import Manipulator
-
-
-@dataclass(frozen=True, eq=False)
-class Desired:
-    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N)."""
-
-    n_arms: int
-    x: np.ndarray
-    xd: np.ndarray
-    xdd: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-
-    @property
-    def q_a(self) -> np.ndarray:
-        """Base angles (..., N), rad."""
-        return self.q[..., : self.n_arms]
-
-    @property
-    def qd_a(self) -> np.ndarray:
-        """Base rates (..., N), rad/s."""
-        return self.qd[..., : self.n_arms]
-
-    @property
-    def qdd_a(self) -> np.ndarray:
-        """Base accelerations (..., N), rad/s^2."""
-        return self.qdd[..., : self.n_arms]
+from ..mechanics.antagonism import antagonism_filter, command_filter
+from ..mechanics.trajectory import Desired
 
 
 def gain(name: str, value) -> np.ndarray:

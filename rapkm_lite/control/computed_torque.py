@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     bounded,
     check_leading,
     exact_array,
@@ -17,24 +17,25 @@ from ._arguments import (
     positive_definite,
     real_array,
 )
-from .actuation import (
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import (
     control_matrix,
     distal_cross_products,
     drive_pairs,
     redundant_control_matrix,
     weighted_pseudoinverse,
 )
-from .control import Desired, Law, gain, measured
-from .dynamics import (
+from ..mechanics.dynamics import (
     coriolis_matrix,
     generalized_forces,
     mass_matrix,
     minimal_dynamics,
     redundant_dynamics,
 )
-from .kinematics import ee_complement, forward_kinematics
-from .manipulator import Manipulator
-from .partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
+from ..mechanics.kinematics import ee_complement, forward_kinematics
+from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
+from ..mechanics.trajectory import Desired
+from .laws import Law, gain, measured
 
 
 @dataclass(frozen=True, eq=False)

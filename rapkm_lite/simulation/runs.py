@@ -7,15 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ._arguments import bounded, matvec, positive_number, real_array
-from ._closed_loop import Loop, encode, growth, run_lockstep, run_model_based
-from .actuation import distal_cross_products, drive_pairs
-from .control import PD, Law
-from .datafiles import read_toml
-from .engine import tables
-from .kinematics import ee_complement, inverse_kinematics
-from .manipulator import Manipulator, load
-from .trajectory import Trajectory, triangle
+from ..control.laws import PD, Law
+from ..engine import tables
+from ..machine.arguments import bounded, matvec, positive_number, real_array
+from ..machine.datafiles import read_toml
+from ..machine.manipulator import Manipulator, load
+from ..mechanics.actuation import distal_cross_products, drive_pairs
+from ..mechanics.kinematics import ee_complement, inverse_kinematics
+from ..mechanics.trajectory import Trajectory, triangle
+from .compiled import Loop, encode, growth, run_lockstep, run_model_based
 
 
 class SimulationError(RuntimeError):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import ConvergenceError, real_array
-from ._patience import patience
-from .computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from .control import PD, AntagonismFilter, CommandFilter, Law
-from .controller import Controller
-from .engine import lanes, tables
+from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
+from ..control.controller import Controller
+from ..control.laws import PD, AntagonismFilter, CommandFilter, Law
+from ..engine import lanes, tables
+from ..machine.arguments import ConvergenceError, real_array
+from .patience import patience
 
 LANES = 16
 _motions = weakref.WeakKeyDictionary()
@@ -82,7 +82,7 @@ def _diagonal(name: str, K: np.ndarray, size: int, N: int) -> np.ndarray:
 
 def _plain(array: np.ndarray):
     """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
-    from .engine.jit import COMPILED
+    from ..engine.jit import COMPILED
 
     return array if COMPILED else array.tolist()
 
@@ -99,7 +99,7 @@ def lockstep(robot, model, trajectory, code: Code, K_P, K_D, offsets, quantum, t
 
     history : for L = 1 the arrays that take the run, states, q_a, qd_a and c; None sums it up instead.
     """
-    from .engine.lockstep import closed_loops
+    from ..engine.lockstep import closed_loops
 
     L, N = offsets.shape
     w = np.zeros((lanes.SINGLES + lanes.BLOCKS * N, L))
@@ -143,7 +143,7 @@ def run_lockstep(robot, model, trajectory, code, offset, quantum, tau, states, q
 
 def run_model_based(robot, model, trajectory, code, offset, quantum, tau, *arrays) -> tuple[int, int]:
     """One run of a law with a model; returns status and sample."""
-    from .engine.model_based import closed_loop
+    from ..engine.model_based import closed_loop
 
     extra, N = tables.extra(robot), robot.n_arms
     with patience("model", N, extra), np.errstate(all="ignore"):
@@ -167,7 +167,7 @@ class Loop:
 
     def sense(self, k, state):
         """True base angles and rates (N,) at a state (x, y, vx, vy)."""
-        from .engine.plant import observe
+        from ..engine.plant import observe
 
         q, qd = np.empty(self.robot.n_arms), np.empty(self.robot.n_arms)
         observe(self.drives, self.machine[0], motion(self.trajectory)[k], *state, q, qd)
@@ -189,7 +189,7 @@ class Loop:
 
     def move(self, state, c):
         """The state after one hold, or None when the machine has left the workspace."""
-        from .engine.plant import advance
+        from ..engine.plant import advance
 
         with patience("plant", self.drives, self.extra), np.errstate(all="ignore"):
             try:

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     check_leading,
     joint_vectors,
     matvec,
@@ -19,9 +19,9 @@ from ._arguments import (
     tall_matrix,
     transpose,
 )
+from ..machine.manipulator import Manipulator
 from .dynamics import minimal_dynamics, nullspace_projector, orthogonal_complement
 from .kinematics import arm_vectors, cross, ee_complement_dot
-from .manipulator import Manipulator
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:

@@ -36,9 +36,9 @@ def exercises() -> dict[str, Exercise]:
     found = {}
     for lesson in LESSONS:
         try:
-            module = importlib.import_module(f"{__name__}.{lesson}")
+            module = importlib.import_module(f"{__package__}.{lesson}")
         except ModuleNotFoundError as error:
-            if error.name != f"{__name__}.{lesson}":
+            if error.name != f"{__package__}.{lesson}":
                 raise
             continue
         found |= module.EXERCISES

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     joint_indices,
     one_of,
     transpose,

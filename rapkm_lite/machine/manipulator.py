@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ._arguments import bounded, real_array
+from .arguments import bounded, real_array
 from .datafiles import UNITS, known, read_toml
 
 

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     bounded,
     check_leading,
     exact_array,
@@ -17,9 +17,9 @@ from ._arguments import (
     tall_matrix,
     transpose,
 )
+from ..machine.manipulator import Manipulator
 from .actuation import control_matrix, full_rank_qr
 from .kinematics import arm_vectors, cross
-from .manipulator import Manipulator
 
 
 def antagonism_filter(A) -> np.ndarray:

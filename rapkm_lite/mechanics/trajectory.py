@@ -6,10 +6,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arguments import exact_array, matvec, positive_number, real_array
-from .control import Desired
+from ..machine.arguments import exact_array, matvec, positive_number, real_array
+from ..machine.manipulator import Manipulator
 from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
-from .manipulator import Manipulator
+
+
+@dataclass(frozen=True, eq=False)
+class Desired:
+    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N)."""
+
+    n_arms: int
+    x: np.ndarray
+    xd: np.ndarray
+    xdd: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+
+    @property
+    def q_a(self) -> np.ndarray:
+        """Base angles (..., N), rad."""
+        return self.q[..., : self.n_arms]
+
+    @property
+    def qd_a(self) -> np.ndarray:
+        """Base rates (..., N), rad/s."""
+        return self.qd[..., : self.n_arms]
+
+    @property
+    def qdd_a(self) -> np.ndarray:
+        """Base accelerations (..., N), rad/s^2."""
+        return self.qdd[..., : self.n_arms]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arguments import (
+from ..machine.arguments import (
     joint_vectors,
     matvec,
     solve,
     transpose,
 )
-from .actuation import (
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import (
     control_matrix,
 )
-from .closure import estimate_pose
+from ..mechanics.closure import estimate_pose
+from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
+from ..mechanics.trajectory import Desired
 from .computed_torque import SwitchedCTC
-from .control import PD, Desired, Law
-from .kinematics import ee_complement, forward_kinematics, inverse_kinematics
-from .manipulator import Manipulator
+from .laws import PD, Law
 
 
 class Controller:

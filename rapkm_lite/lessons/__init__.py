@@ -1,0 +1,1 @@
+"""What belongs to the lessons: exercises with their checks."""
