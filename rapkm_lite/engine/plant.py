@@ -1,198 +1,232 @@
-"""The machine in end-effector coordinates: regular everywhere inside the workspace, so that the loops stay closed.
+"""The machine under runs side by side: `sense` what it does at a sample, `hold` torques until the next one.
 
-Everything is rational in the arm vectors a_i, d_i but for one square root per arm: no trigonometry in the loop.
-The two links of an arm are replaced by two inertias without coupling and a mass at the end-effector (`arm_table`), so
-that with v the end-effector velocity, b = d / (a x d) and l = a / (a x d) the link rates are b.v and -l.v, and
-
-    M = sum_i S1 b b^T + S2 l l^T + tip masses.
-
-Sizes come as tuples, whose length the compiler knows: ``drives`` has one entry per arm; ``extra`` has one when the
-machine has gravity or friction, else none.
+The end-effector position is the coordinate, regular everywhere inside the workspace, so that the loops stay closed.
+Loops run over arms, then over runs; what is summed over the arms follows in a loop of its own.
 """
 
 from __future__ import annotations
 
 import math
 
-from .jit import kernel, leaf
-from .lanes import SINGLES
-from .tables import BX, BY, COLUMNS, FRICTION, HALF, L1SQ, L2SQ, MEAN, MODE, S1, S2, SCALE, W1, W2
+from .jit import leaf, outlined
+from .leaves import accelerations, drag, geometry, inertia, share, small_angle, solve2
+from .rows import (
+    ACC, AD, AX, AY, B1, B2, BX, BY, C, FRICTION, FX, FY, HALF, INV, KX, KY, L1SQ, L2SQ, LOW, M11, M12, M22, MEAN,
+    MODE, NEAR, PUSH, QD, S1, S2, SAMPLE, SCALE, STATUS, STEP, STEPS, SVX, SVY, SX, SY, TVX, TVY, TX, TY, VX, VY, W1,
+    W2, Q, X, Y, at, of,
+)
+from .tables import ANGLE, COS, DONE, LEFT_WORKSPACE, SIN, TOO_STIFF, want
+
+# Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
+STIFF, FAST, MOST_STEPS = 1.5, 1.0, 4000.0
 
 
 @leaf
-def at(block, i, j, N, L):
-    """Index of lane j in row i of a block."""
-    return (SINGLES + block * N + i) * L + j
+def seen(arm, env, extra, place, x, y, vx, vy, dt):
+    """An arm at a sample: its rates, shares as in `leaves.share`, and a number that is not positive for a lost arm.
 
-
-@leaf
-def small_angle(s):
-    """arcsin(s) for |s| < 0.1 by its series."""
-    z = s * s
-    z2 = z * z
-    # In pairs, so that less waits for each other.
-    low = 1.0 + z * (1 / 6) + z2 * (3 / 40 + z * (5 / 112))
-    high = 35 / 1152 + z * (63 / 2816) + z2 * (231 / 13312 + z * (143 / 10240) + z2 * (6435 / 557056))
-    return s * (low + z2 * z2 * high)
-
-
-@leaf
-def turned_by(ux, uy, ax, ay, scale):
-    """Angle from the unit vector u to the vector a of length 1 / scale, rad."""
-    s, t = ux * ay - uy * ax, ux * ax + uy * ay
-    if abs(s * scale) <= 0.1 and t >= 0.0:
-        return small_angle(s * scale)
-    return math.atan2(s, t)
-
-
-@leaf
-def geometry(arms, i, x, y):
-    """Arm i with its tip at (x, y): arm vectors a, d, their product a.d, rows b = d / (a x d) and l = a / (a x d),
-    1 / (a x d), and (a x d)^2, which is not positive outside the reach.  Link rates are b.v and -l.v."""
-    o = i * COLUMNS
-    X, Y = x - arms[o + BX], y - arms[o + BY]
-    rho2 = X * X + Y * Y
-    kappa = 0.5 * rho2 + arms[o + HALF]
-    area2 = arms[o + L1SQ] * rho2 - kappa * kappa
-    den = arms[o + MODE] * math.sqrt(max(area2, 1e-300))
-    inverse = 1.0 / rho2
-    k, h = kappa * inverse, den * inverse
-    ax, ay = k * X + h * Y, k * Y - h * X
-    dx, dy, inv = X - ax, Y - ay, 1.0 / den
-    return ax, ay, dx, dy, 0.5 * rho2 - arms[o + MEAN], dx * inv, dy * inv, ax * inv, ay * inv, inv, area2
-
-
-@leaf
-def smooth_sign(z):
-    """tanh(z) without branches, by halving the argument: t = e^u - 1 at u = -2 |z| / 256, doubled eight times."""
-    u = max(-2.0 * abs(z), -40.0) * 0.00390625
-    t = u * (1.0 + u * (1 / 2 + u * (1 / 6 + u * (1 / 24 + u * (1 / 120 + u * (1 / 720 + u * (1 / 5040 + u * (
-        1 / 40320 + u * (1 / 362880)))))))))
-    for _ in range(8):
-        t = t * (2.0 + t)
-    t = t / (2.0 + t)
-    return -t if z > 0.0 else t
-
-
-@leaf
-def add_arm(arms, i, env, extra, place, vx, vy, sums):
-    """Add the share of arm i without its torque: mass matrix, force at zero acceleration, smallest (a x d)^2."""
-    m11, m12, m22, fx, fy, low = sums
-    ax, ay, dx, dy, ad, bx, by, lx, ly, inv, area2 = place
-    o = i * COLUMNS
+    place : what `geometry` gives.
+    """
+    base_x, base_y, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction = arm
+    ax, ay, dx, dy, ad, inv, _ = place
+    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
     base, back = bx * vx + by * vy, lx * vx + ly * vy
-    base2, back2 = base * base * inv, back * back * inv
-    # Accelerations of the proximal link and, with the opposite sign, of the distal link at zero xdd.
-    base_acc, back_acc = base2 * ad + back2 * arms[o + L2SQ], base2 * arms[o + L1SQ] + back2 * ad
-    sx, sy, tx, ty = arms[o + S1] * bx, arms[o + S1] * by, arms[o + S2] * lx, arms[o + S2] * ly
-    fx, fy = fx - sx * base_acc - tx * back_acc, fy - sy * base_acc - ty * back_acc
+    base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
+    m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
     if len(extra) > 0:
-        drag = arms[o + W1] * (env[0] * ay - env[1] * ax) + arms[o + FRICTION] * smooth_sign(base * env[2])
-        weight = arms[o + W2] * (env[0] * dy - env[1] * dx)
-        fx, fy = fx - bx * drag + lx * weight, fy - by * drag + ly * weight
-    return m11 + sx * bx + tx * lx, m12 + sx * by + tx * ly, m22 + sy * by + ty * ly, fx, fy, min(low, area2)
+        drive, distal = drag(w1, w2, friction, env, ax, ay, dx, dy, base)
+        fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
+    # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector coordinates
+    # a Runge-Kutta step could jump over that instant.
+    return base, bx, by, base_acc, m11, m12, m22, fx, fy, 1.0 - dt * ad * inv * (base + back)
+
+
+@outlined
+def sense(lanes, arms, env, extra, row, w, dt):
+    """Base angles and rates, geometry and shares of all arms; returns how many arms are far from where they should be."""
+    L, W = len(lanes), len(arms)
+    count = 0
+    for i in range(W):
+        angle, ux, uy = want(row, ANGLE, i, W), want(row, COS, i, W), want(row, SIN, i, W)
+        for j in range(L):
+            x, y, vx, vy = w[of(X, j, W, L)], w[of(Y, j, W, L)], w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+            arm = (w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)],
+                   w[at(HALF, i, j, W, L)], w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[at(S1, i, j, W, L)],
+                   w[at(S2, i, j, W, L)], w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)])
+            place = geometry(arm[0], arm[1], arm[2], arm[4], arm[5], arm[6], x, y)
+            rate, bx, by, acc, m11, m12, m22, fx, fy, low = seen(arm, env, extra, place, x, y, vx, vy, dt)
+            ax, ay = place[0], place[1]
+            # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
+            s, t = (ux * ay - uy * ax) * w[at(SCALE, i, j, W, L)], ux * ax + uy * ay
+            near = min(0.1 - abs(s), t)
+            w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = angle + small_angle(s), rate
+            w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)], w[at(AD, i, j, W, L)] = ax, ay, place[4]
+            w[at(INV, i, j, W, L)], w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = place[5], bx, by
+            w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
+            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)], w[at(ACC, i, j, W, L)] = fx, fy, acc
+            w[at(LOW, i, j, W, L)] = low
+            count += 1 if near < 0.0 else 0
+    return count
 
 
 @leaf
-def solve2(m11, m12, m22, fx, fy):
-    """Solve a symmetric 2 x 2 system."""
-    scale = 1.0 / (m11 * m22 - m12 * m12)
-    return (m22 * fx - m12 * fy) * scale, (m11 * fy - m12 * fx) * scale
+def mend(lanes, arms, row, w):
+    """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent."""
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+        for j in range(L):
+            ax, ay = w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)]
+            s, t = ux * ay - uy * ax, ux * ax + uy * ay
+            if not (abs(s * w[at(SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
+                w[at(Q, i, j, W, L)] = want(row, ANGLE, i, W) + math.atan2(s, t)
+
+
+@outlined
+def pull(lanes, arms, env, extra, w):
+    """Shares of all arms at the state of a stage, under the torques PUSH."""
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        for j in range(L):
+            arm = (w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)],
+                   w[at(HALF, i, j, W, L)], w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[at(S1, i, j, W, L)],
+                   w[at(S2, i, j, W, L)], w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)])
+            m11, m12, m22, fx, fy, bx, by, area2 = share(
+                arm, env, extra, w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(SVX, j, W, L)], w[of(SVY, j, W, L)])
+            c = w[at(PUSH, i, j, W, L)]
+            w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
+            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c
+            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
+
+
+@outlined
+def join(lanes, arms, env, w):
+    """End-effector accelerations from the shares of the arms."""
+    L, W = len(lanes), len(arms)
+    for j in range(L):
+        m11, m12, m22, fx, fy = env[3], -0.0, env[3], -0.0, -0.0
+        for i in range(W):
+            m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
+            fx, fy = fx + w[at(FX, i, j, W, L)], fy + w[at(FY, i, j, W, L)]
+        w[of(KX, j, W, L)], w[of(KY, j, W, L)] = solve2(m11, m12, m22, fx, fy)
 
 
 @leaf
-def add_torque(place, c, sums):
-    """Add the force of the torque c of an arm."""
-    m11, m12, m22, fx, fy, low = sums
-    return m11, m12, m22, fx + place[5] * c, fy + place[6] * c, low
+def stiffness(friction, env, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
+    """What friction of a drive asks of a hold: lambda dt, |qdd| dt / v0, and 1 where the drive can pass zero in it.
 
-
-@leaf
-def drive(drives, g0, g1, g2, g3, c, first, stride, sums):
-    """Add the forces of the torques c[first + i * stride] of the first four arms."""
-    sums = add_torque(g1, c[first + stride], add_torque(g0, c[first], sums))
-    if len(drives) > 2:
-        sums = add_torque(g2, c[first + 2 * stride], sums)
-    if len(drives) > 3:
-        sums = add_torque(g3, c[first + 3 * stride], sums)
-    return sums
-
-
-@leaf
-def acceleration(drives, arms, env, extra, x, y, vx, vy, c, first, stride, low):
-    """End-effector acceleration under the torques c[first + i * stride], and the smallest of low and all (a x d)^2.
-
-    Written out for up to four arms: straight code is what the compiler turns into vector instructions over runs.
+    lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
     """
-    N = len(drives)
-    g0, g1 = geometry(arms, 0, x, y), geometry(arms, 1, x, y)
-    g2 = geometry(arms, 2, x, y) if N > 2 else g0
-    g3 = geometry(arms, 3, x, y) if N > 3 else g0
-    # -0.0 is the zero that an addition does not need.
-    sums = add_arm(arms, 0, env, extra, g0, vx, vy, (env[3], -0.0, env[3], -0.0, -0.0, low))
-    sums = add_arm(arms, 1, env, extra, g1, vx, vy, sums)
-    if N > 2:
-        sums = add_arm(arms, 2, env, extra, g2, vx, vy, sums)
-    if N > 3:
-        sums = add_arm(arms, 3, env, extra, g3, vx, vy, sums)
-    for i in range(4, N):
-        place = geometry(arms, i, x, y)
-        sums = add_torque(place, c[first + i * stride], add_arm(arms, i, env, extra, place, vx, vy, sums))
-    m11, m12, m22, fx, fy, low = drive(drives, g0, g1, g2, g3, c, first, stride, sums)
-    gx, gy = solve2(m11, m12, m22, fx, fy)
-    return gx, gy, low
+    gx, gy = solve2(m11, m12, m22, bx, by)
+    yields = friction * (bx * gx + by * gy)
+    qdd = abs(bx * kx + by * ky + acc)
+    passes = abs(rate) < 20.0 / env[2] + (qdd + 2.0 * yields) * dt
+    return yields * env[2] * dt, (qdd + yields) * dt * env[2], 1.0 if passes and friction > 0.0 else 0.0
+
+
+@outlined
+def count_steps(lanes, arms, env, w, dt):
+    """Steps of equal length that each run needs in a hold because of friction; returns the largest number."""
+    L, W = len(lanes), len(arms)
+    most = 1.0
+    for j in range(L):
+        m11, m12, m22 = env[3], -0.0, env[3]
+        for i in range(W):
+            m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
+        stiff, fast, near = 0.0, 0.0, 0.0
+        for i in range(W):
+            a, b, c = stiffness(w[at(FRICTION, i, j, W, L)], env, m11, m12, m22, w[at(B1, i, j, W, L)],
+                                w[at(B2, i, j, W, L)], w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)],
+                                w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
+            stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
+        n = max(1.0, near * math.ceil(max(stiff / STIFF, fast / FAST)))
+        w[of(STEPS, j, W, L)] = n
+        w[of(STEP, j, W, L)] = dt / n if n <= MOST_STEPS else dt
+        # A run beyond the limit takes one step and is judged afterwards.
+        most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else 1.0)
+    return most
 
 
 @leaf
-def runge_kutta(drives, arms, env, extra, x, y, vx, vy, k1x, k1y, low, c, first, stride, dt):
-    """The rest of a Runge-Kutta step (order 4) after its first stage, and the smallest of low and all (a x d)^2."""
-    h = 0.5 * dt
-    ux, uy = vx + h * k1x, vy + h * k1y
-    k2x, k2y, low = acceleration(drives, arms, env, extra, x + h * vx, y + h * vy, ux, uy, c, first, stride, low)
-    wx, wy = vx + h * k2x, vy + h * k2y
-    k3x, k3y, low = acceleration(drives, arms, env, extra, x + h * ux, y + h * uy, wx, wy, c, first, stride, low)
-    zx, zy = vx + dt * k3x, vy + dt * k3y
-    k4x, k4y, low = acceleration(drives, arms, env, extra, x + dt * wx, y + dt * wy, zx, zy, c, first, stride, low)
-    s = dt / 6.0
-    return (x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy),
-            vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y), low)
+def stage(lanes, arms, w, part, weight):
+    """Add a stage to the sums with a weight, and go to the state of the next one, a part of the step away."""
+    L, W = len(lanes), len(arms)
+    for j in range(L):
+        h = part * w[of(STEP, j, W, L)]
+        vx, vy, kx, ky = w[of(SVX, j, W, L)], w[of(SVY, j, W, L)], w[of(KX, j, W, L)], w[of(KY, j, W, L)]
+        w[of(TX, j, W, L)] += weight * vx
+        w[of(TY, j, W, L)] += weight * vy
+        w[of(TVX, j, W, L)] += weight * kx
+        w[of(TVY, j, W, L)] += weight * ky
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)] + h * vx, w[of(Y, j, W, L)] + h * vy
+        w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)] + h * kx, w[of(VY, j, W, L)] + h * ky
 
 
 @leaf
-def hold(drives, arms, env, extra, x, y, vx, vy, c, dt):
-    """One hold of the torques c (N,): the next state, and a number that is not positive if an arm was lost on the way.
-
-    An arm that its present elbow rate would stretch or fold before the hold ends is lost too: in end-effector
-    coordinates a Runge-Kutta step could jump over that instant.
-    """
-    low = 1e300
-    for i in range(len(drives)):
-        _, _, _, _, ad, bx, by, lx, ly, inv, _ = geometry(arms, i, x, y)
-        low = min(low, 1.0 - dt * ad * inv * ((bx + lx) * vx + (by + ly) * vy))
-    k1x, k1y, low = acceleration(drives, arms, env, extra, x, y, vx, vy, c, 0, 1, low)
-    x, y, vx, vy, low = runge_kutta(drives, arms, env, extra, x, y, vx, vy, k1x, k1y, low, c, 0, 1, dt)
-    for i in range(len(drives)):
-        low = min(low, geometry(arms, i, x, y)[10])
-    return x, y, vx, vy, low
-
-
-@kernel
-def advance(drives, extra, arms, env, x, y, vx, vy, c, dt):
-    """`hold` for a controller in Python."""
-    return hold(drives, arms, env, extra, x, y, vx, vy, c, dt)
+def step(lanes, arms, env, extra, w):
+    """A Runge-Kutta step (order 4) of length STEP after its first stage."""
+    L, W = len(lanes), len(arms)
+    for j in range(L):
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
+        w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+        w[of(TX, j, W, L)] = w[of(TY, j, W, L)] = w[of(TVX, j, W, L)] = w[of(TVY, j, W, L)] = 0.0
+    stage(lanes, arms, w, 0.5, 1.0)
+    for s in range(3):
+        pull(lanes, arms, env, extra, w)
+        join(lanes, arms, env, w)
+        # The last stage leaves its state unused.
+        stage(lanes, arms, w, 0.5 if s == 0 else 1.0, 1.0 if s == 2 else 2.0)
+    for j in range(L):
+        h = w[of(STEP, j, W, L)] / 6.0
+        w[of(X, j, W, L)] += h * w[of(TX, j, W, L)]
+        w[of(Y, j, W, L)] += h * w[of(TY, j, W, L)]
+        w[of(VX, j, W, L)] += h * w[of(TVX, j, W, L)]
+        w[of(VY, j, W, L)] += h * w[of(TVY, j, W, L)]
 
 
 @leaf
-def base_angles(drives, arms, row, x, y, vx, vy, q, qd):
-    """True base angles and rates, written to q and qd (N,); `row` is the desired motion."""
-    N = len(drives)
-    for i in range(N):
-        ax, ay, _, _, _, bx, by, _, _, _, _ = geometry(arms, i, x, y)
-        q[i] = row[6 + i] + turned_by(row[6 + 6 * N + i], row[6 + 7 * N + i], ax, ay, arms[i * COLUMNS + SCALE])
-        qd[i] = bx * vx + by * vy
+def hold(lanes, arms, env, extra, w, dt, k):
+    """Hold the torques C for dt; returns how many runs have ended."""
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        for j in range(L):
+            c = w[at(C, i, j, W, L)]
+            w[at(PUSH, i, j, W, L)] = c
+            w[at(FX, i, j, W, L)] += w[at(B1, i, j, W, L)] * c
+            w[at(FY, i, j, W, L)] += w[at(B2, i, j, W, L)] * c
+    join(lanes, arms, env, w)
+    most = 1.0
+    for j in range(L):
+        w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
+    if len(extra) > 0:
+        most = count_steps(lanes, arms, env, w, dt)
+    step(lanes, arms, env, extra, w)
+    for s in range(1, int(most)):
+        for j in range(L):
+            # A run that needs fewer steps stands still while others go on.
+            w[of(STEP, j, W, L)] = w[of(STEP, j, W, L)] if s < w[of(STEPS, j, W, L)] else 0.0
+            w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
+            w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+        pull(lanes, arms, env, extra, w)
+        join(lanes, arms, env, w)
+        step(lanes, arms, env, extra, w)
+    return judge(lanes, arms, w, k)
 
 
-@kernel
-def observe(drives, arms, row, x, y, vx, vy, q, qd):
-    """`base_angles` for a controller in Python."""
-    base_angles(drives, arms, row, x, y, vx, vy, q, qd)
+@outlined
+def judge(lanes, arms, w, k):
+    """Mark the runs that were lost in the hold after sample k; returns how many runs have ended."""
+    L, W = len(lanes), len(arms)
+    ended = 0
+    for j in range(L):
+        low = 1e300
+        for i in range(W):
+            low = min(low, w[at(LOW, i, j, W, L)])
+        size = (abs(w[of(X, j, W, L)]) + abs(w[of(Y, j, W, L)])) + (abs(w[of(VX, j, W, L)]) + abs(w[of(VY, j, W, L)]))
+        status = DONE if low > 0.0 and size < 1e300 else LEFT_WORKSPACE
+        status = status if w[of(STEPS, j, W, L)] <= MOST_STEPS else TOO_STIFF
+        running = w[of(STATUS, j, W, L)] == DONE
+        w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
+        w[of(STATUS, j, W, L)] = status if running else w[of(STATUS, j, W, L)]
+        ended += w[of(STATUS, j, W, L)] != DONE
+    return ended

@@ -1,85 +1,108 @@
-"""Where the controller thinks the machine is: control matrix at the true or at the measured pose, in lockstep."""
+"""Where the controller thinks the machine is: its pose and control matrix A, true or by least squares."""
 
 from __future__ import annotations
 
 import math
 
 from .jit import leaf, outlined
-from .lanes import A1, A2, DX, DY, FAR, INV, PX, PX1, PX2, PY, PY1, PY2, SAMPLE, STATUS, TODO, E, X, Y
-from .plant import at, geometry, small_angle, solve2
-from .tables import COLUMNS, DONE, L2SQ, NO_POSE, SCALE
+from .leaves import geometry, small_angle, solve2
+from .rows import (
+    A1, A2, B1, B2, BX, BY, ED, FAR, GX, GY, HALF, L1SQ, L2SQ, MEAN, MODE, MODEL, NEAR, P11, P12, P22, PVX, PVY, PX,
+    PX1, PX2, PY, PY1, PY2, SAMPLE, SCALE, STATUS, TODO, VX, VY, E, X, Y, at, of,
+)
+from .tables import COS, DONE, NO_POSE, RATE, SIN, want
 
 
 @leaf
-def true_pose(lanes, drives, model, same, w):
-    """Control matrix of the controller's model at the true end-effector position."""
-    L, N = len(lanes), len(drives)
+def true_pose(lanes, drives, arms, law, w):
+    """The true end-effector position and velocity, and A there."""
+    L, W = len(lanes), len(arms)
     for j in range(L):
-        for i in range(N):
-            if same:
-                inv = w[at(INV, i, j, N, L)]
-                w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = w[at(DX, i, j, N, L)] * inv, w[at(DY, i, j, N, L)] * inv
-            else:
-                place = geometry(model, i, w[X * L + j], w[Y * L + j])
-                w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = place[5], place[6]
-
-
-@leaf
-def pose_terms(model, i, ux, uy, e, x, y):
-    """Shares of arm i in the Hessian and gradient of the pose error, its row of the control matrix, and a flag."""
-    ax, ay, _, _, ad, bx, by, lx, ly, inv, area2 = geometry(model, i, x, y)
-    s = (ux * ay - uy * ax) * model[i * COLUMNS + SCALE]
-    # The flag is negative where the series does not hold or the arm does not reach.
-    flag = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
-    r = e - small_angle(s)
-    # Second derivative of the base angle: (a.d b b^T + l2^2 j j^T) / (a x d).
-    h = r * inv
-    g1, g2 = 1.0 - h * ad, h * model[i * COLUMNS + L2SQ]
-    return (g1 * bx * bx - g2 * lx * lx, g1 * bx * by - g2 * lx * ly, g1 * by * by - g2 * ly * ly,
-            bx * r, by * r, bx, by, flag)
+        w[of(PX, j, W, L)], w[of(PY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
+        w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+    if law.same:
+        for i in range(W):
+            for j in range(L):
+                w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)]
+    else:
+        control_rows(lanes, drives, arms, w)
 
 
 @outlined
-def newton_step(lanes, drives, model, row, w, tolerance):
-    """One Newton step for the least-squares pose of all lanes; returns how many lanes need another one."""
-    L, N = len(lanes), len(drives)
+def control_rows(lanes, drives, arms, w):
+    """Rows b = d / (a x d) of A at the pose."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for i in range(N):
+        for j in range(L):
+            place = geometry(w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)],
+                             w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + HALF, i, j, W, L)],
+                             w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
+                             w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = place[2] * place[5], place[3] * place[5]
+
+
+@outlined
+def newton_step(lanes, drives, arms, row, w, tolerance):
+    """One Newton step for the least-squares pose of all runs; returns how many need another one."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for i in range(N):
+        ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+        for j in range(L):
+            l2sq = w[at(MODEL + L2SQ, i, j, W, L)]
+            ax, ay, dx, dy, ad, inv, area2 = geometry(
+                w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
+                w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+            bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
+            s = (ux * ay - uy * ax) * w[at(MODEL + SCALE, i, j, W, L)]
+            # Negative where the series does not hold or the arm does not reach.
+            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
+            r = w[at(E, i, j, W, L)] - small_angle(s)
+            # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
+            h = r * inv
+            g1, g2 = 1.0 - h * ad, h * l2sq
+            w[at(P11, i, j, W, L)] = g1 * bx * bx - g2 * lx * lx
+            w[at(P12, i, j, W, L)] = g1 * bx * by - g2 * lx * ly
+            w[at(P22, i, j, W, L)] = g1 * by * by - g2 * ly * ly
+            w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = bx * r, by * r
+            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
     count = 0
     for j in range(L):
-        px, py, todo = w[PX * L + j], w[PY * L + j], w[TODO * L + j]
         m11 = m12 = m22 = fx = fy = -0.0
-        flag = 1.0
+        near = 1.0
         for i in range(N):
-            p11, p12, p22, gx, gy, a1, a2, f = pose_terms(model, i, row[6 + 6 * N + i], row[6 + 7 * N + i],
-                                                          w[at(E, i, j, N, L)], px, py)
-            m11, m12, m22, fx, fy = m11 + p11, m12 + p12, m22 + p22, fx + gx, fy + gy
-            flag = min(flag, f)
-            w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = a1, a2
+            m11, m12, m22 = m11 + w[at(P11, i, j, W, L)], m12 + w[at(P12, i, j, W, L)], m22 + w[at(P22, i, j, W, L)]
+            fx, fy = fx + w[at(GX, i, j, W, L)], fy + w[at(GY, i, j, W, L)]
+            near = min(near, w[at(NEAR, i, j, W, L)])
         sx, sy = solve2(m11, m12, m22, fx, fy)
-        flag = min(min(flag, m11), m11 * m22 - m12 * m12)
-        size = max(abs(sx), abs(sy))
-        more = todo if flag > 0.0 and size >= tolerance else 0.0
-        w[FAR * L + j] += 0.0 if flag > 0.0 else todo
+        near = min(min(near, m11), m11 * m22 - m12 * m12)
+        todo = w[of(TODO, j, W, L)]
+        more = todo if near > 0.0 and max(abs(sx), abs(sy)) >= tolerance else 0.0
+        w[of(FAR, j, W, L)] += 0.0 if near > 0.0 else todo
         # A run that is done stays where it is and finds the same matrix again, whatever its neighbours still need.
-        w[PX * L + j] = px + sx if more > 0.0 else px
-        w[PY * L + j] = py + sy if more > 0.0 else py
-        w[TODO * L + j] = more
+        w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
+        w[of(PY, j, W, L)] += sy if more > 0.0 else 0.0
+        w[of(TODO, j, W, L)] = more
         count += 1 if more > 0.0 else 0
     return count
 
 
-@leaf
-def gauss_newton(drives, model, row, w, j, L, x, y, tolerance):
-    """Least-squares pose of one lane from a rough start; returns it, and whether it converged."""
-    N = len(drives)
+@outlined
+def gauss_newton(drives, arms, row, w, j, L, x, y, tolerance):
+    """Least-squares pose of one run from a rough start; returns it, and whether it converged."""
+    N, W = len(drives), len(arms)
     for _ in range(50):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            ax, ay, _, _, _, bx, by, _, _, _, area2 = geometry(model, i, x, y)
+            ax, ay, dx, dy, _, inv, area2 = geometry(
+                w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)], x, y)
             if not area2 > 0.0:
                 return x, y, False
-            ux, uy = row[6 + 6 * N + i], row[6 + 7 * N + i]
-            r = w[at(E, i, j, N, L)] - math.atan2(ux * ay - uy * ax, ux * ax + uy * ay)
-            w[at(A1, i, j, N, L)], w[at(A2, i, j, N, L)] = bx, by
+            bx, by = dx * inv, dy * inv
+            ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+            r = w[at(E, i, j, W, L)] - math.atan2(ux * ay - uy * ax, ux * ax + uy * ay)
+            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
         sx, sy = solve2(m11, m12, m22, fx, fy)
         if abs(sx) < tolerance and abs(sy) < tolerance:
@@ -89,32 +112,42 @@ def gauss_newton(drives, model, row, w, j, L, x, y, tolerance):
 
 
 @leaf
-def measured_pose(lanes, drives, model, row, w, k, smooth):
-    """Least-squares pose of the measured base angles, and the control matrix there (`estimate_pose`)."""
-    L = len(lanes)
-    tolerance = 1e-13 / model[SCALE]
+def measured_pose(lanes, drives, arms, row, w, k, smooth):
+    """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
+    L, W = len(lanes), len(arms)
+    tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
     for j in range(L):
-        w[TODO * L + j], w[FAR * L + j] = 1.0, 0.0
-        if smooth:
-            # The pose moves on smoothly: a parabola through the last three.
-            guess_x = 3.0 * (w[PX * L + j] - w[PX1 * L + j]) + w[PX2 * L + j]
-            guess_y = 3.0 * (w[PY * L + j] - w[PY1 * L + j]) + w[PY2 * L + j]
-        else:
-            guess_x, guess_y = w[PX * L + j], w[PY * L + j]
-        w[PX2 * L + j], w[PY2 * L + j] = w[PX1 * L + j], w[PY1 * L + j]
-        w[PX1 * L + j], w[PY1 * L + j] = w[PX * L + j], w[PY * L + j]
-        w[PX * L + j], w[PY * L + j] = guess_x, guess_y
+        x, y = w[of(PX, j, W, L)], w[of(PY, j, W, L)]
+        x1, y1 = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
+        # The pose moves on smoothly, unless angles are stepped: a parabola through the last three.
+        w[of(PX, j, W, L)] = 3.0 * (x - x1) + w[of(PX2, j, W, L)] if smooth else x
+        w[of(PY, j, W, L)] = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
+        w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
+        w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
     count = L
     for _ in range(12):
         if count > 0:
-            count = newton_step(lanes, drives, model, row, w, tolerance)
+            count = newton_step(lanes, drives, arms, row, w, tolerance)
     rough = 0.0
     for j in range(L):
-        rough += w[FAR * L + j] + w[TODO * L + j]
+        rough += w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)]
     if rough > 0.0:
         for j in range(L):
-            if w[FAR * L + j] + w[TODO * L + j] > 0.0 and w[STATUS * L + j] == DONE:
-                px, py, found = gauss_newton(drives, model, row, w, j, L, w[PX1 * L + j], w[PY1 * L + j], tolerance)
-                w[PX * L + j], w[PY * L + j] = px, py
+            if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
+                px, py, found = gauss_newton(drives, arms, row, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)],
+                                             tolerance)
+                w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
-                    w[STATUS * L + j], w[SAMPLE * L + j] = NO_POSE, k
+                    w[of(STATUS, j, W, L)], w[of(SAMPLE, j, W, L)] = NO_POSE, k
+
+
+@outlined
+def measured_rate(lanes, drives, arms, row, w):
+    """End-effector velocity by least squares from the measured base rates."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for j in range(L):
+        m11 = m12 = m22 = fx = fy = -0.0
+        for i in range(N):
+            a1, a2, rate = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(ED, i, j, W, L)] + want(row, RATE, i, W)
+            m11, m12, m22, fx, fy = m11 + a1 * a1, m12 + a1 * a2, m22 + a2 * a2, fx + a1 * rate, fy + a2 * rate
+        w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve2(m11, m12, m22, fx, fy)

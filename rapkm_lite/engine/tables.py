@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
-# What a run ended with; laws; filters; pose sources.
-DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR = range(4)
-PD, APD, CTC, SWITCHED, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2 = range(7)
-NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
-MEASURED, TRUE, TRUE_SAME = range(3)
+from .jit import leaf
 
-# Columns of the arm table, which is flat: entry i * COLUMNS + BX.
-COLUMNS = 14
-BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE = range(COLUMNS)
+# What a run ended with; laws; filters; pose sources.
+DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
+PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(8)
+NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
+MEASURED, TRUE = range(2)
+
+Machine = namedtuple("Machine", "env extra")
+Motion = namedtuple("Motion", "table dt")
+Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
+Law = namedtuple("Law", "form filter pose same switched")
+Faults = namedtuple("Faults", "limit alive held jump")
+History = namedtuple("History", "states q_a qd_a c pairs")
+
+# Rows of the arm table, (14, N).
+ARM_ROWS = 15
+
+# Blocks of the motion table, one number per arm, after x, xd and xdd.
+ANGLE, RATE, ACCELERATION, ELBOW, ELBOW_RATE, ELBOW_ACCELERATION, COS, SIN, ELBOW_COS, ELBOW_SIN = range(10)
+
+
+@leaf
+def want(row, block, i, W):
+    """Desired motion of arm i at a sample."""
+    return row[6 + block * W + i]
 
 
 def arm_table(robot) -> np.ndarray:
-    """The constants of each arm that the kernels need, (N * COLUMNS,)."""
+    """The constants of each arm that the kernels need, (15, N), in the order of `rows`."""
     l1, l2 = robot.lengths.T
     proximal, distal, _ = robot.arm_inertias.T
     w1, w2 = robot.arm_moments.T
     mass = _tip_masses(robot)
-    return np.column_stack([
-        robot.base, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2, robot.mode,
-        proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction, 1 / l1]).ravel()
+    return np.stack([
+        *robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2, robot.mode,
+        proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction, 1 / l1, 1 / (l1 * l2)])
 
 
 def _tip_masses(robot) -> np.ndarray:
@@ -39,12 +58,14 @@ def environment(robot) -> np.ndarray:
     return np.array([*robot.gravity, 1 / robot.friction_velocity, _tip_masses(robot).sum()])
 
 
-def motion_table(trajectory) -> np.ndarray:
-    """Desired motion per sample: x, xd, xdd, q, qd, qdd and the unit vectors along the proximal links, (k, 6 + 8N)."""
+def motion_table(trajectory, width: int) -> np.ndarray:
+    """Desired motion per sample, (k, 6 + 10 width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
-    angle = trajectory.q[:, :N]
-    return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, trajectory.q, trajectory.qd, trajectory.qdd,
-                            np.cos(angle), np.sin(angle)])
+    q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
+    blocks = [q[:, :N], qd[:, :N], qdd[:, :N], q[:, N:], qd[:, N:], qdd[:, N:],
+              np.cos(q[:, :N]), np.sin(q[:, :N]), np.cos(q[:, N:]), np.sin(q[:, N:])]
+    arms = np.minimum(np.arange(width), N) % N
+    return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks)])
 
 
 def sizes(count: int) -> tuple:
@@ -52,6 +73,6 @@ def sizes(count: int) -> tuple:
     return ((),) * count
 
 
-def extra(robot) -> tuple:
-    """`sizes(1)` for a machine with gravity or friction, else `sizes(0)`."""
-    return sizes(int(bool(robot.friction.any() or robot.gravity.any())))
+def machine(robot) -> Machine:
+    """Environment of a machine; `extra` has an entry when it has gravity or friction."""
+    return Machine(environment(robot), sizes(int(bool(robot.friction.any() or robot.gravity.any()))))

@@ -1,0 +1,103 @@
+"""The formulas of one arm, without loops or memory: every layout of the engine is made of them.
+
+Everything is rational in the arm vectors a, d but for one square root per arm: no trigonometry in the loop.  The two
+links of an arm are replaced by two inertias S1, S2 without coupling and a mass at the end-effector (`tables`), so that
+with v the end-effector velocity, b = d / (a x d) and l = a / (a x d) the link rates are b.v and -l.v, and
+
+    M = sum_i S1 b b^T + S2 l l^T + tip masses.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .jit import leaf
+
+
+@leaf
+def solve2(m11, m12, m22, fx, fy):
+    """Solve a symmetric 2 x 2 system."""
+    scale = 1.0 / (m11 * m22 - m12 * m12)
+    return (m22 * fx - m12 * fy) * scale, (m11 * fy - m12 * fx) * scale
+
+
+@leaf
+def small_angle(s):
+    """arcsin(s) for |s| < 0.1 by its series."""
+    z = s * s
+    z2 = z * z
+    # In pairs, so that less waits for each other.
+    low = 1.0 + z * (1 / 6) + z2 * (3 / 40 + z * (5 / 112))
+    high = 35 / 1152 + z * (63 / 2816) + z2 * (231 / 13312 + z * (143 / 10240) + z2 * (6435 / 557056))
+    return s * (low + z2 * z2 * high)
+
+
+@leaf
+def smooth_sign(z):
+    """tanh(z) without branches, by halving the argument: t = e^u - 1 at u = -2 |z| / 256, doubled eight times."""
+    u = max(-2.0 * abs(z), -40.0) * 0.00390625
+    t = u * (1.0 + u * (1 / 2 + u * (1 / 6 + u * (1 / 24 + u * (1 / 120 + u * (1 / 720 + u * (1 / 5040 + u * (
+        1 / 40320 + u * (1 / 362880)))))))))
+    for _ in range(8):
+        t = t * (2.0 + t)
+    t = t / (2.0 + t)
+    return -t if z > 0.0 else t
+
+
+@leaf
+def geometry(base_x, base_y, l1sq, half, mean, mode, x, y):
+    """An arm with its tip at (x, y): arm vectors a, d, their product a.d, 1 / (a x d), and (a x d)^2, which is not
+    positive outside the reach."""
+    X, Y = x - base_x, y - base_y
+    rho2 = X * X + Y * Y
+    kappa = 0.5 * rho2 + half
+    area2 = l1sq * rho2 - kappa * kappa
+    inside = max(area2, 1e-300)
+    root, inverse = math.sqrt(inside), 1.0 / rho2
+    k, h = kappa * inverse, root * (mode * inverse)
+    rest = 1.0 - k
+    return (k * X + h * Y, k * Y - h * X, rest * X - h * Y, rest * Y + h * X, 0.5 * rho2 - mean,
+            root * (mode / inside), area2)
+
+
+@leaf
+def accelerations(base, back, base_ref, back_ref, ad, inv, l1sq, l2sq):
+    """Of the proximal link and, with the opposite sign, of the distal link at zero xdd; `back` is l.v.
+
+    Bilinear in the rates and the reference rates, which are the same but in APD laws.
+    """
+    base2, back2 = base * base_ref * inv, back * back_ref * inv
+    return base2 * ad + back2 * l2sq, base2 * l1sq + back2 * ad
+
+
+@leaf
+def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
+    """Share of an arm in the mass matrix and in the force at zero xdd: m11, m12, m22, fx, fy."""
+    sx, sy, tx, ty = s1 * bx, s1 * by, s2 * lx, s2 * ly
+    return (sx * bx + tx * lx, sx * by + tx * ly, sy * by + ty * ly,
+            -(sx * base_acc + tx * back_acc), -(sy * base_acc + ty * back_acc))
+
+
+@leaf
+def drag(w1, w2, friction, env, ax, ay, dx, dy, base):
+    """Gravity and friction of an arm at its two links: torques in N m that oppose the drive and the distal link."""
+    return (w1 * (env[0] * ay - env[1] * ax) + friction * smooth_sign(base * env[2]),
+            w2 * (env[0] * dy - env[1] * dx))
+
+
+@leaf
+def share(arm, env, extra, x, y, vx, vy):
+    """An arm in the equations of motion, without its torque: m11, m12, m22, fx, fy; b; (a x d)^2.
+
+    arm : base_x, base_y, l1^2, l2^2, half, mean, mode, S1, S2, w1, w2, friction (`tables.arm_table`).
+    """
+    base_x, base_y, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction = arm
+    ax, ay, dx, dy, ad, inv, area2 = geometry(base_x, base_y, l1sq, half, mean, mode, x, y)
+    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
+    base, back = bx * vx + by * vy, lx * vx + ly * vy
+    base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
+    m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
+    if len(extra) > 0:
+        drive, distal = drag(w1, w2, friction, env, ax, ay, dx, dy, base)
+        fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
+    return m11, m12, m22, fx, fy, bx, by, area2

@@ -1,0 +1,50 @@
+"""The work table `w` of runs side by side: one flat array, because the compiler then sees that no two rows overlap.
+
+First the pair rows, one number per arm and run: row b of arm i and run j is entry (b W + i) L + j; then the run rows,
+one number per run.  W is the number of arms, in a compiled single run filled up to whole vector registers with arms
+that weigh and do nothing; L is the number of runs.  Both come as tuples, whose length the compiler knows.
+"""
+
+from __future__ import annotations
+
+from .jit import leaf
+
+# The arms of the machine as in `tables.arm_table`; those of the controller's model follow from MODEL on.
+BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCALE = range(15)
+MODEL = 15
+# What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
+OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
+# The machine at the sample: angle and rate, geometry, shares of the arms; what tells a lost arm and a far one.
+(Q, QD, AX, AY, AD, INV, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 17)
+# The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
+(E, ED, LAST, SLOW, READ, MEMORY, A1, A2, P11, P12, P22, GX, GY, L1, L2, MAD, MINV, ACC_B, ACC_E, ELBOW_E, ELBOW_ED,
+ C, PUSH, OLD, COPPER, WORK, ANGLE, UX, UY) = range(FY + 1, FY + 30)
+BLOCKS = UY + 1
+
+(X, Y, VX, VY, KX, KY, SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS, PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR,
+ JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS, REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
+ BEST, BEST_J, BEST_K, NOW, TORQUE2, ANTAGONISM, STATUS, SAMPLE) = range(50)
+SINGLES = 50
+
+
+@leaf
+def at(block, i, j, W, L):
+    """Index of arm i and run j in a pair row."""
+    return (block * W + i) * L + j
+
+
+@leaf
+def of(row, j, W, L):
+    """Index of run j in a run row."""
+    return (BLOCKS * W + row) * L + j
+
+
+@leaf
+def total(row, w, W):
+    """Sum of a pair row of a single run; of four arms as a vector register adds fastest."""
+    if W == 4:
+        return (w[row * W] + w[row * W + 2]) + (w[row * W + 1] + w[row * W + 3])
+    s = w[row * W]
+    for i in range(1, W):
+        s += w[row * W + i]
+    return s

@@ -1,0 +1,126 @@
+"""`sense` and `hold` of `plant` for one run, its arms side by side in a vector register and its state in scalars."""
+
+from __future__ import annotations
+
+import math
+
+from .jit import leaf, outlined
+from .leaves import geometry, share, small_angle, solve2
+from .plant import FAST, MOST_STEPS, STIFF, seen, stiffness
+from .rows import (
+    ACC, AD, AX, AY, B1, B2, BX, BY, C, FRICTION, FX, FY, HALF, INV, L1SQ, L2SQ, LOW, M11, M12, M22, MEAN, MODE, NEAR,
+    PUSH, QD, S1, S2, SCALE, STATUS, STEPS, UX, UY, VX, VY, W1, W2, Q, X, Y, of, total,
+)
+from .rows import ANGLE as DESIRED
+from .tables import ANGLE, COS, SIN, want
+
+
+@leaf
+def sense(arms, env, extra, row, w, dt):
+    """As `plant.sense`."""
+    W = len(arms)
+    x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    for i in range(W):
+        # Into the table first: beside another array the loop below would not become vector instructions.
+        w[DESIRED * W + i], w[UX * W + i], w[UY * W + i] = want(row, ANGLE, i, W), want(row, COS, i, W), want(row, SIN, i, W)
+    for i in range(W):
+        arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
+               w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
+        place = geometry(arm[0], arm[1], arm[2], arm[4], arm[5], arm[6], x, y)
+        rate, bx, by, acc, m11, m12, m22, fx, fy, low = seen(arm, env, extra, place, x, y, vx, vy, dt)
+        ax, ay, ux, uy = place[0], place[1], w[UX * W + i], w[UY * W + i]
+        s, t = (ux * ay - uy * ax) * w[SCALE * W + i], ux * ax + uy * ay
+        w[NEAR * W + i] = min(0.1 - abs(s), t)
+        w[Q * W + i], w[QD * W + i] = w[DESIRED * W + i] + small_angle(s), rate
+        w[AX * W + i], w[AY * W + i], w[AD * W + i] = ax, ay, place[4]
+        w[INV * W + i], w[B1 * W + i], w[B2 * W + i] = place[5], bx, by
+        w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
+        w[FX * W + i], w[FY * W + i], w[ACC * W + i], w[LOW * W + i] = fx, fy, acc, low
+    near = w[NEAR * W]
+    for i in range(1, W):
+        near = min(near, w[NEAR * W + i])
+    return 0 if near >= 0.0 else 1
+
+
+@leaf
+def join(arms, env, w):
+    """End-effector acceleration from the shares of the arms."""
+    W = len(arms)
+    return solve2(env[3] + total(M11, w, W), total(M12, w, W), env[3] + total(M22, w, W),
+                  total(FX, w, W), total(FY, w, W))
+
+
+@leaf
+def acceleration(arms, env, extra, w, x, y, vx, vy):
+    """End-effector acceleration under the torques PUSH."""
+    W = len(arms)
+    for i in range(W):
+        arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
+               w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
+        m11, m12, m22, fx, fy, bx, by, area2 = share(arm, env, extra, x, y, vx, vy)
+        c = w[PUSH * W + i]
+        w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
+        w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
+        w[LOW * W + i] = min(w[LOW * W + i], area2)
+    return join(arms, env, w)
+
+
+@leaf
+def step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, dt):
+    """A Runge-Kutta step (order 4) after its first stage."""
+    h = 0.5 * dt
+    ux, uy = vx + h * k1x, vy + h * k1y
+    k2x, k2y = acceleration(arms, env, extra, w, x + h * vx, y + h * vy, ux, uy)
+    wx, wy = vx + h * k2x, vy + h * k2y
+    k3x, k3y = acceleration(arms, env, extra, w, x + h * ux, y + h * uy, wx, wy)
+    zx, zy = vx + dt * k3x, vy + dt * k3y
+    k4x, k4y = acceleration(arms, env, extra, w, x + dt * wx, y + dt * wy, zx, zy)
+    s = dt / 6.0
+    return (x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy),
+            vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y))
+
+
+@outlined
+def count_steps(arms, env, w, kx, ky, dt):
+    """Steps that friction asks of a hold; 0.0 where all drives move so fast that friction is constant in it."""
+    W = len(arms)
+    m11, m12, m22 = env[3] + total(M11, w, W), total(M12, w, W), env[3] + total(M22, w, W)
+    stiff, fast, near = 0.0, 0.0, 0.0
+    for i in range(W):
+        a, b, c = stiffness(w[FRICTION * W + i], env, m11, m12, m22, w[B1 * W + i], w[B2 * W + i], w[QD * W + i],
+                            w[ACC * W + i], kx, ky, dt)
+        stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
+    return max(1.0, math.ceil(max(stiff / STIFF, fast / FAST))) if near > 0.0 else 0.0
+
+
+@outlined
+def friction_hold(arms, env, extra, w, k1x, k1y, dt):
+    """The state after as many steps as friction needs; zero where it needs too many."""
+    W = len(arms)
+    x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    n = max(1.0, count_steps(arms, env, w, k1x, k1y, dt))
+    w[of(STEPS, 0, W, 1)] = n
+    h, most = dt / n, int(min(n, MOST_STEPS))
+    x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, h)
+    for _ in range(1, most):
+        k1x, k1y = acceleration(arms, env, extra, w, x, y, vx, vy)
+        x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, h)
+    return x, y, vx, vy
+
+
+@leaf
+def hold(arms, env, extra, w, dt):
+    """As `plant.hold`, without its judgement."""
+    W = len(arms)
+    for i in range(W):
+        c = w[C * W + i]
+        w[PUSH * W + i] = c
+        w[FX * W + i] += w[B1 * W + i] * c
+        w[FY * W + i] += w[B2 * W + i] * c
+    k1x, k1y = join(arms, env, w)
+    if len(extra) > 0:
+        x, y, vx, vy = friction_hold(arms, env, extra, w, k1x, k1y, dt)
+    else:
+        x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+        x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, dt)
+    w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
