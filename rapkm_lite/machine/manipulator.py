@@ -233,7 +233,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """
     tables = read_toml(source)
     for key in tables:
-        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
+        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor", "fault"])
     values = tables.get("manipulator", {})
     if not isinstance(values, dict):
         raise ValueError(f"manipulator = {values!r} in {str(source)!r}; allowed: a table [manipulator]")
