@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
+from ..control.laws import PD, PID, AntagonismFilter, BadAnswer, CommandFilter, coordinates
 from ..control.sample import Controller
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .compiled import LEFT_WORKSPACE, NO_POSE, SINGULAR, Plant
@@ -21,8 +21,8 @@ REASONS = {
 def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None) -> str:
     """What went wrong at sample k."""
     if status not in REASONS:
-        return str(cause) if isinstance(cause, ValueError) else f"the law raised {type(cause).__name__}: {cause}"
-    pair = getattr(law, "independent", None)
+        return str(cause) if isinstance(cause, BadAnswer) else f"the law raised {type(cause).__name__}: {cause}"
+    pair = coordinates(law, None) if _ours(law) else None
     if pair is not None and tuple(sorted(pair)) in drive_pairs(setup.model):
         crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
         measure = abs(crossed[drive_pairs(setup.model).index(tuple(sorted(pair)))])

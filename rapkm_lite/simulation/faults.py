@@ -149,8 +149,8 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
 
 
 def check_faults(faults) -> tuple[Fault, ...]:
-    """The faults as a tuple; raises ValueError for what is none."""
-    faults = (faults,) if isinstance(faults, Fault) or not np.iterable(faults) else tuple(faults)
+    """The faults as a tuple; raises ValueError for what is no fault."""
+    faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
     for fault in faults:
         if not isinstance(fault, Fault):
             raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(KINDS)}")
