@@ -7,8 +7,8 @@ from .control.computed_torque import (
     RedundantCTC,
     SwitchedCTC,
 )
-from .control.controller import Controller
-from .control.laws import PD, AntagonismFilter, CommandFilter, Law
+from .control.laws import PD, PID, AntagonismFilter, CommandFilter, Law
+from .control.sample import Controller, Sample
 from .control.stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
 from .machine.arguments import ConvergenceError
 from .machine.datafiles import data_path
@@ -74,11 +74,12 @@ from .simulation.energy import (
     antagonistic_energy,
     antagonistic_torque,
     copper_loss,
-    measured_energies,
     mechanical_work,
-    table1,
 )
-from .simulation.runs import Experiment, Run, SimulationError, experiment, simulate
+from .simulation.experiments import Experiment, experiment, measured_energies, table1
+from .simulation.faults import DeadDrive, EncoderDropout, OffsetJump, TorqueLimit
+from .simulation.runs import Run, SimulationError, simulate
+from .simulation.sensors import Sensors
 from .simulation.sweeps import Sweep, sweep
 
 __version__ = "0.1.0"

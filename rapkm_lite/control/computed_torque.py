@@ -35,11 +35,11 @@ from ..mechanics.dynamics import (
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .laws import Law, gain, measured
+from .laws import LawValue, gain, measured
 
 
-@dataclass(frozen=True, eq=False)
-class APD(Law):
+@dataclass(frozen=True, eq=False, repr=False)
+class APD(LawValue):
     """Augmented PD in minimal coordinates (19): c = (A^T)_W^+ (Gbar q2dd^d + Cbar q2d^d + Qbar - K_P e2 - K_D e2d).
 
     K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
@@ -55,12 +55,15 @@ class APD(Law):
 
     def __post_init__(self):
         self._check_pose()
-        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
-        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
+        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
         if self.W is not None:
-            object.__setattr__(self, "W", gain("W", self.W))
+            self._set(W=gain("W", self.W))
         if self.independent is not None:
-            object.__setattr__(self, "independent", joint_indices("independent", self.independent, 2**31))
+            self._set(independent=joint_indices("independent", self.independent, 2**31))
+        super().__post_init__()
+
+    def coordinates(self, memory):
+        return self.independent
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
@@ -95,11 +98,12 @@ class CTC(APD):
         return matvec(weighted_pseudoinverse(A, self.W), matvec(Gbar, v) + matvec(Cbar, rate) + Qbar)
 
 
-@dataclass(frozen=True, eq=False)
-class SwitchedCTC(Law):
-    """CTC (20) that switches its pair of independent base joints (section 4.5); K_P in 1/s^2, K_D in 1/s.
+@dataclass(frozen=True, eq=False, repr=False)
+class SwitchedCTC(LawValue):
+    """CTC (20) that switches its pair of independent base joints (section 4.2); K_P in 1/s^2, K_D in 1/s.
 
-    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1.
+    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1; the pair in use is
+    its memory.
     """
 
     K_P: np.ndarray
@@ -109,9 +113,18 @@ class SwitchedCTC(Law):
 
     def __post_init__(self):
         self._check_pose()
-        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
-        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
-        bounded("hysteresis", exact_array("hysteresis", self.hysteresis), 1.0, strict=False)
+        hysteresis = bounded("hysteresis", exact_array("hysteresis", self.hysteresis), 1.0, strict=False)
+        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), hysteresis=float(hysteresis))
+        super().__post_init__()
+
+    def step(self, memory, sample):
+        q, qd = sample.pose(self.pose)
+        pair = self.choose(sample.model, q, memory)
+        law = self.fixed(pair)
+        return law.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair
+
+    def coordinates(self, memory):
+        return memory
 
     def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
         """The pair to use at one pose q (2N,), given the current one."""
@@ -153,13 +166,16 @@ class SwitchedCTC(Law):
         return c
 
 
-@dataclass(frozen=True, eq=False)
-class RedundantAPD(Law):
-    """Augmented PD in redundant coordinates (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
+@dataclass(frozen=True, eq=False, repr=False)
+class RedundantAPD(LawValue):
+    """Augmented PD in redundant coordinates, line 1 of (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
 
-    The errors then obey (29)-(30), G~ edd + (C~ + D K_D) ed + D K_P e = 0 with D of `closed_loop_projector`.
+    The errors then obey (30), which is G~ edd + (C~ + D K_D) ed + D K_P e = 0 wherever the degree of actuation is
+    delta, with D of `closed_loop_projector`.  Line 2 of the print, with N_J (G qdd^d + C qd^d + Q), is another law:
+    both agree at e = 0 only.
 
-    K_P, K_D : one number for all 2N joints, (N,) for the driven joints only, (2N,) or (2N, 2N); N m/rad, N m s/rad.
+    K_P, K_D : in N m/rad, N m s/rad.  (m,) = (N,) are the chapter's gains (29), K = diag(0, ..., 0, K_1, ..., K_m) on
+        the driven joints (which come first in our q); one number, (2N,) or (2N, 2N) act on all joints.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     """
 
@@ -170,9 +186,9 @@ class RedundantAPD(Law):
 
     def __post_init__(self):
         self._check_pose()
-        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
-        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
         one_of("rule", self.rule, PARTITION_RULES)
+        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
+        super().__post_init__()
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """K_P e + K_D ed in all joints, and (A~^T)^+."""
@@ -188,15 +204,16 @@ class RedundantAPD(Law):
         return matvec(pinv, matvec(G, desired.qdd) + matvec(C, desired.qd) + Q - feedback)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RedundantCTC(RedundantAPD):
-    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; K_P in 1/s^2, K_D in 1/s.
+    """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; the print has qdd instead of qdd^d.
 
-    Line 1 leads to G~ (edd + K_D ed + K_P e) = 0 (33); with tangential errors, ed = F e2d (34), that is (35): see
-    `effective_gain`.
+    K_P in 1/s^2, K_D in 1/s : (m,) are the chapter's gains (29) on the driven joints, see `RedundantAPD`.
+    projected : True reads line 1 of (32), c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
+        c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
 
-    projected : True reads line 1, c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
-    c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
+    Line 1 leads to G~ (edd + K_D ed + K_P e) = 0, which the chapter splits into (33) and (34); in independent
+    coordinates that is (35), corrected: see `effective_gain`.
     """
 
     projected: bool = True

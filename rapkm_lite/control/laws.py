@@ -1,12 +1,19 @@
-"""Control laws as small values: decentralized PD (12) and the antagonism filters (16)-(18).
+"""Control laws as small values: decentralized PD (12), PD with an integral, and the antagonism filters (16)-(18).
 
-A law maps what a controller knows to drive torques: ``law.torque(model, q, qd, q_a, qd_a, desired)`` with the pose and
-its rate on V (..., 2N), the measured base angles and rates (..., N) and the desired motion; `model` is the
-controller's own manipulator.  Errors are measured minus desired.
+A law maps what a controller knows to drive torques.  Two ways to ask it:
+
+``law.torque(model, q, qd, q_a, qd_a, desired)`` is the formula: pose and rate on V (..., 2N), measured base angles and
+rates (..., N), desired motion; one instant or many.  `model` is the controller's own manipulator.
+
+``law.start(model, dt) -> memory`` and ``law.step(memory, sample) -> (c, memory)`` are the law at work, sampled every
+dt: what it remembers is in `memory` and nowhere else.  A law without memory inherits both.
+
+Errors are measured minus desired.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,19 +28,123 @@ from ..machine.arguments import (
     real_array,
 )
 from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import (
-    control_matrix,
-)
+from ..machine.values import Value
+from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
 from ..mechanics.trajectory import Desired
 
 
-def gain(name: str, value) -> np.ndarray:
-    """A positive number, diagonal or matrix of whatever size; the size is checked where the machine is known."""
+class Law:
+    """Base of all laws, also of those that users write.
+
+    pose : from where `step` takes the configuration: "measured", the least-squares pose of the measured base angles
+        (`estimate_pose`); "true", the true one, for study; None for a law that needs no pose.
+
+    A law of your own gives `torque`, or `start` and `step` when it remembers something:
+
+    >>> import rapkm_lite as rk
+    >>> class Push(rk.Law):
+    ...     def step(self, memory, sample):
+    ...         return np.array([0.01, 0.0, 0.0]), memory
+    >>> robot = rk.load()
+    >>> bool(rk.simulate(robot, Push(), rk.hold(robot, [0.0, 0.0], 0.1)).x[-1, 0] != 0.0)
+    True
+    """
+
+    pose: str | None = "measured"
+
+    def start(self, model: Manipulator, dt: float):
+        """The memory at the beginning of a run sampled every dt in s."""
+        return None
+
+    def step(self, memory, sample) -> tuple[np.ndarray, object]:
+        """Drive torques c (N,) in N m at a `Sample`, and the memory for the next one."""
+        q, qd = sample.pose(self.pose)
+        return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
+
+    def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
+        """Drive torques c (..., N) in N m."""
+        raise NotImplementedError(f"{self!r} has no torque without its memory; needed: start and step, as in simulate")
+
+    def coordinates(self, memory) -> tuple[int, int] | None:
+        """The two independent joints that the law works in, given its memory; None where it has none."""
+        return None
+
+    def _check_pose(self) -> None:
+        one_of("pose", self.pose, ("measured", "true"))
+
+
+class Function(Law):
+    """A function ``(t, q_a, qd_a, desired) -> c`` in the grammar of a law; it may keep what it is given."""
+
+    pose = None
+
+    def __init__(self, function):
+        self.function = function
+
+    def step(self, memory, sample):
+        return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
+
+
+def as_law(law) -> Law:
+    """The law itself, or a callable in the grammar of a law; raises ValueError for anything else."""
+    if not isinstance(law, type):
+        if hasattr(law, "start") and hasattr(law, "step"):
+            return law
+        if callable(law):
+            return Function(law)
+    raise ValueError(f"law = {law!r}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
+
+
+class BadAnswer(ValueError):
+    """What a law answered is not what a law should answer."""
+
+
+def ask(law, memory, sample) -> tuple[np.ndarray, object]:
+    """`step` of a law or callable, with an answer that fits: N finite torques, and the memory.
+
+    Raises BadAnswer, a ValueError that says what to change.
+    """
+    answer = as_law(law).step(memory, sample)
+    if type(answer) is not tuple or len(answer) != 2:
+        raise BadAnswer(f"{type(law).__name__}.step returned {answer!r}; allowed: the pair (c, memory)")
+    c, memory = answer
+    # The cheap test first: it lets pass what is surely fine.
+    if type(c) is np.ndarray and c.dtype == float and c.shape == sample.q_a.shape and c.dot(c) < 1e200:
+        return c, memory
+    if c is None:
+        raise BadAnswer("law returned None; allowed: the drive torques c, an array (N,) in N m (is a return missing?)")
+    try:
+        c = real_array(f"law(t = {sample.t:.4f} s, ...)", c)
+    except ValueError as error:
+        raise BadAnswer(str(error)) from None
+    if c.shape != sample.q_a.shape:
+        raise BadAnswer(f"law returned the shape {c.shape}; allowed: {sample.q_a.shape}, one torque in N m per drive")
+    return c, memory
+
+
+class LawValue(Law, Value):
+    """Base of the laws of this package: frozen dataclasses, compared by value, printed as typed."""
+
+    def __repr__(self):
+        parts = []
+        for name, value in self._fields().items():
+            if name == "law":
+                parts.append(repr(value))
+            elif not (value is None and name == "W") and not (np.ndim(value) == 0 and value == math.inf):
+                parts.append(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value!r}")
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+def gain(name: str, value, zero: bool = False) -> np.ndarray:
+    """A positive number, diagonal or matrix of whatever size; the size is checked where the machine is known.
+
+    zero : also numbers and diagonals that are zero.
+    """
     K = real_array(name, value)
     if K.size == 0:
         raise ValueError(f"{name} has shape {K.shape}; allowed: one number, one per coordinate, or a matrix")
-    return bounded(name, K, 0.0, strict=True) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
+    return bounded(name, K, 0.0, strict=not zero) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
 
 
 def measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
@@ -45,36 +156,31 @@ def measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
     return q_a, qd_a
 
 
-class Law:
-    """Base of the laws; `pose` says from where the model matrices take the configuration.
-
-    "measured": the least-squares pose of the measured base angles (`estimate_pose`); "true": the true one, for study.
-    """
-
-    pose = "measured"
-
-    def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
-        """Drive torques c (..., N) in N m."""
-        raise NotImplementedError
-
-    def _check_pose(self) -> None:
-        one_of("pose", self.pose, ("measured", "true"))
-
-
-@dataclass(frozen=True, eq=False)
-class PD(Law):
+@dataclass(frozen=True, eq=False, repr=False)
+class PD(LawValue):
     """Decentralized PD control (12), c = -K_P e - K_D ed, each drive for itself.
 
     K_P in N m/rad, K_D in N m s/rad: one number, one per drive (N,), or a positive definite (N, N).
     Raises ValueError when a gain is not positive.
+
+    >>> PD(7.05, 0.225)
+    PD(K_P=7.05, K_D=0.225)
     """
 
     K_P: np.ndarray
     K_D: np.ndarray
+    pose = None
 
     def __post_init__(self):
-        object.__setattr__(self, "K_P", gain("K_P", self.K_P))
-        object.__setattr__(self, "K_D", gain("K_D", self.K_D))
+        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
+        super().__post_init__()
+
+    def start(self, model, dt):
+        self.gains(model.n_arms)
+
+    def step(self, memory, sample):
+        e, ed = sample.errors()
+        return -_times(self.K_P, e) - _times(self.K_D, ed), memory
 
     def gains(self, m: int) -> tuple[np.ndarray, np.ndarray]:
         """K_P and K_D as (m, m) matrices."""
@@ -86,25 +192,110 @@ class PD(Law):
         return -matvec(K_P, q_a - desired.q_a) - matvec(K_D, qd_a - desired.qd_a)
 
 
-@dataclass(frozen=True, eq=False)
-class AntagonismFilter(Law):
-    """Force form (16): c = R c', R = (A^T)^+ A^T at the pose, of the torques c' of another law."""
+@dataclass(frozen=True, eq=False, repr=False)
+class PID(LawValue):
+    """PD (12) with the integral of the error, c = -(K_P e + K_D ed + K_I int e dt), cut off at +-limit.
+
+    K_P, K_D : see `PD`.  K_I in N m/(rad s): likewise, zero allowed for a number or diagonal.
+    limit : largest torque in N m, one number or one per drive; its integral stands still while a drive is there.
+    Its memory is the integral (N,) in N m.
+    Raises ValueError when a gain or the limit is out of range.
+
+    >>> PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
+    PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
+    """
+
+    K_P: np.ndarray
+    K_I: np.ndarray
+    K_D: np.ndarray
+    limit: np.ndarray = math.inf
+    pose = None
+
+    def __post_init__(self):
+        self._set(K_P=gain("K_P", self.K_P), K_I=gain("K_I", self.K_I, zero=True), K_D=gain("K_D", self.K_D),
+                  limit=torque_limit(self.limit))
+        super().__post_init__()
+
+    def start(self, model, dt):
+        for name in ("K_P", "K_I", "K_D", "limit"):
+            value = getattr(self, name)
+            if value.shape not in ((), (model.n_arms,), (model.n_arms, model.n_arms)):
+                raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({model.n_arms},)")
+        return np.zeros(model.n_arms)
+
+    def step(self, memory, sample):
+        e, ed = sample.errors()
+        integral = memory + _times(self.K_I, sample.dt * e)
+        c = -(_times(self.K_P, e) + _times(self.K_D, ed) + integral)
+        held = np.clip(c, -self.limit, self.limit)
+        return held, np.where(held == c, integral, memory)
+
+
+def _times(K: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """K e of one sample, for a gain that is a number, a diagonal or a matrix."""
+    return K * e if K.ndim < 2 else K @ e
+
+
+def torque_limit(limit) -> np.ndarray:
+    """A largest torque in N m, one number or (N,), not negative; infinity is no limit."""
+    endless = np.asarray(limit) == math.inf
+    array = real_array("limit", np.where(endless, 0.0, limit) if np.any(endless) else limit)
+    if array.ndim > 1:
+        raise ValueError(f"limit has shape {array.shape}; allowed: one number or one per drive")
+    return np.where(endless, math.inf, bounded("limit", array, 0.0, strict=False))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AntagonismFilter(LawValue):
+    """Force form (16): c = R c' of the torques c' of any other law, R = (A^T)^+ A^T of (15) at the pose.
+
+    law : a law, or a callable ``(t, q_a, qd_a, desired) -> c'``; its memory is handed on.
+    pose : "measured" or "true", where R is formed; the law inside keeps its own.
+    W : positive definite number, (m,) or (m, m); then R = (A^T)_W^+ A^T, and of all torques with the same end-effector
+        force c has the smallest c^T W c.  W = diag(R / k_t^2) makes the least heat; default the identity.
+
+    >>> AntagonismFilter(PD(7.05, 0.225))
+    AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
+    """
 
     law: Law
     pose: str = "measured"
+    W: np.ndarray | None = None
 
     def __post_init__(self):
         self._check_pose()
-        if not isinstance(self.law, Law):
-            raise ValueError(f"law = {self.law!r}; allowed: a law of this package, such as PD(7.05, 0.225)")
+        as_law(self.law)
+        if self.W is not None:
+            self._set(W=gain("W", self.W))
+        super().__post_init__()
+
+    def start(self, model, dt):
+        return as_law(self.law).start(model, dt)
+
+    def step(self, memory, sample):
+        c, memory = ask(self.law, memory, sample)
+        q, _ = sample.pose(self.pose)
+        return self.matrix(sample.model, q) @ c, memory
+
+    def matrix(self, model, q) -> np.ndarray:
+        """R (..., m, m) of (15) at the pose q (..., 2N)."""
+        A = control_matrix(model, q)
+        return antagonism_filter(A) if self.W is None else weighted_pseudoinverse(A, self.W) @ A.mT
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        R = antagonism_filter(control_matrix(model, q))
-        return matvec(R, self.law.torque(model, q, qd, q_a, qd_a, desired))
+        return matvec(self.matrix(model, q), as_law(self.law).torque(model, q, qd, q_a, qd_a, desired))
+
+    def coordinates(self, memory):
+        return coordinates(self.law, memory)
 
 
-@dataclass(frozen=True, eq=False)
-class CommandFilter(Law):
+def coordinates(law, memory) -> tuple[int, int] | None:
+    """`Law.coordinates` of any law or callable."""
+    return law.coordinates(memory) if hasattr(law, "coordinates") else None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CommandFilter(LawValue):
     """Command form (17)-(18): the PD drives get filtered commands, c = -K_P R_P e - K_D R_D ed.
 
     R_P = (A^T K_P)^+ A^T K_P and R_D alike; the end-effector force is that of (16), the torques only for K = k I.
@@ -117,6 +308,10 @@ class CommandFilter(Law):
         self._check_pose()
         if not isinstance(self.law, PD):
             raise ValueError(f"law = {self.law!r}; allowed: PD, whose commands are filtered")
+        super().__post_init__()
+
+    def start(self, model, dt):
+        return self.law.start(model, dt)
 
     def commands(self, model, q, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
         """The filtered commands (18) for angles and rates, each (..., N), formed with the *measured* angles."""

@@ -1,16 +1,17 @@
-"""What closed loops obey: projector (30), Lyapunov function (31), effective gain (35), size of the feedback map."""
+"""What closed loops obey: projector of (30), Lyapunov function (31), effective gain of (35), size of the feedback."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..machine.arguments import (
+    bounded,
     check_leading,
+    exact_array,
     joint_vectors,
     real_array,
     solve,
     tall_matrix,
-    transpose,
     wide_matrix,
 )
 from ..machine.manipulator import Manipulator
@@ -26,7 +27,7 @@ def closed_loop_projector(A_tilde) -> np.ndarray:
     A_tilde : (..., m, 2N).  Raises ValueError at input singularities.
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
-    return transpose(A_tilde) @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
+    return A_tilde.mT @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
 
 
 def effective_gain(F, K) -> np.ndarray:
@@ -40,19 +41,24 @@ def effective_gain(F, K) -> np.ndarray:
     K = real_array("K", K)
     K = K * np.eye(n) if K.ndim == 0 else real_array("K", K, n, n)
     check_leading(F=F.shape[:-2], K=K.shape[:-2])
-    return solve("F^T F", transpose(F) @ F, transpose(F) @ K @ F)
+    return solve("F^T F", F.mT @ F, F.mT @ K @ F)
 
 
-def lyapunov_function(robot: Manipulator, q, e, ed, K_P) -> np.ndarray:
-    """V = (ed^T G~ ed + e^T K_P e) / 2 of (31), (...,) in J, for errors e, ed (..., 2N) in redundant coordinates.
+def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np.ndarray:
+    """V = (ed^T G~ ed + e^T K_P e + eps e^T G~ ed) / 2 of (31), (...,) in J, for errors e, ed (..., 2N).
 
-    At a fixed desired pose it falls under `RedundantAPD` at the rate -ed^T K_D ed.
+    K_P : as in `RedundantAPD`; with the gains (29), (m,), it has rank m of 2N, and V is positive definite on errors
+        tangent to V only, where the degree of actuation is delta.  eps : in 1/s, not negative.
+    At a fixed desired pose V with eps = 0 falls under `RedundantAPD` at the rate -ed^T K_D ed, which is zero whenever
+    ed is; a small eps > 0 makes the rate negative there too, and so the decay exponential.
+    Raises ValueError for arguments that do not fit.
     """
     q, e, ed = joint_vectors(robot.n_joints, q=q, e=e, ed=ed)
+    eps = float(bounded("eps", exact_array("eps", eps), 0.0, strict=False))
     Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
     K = joint_gain("K_P", K_P, robot.n_arms)
-    kinetic = np.einsum("...i,...ij,...j->...", ed, Gt, ed)
-    return (kinetic + np.einsum("...i,...ij,...j->...", e, K, e)) / 2
+    form = lambda u, M, v: np.einsum("...i,...ij,...j->...", u, M, v)  # noqa: E731
+    return (form(ed, Gt, ed) + form(e, K, e) + eps * form(e, Gt, ed)) / 2
 
 
 def feedback_norm(robot, q, pair=None) -> np.ndarray:

@@ -13,8 +13,8 @@ from ..mechanics.antagonism import steady_state_error, steady_state_torque
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
 from ..plotting.style import NEUTRAL, arm_colour, arm_line
-from ..simulation.energy import measured_energies
-from ..simulation.runs import experiment, simulate
+from ..simulation.experiments import experiment, measured_energies
+from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, log_slider, switch
 from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive
 

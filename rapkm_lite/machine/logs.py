@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .datafiles import data_path
+from .values import Value
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
-    """A log of a run, one row per record.
+@dataclass(frozen=True, eq=False, repr=False)
+class Log(Value):
+    """A log of a run, one row per record; read-only.
 
     t : (k,) s.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
     q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, with the noise of a current sensor.

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from .arguments import bounded, real_array
 from .datafiles import UNITS, known, read_toml
+from .values import Value, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Manipulator:
-    """A planar 2-DOF parallel manipulator with N >= 2 driven RR arms; read-only, SI units.
+class Manipulator(Value):
+    """A planar 2-DOF parallel manipulator with N >= 2 driven RR arms; read-only, compared by value, SI units.
 
     Per-link values are given as one number, as (2,) = (proximal, distal) for all arms, or as (N, 2);
     per-drive values as one number or (N,).
@@ -81,14 +83,12 @@ class Manipulator:
             value = real_array(key, getattr(self, key))
             if value.ndim:
                 raise ValueError(f"{key} has shape {value.shape}; allowed: one number")
-            object.__setattr__(self, key, float(bounded(key, value, 0.0, strict=strict)))
+            given[key] = float(bounded(key, value, 0.0, strict=strict))
         given["mode"] = _per_drive("mode", self.mode, N)
         if not np.all(np.abs(given["mode"]) == 1.0):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
-        for key, value in given.items():
-            value = np.array(value, dtype=float)
-            value.setflags(write=False)
-            object.__setattr__(self, key, value)
+        self._set(**given)
+        super().__post_init__()
         J_a, J_d, P = self.arm_inertias.T
         if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(
@@ -101,22 +101,22 @@ class Manipulator:
                 "allowed: arms that can meet (longer links or closer base points)"
             )
 
-    @property
+    @cached_property
     def n_arms(self) -> int:
         """N, the number of arms, which is also m, the number of drives."""
         return len(self.base)
 
-    @property
+    @cached_property
     def n_joints(self) -> int:
         """n = 2N joint variables."""
         return 2 * self.n_arms
 
-    @property
+    @cached_property
     def n_constraints(self) -> int:
         """r = 2(N - 1) loop constraints."""
         return 2 * (self.n_arms - 1)
 
-    @property
+    @cached_property
     def arm_inertias(self) -> np.ndarray:
         """(N, 3) inertia constants of each arm in absolute link angles, kg m^2, the load counted with arm 2.
 
@@ -124,18 +124,18 @@ class Manipulator:
         """
         (l1, l2), (m1, m2), (c1, c2), (i1, i2) = (v.T for v in (self.lengths, self.masses, self.centers, self.inertias))
         load = self._load_per_arm
-        return np.stack([
+        return frozen(np.stack([
             i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia,
             i2 + m2 * c2**2 + load * l2**2,
             l1 * (m2 * c2 + load * l2),
-        ], axis=-1)
+        ], axis=-1))
 
-    @property
+    @cached_property
     def arm_moments(self) -> np.ndarray:
         """(N, 2) first mass moments of each arm along proximal and distal link, kg m, the load counted with arm 2."""
         (l1, l2), (m1, m2), (c1, c2) = (v.T for v in (self.lengths, self.masses, self.centers))
         load = self._load_per_arm
-        return np.stack([m1 * c1 + (m2 + load) * l1, m2 * c2 + load * l2], axis=-1)
+        return frozen(np.stack([m1 * c1 + (m2 + load) * l1, m2 * c2 + load * l2], axis=-1))
 
     @property
     def _load_per_arm(self) -> np.ndarray:
@@ -233,7 +233,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """
     tables = read_toml(source)
     for key in tables:
-        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor"])
+        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor", "fault"])
     values = tables.get("manipulator", {})
     if not isinstance(values, dict):
         raise ValueError(f"manipulator = {values!r} in {str(source)!r}; allowed: a table [manipulator]")

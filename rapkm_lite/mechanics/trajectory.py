@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..machine.arguments import exact_array, matvec, positive_number, real_array
 from ..machine.manipulator import Manipulator
+from ..machine.values import Value, frozen
 from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
 
 
-@dataclass(frozen=True, eq=False)
-class Desired:
-    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N)."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Desired(Value):
+    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N), read-only.
+
+    Every array is C-contiguous; who writes into one gets NumPy's ValueError, so that no law can shift the path.
+    """
 
     n_arms: int
     x: np.ndarray
@@ -23,25 +28,32 @@ class Desired:
     qd: np.ndarray
     qdd: np.ndarray
 
-    @property
+    def __post_init__(self):
+        self._set(**{name: np.asarray(getattr(self, name), dtype=float) for name in _MOTION})
+        super().__post_init__()
+
+    @cached_property
     def q_a(self) -> np.ndarray:
         """Base angles (..., N), rad."""
-        return self.q[..., : self.n_arms]
+        return frozen(self.q[..., : self.n_arms])
 
-    @property
+    @cached_property
     def qd_a(self) -> np.ndarray:
         """Base rates (..., N), rad/s."""
-        return self.qd[..., : self.n_arms]
+        return frozen(self.qd[..., : self.n_arms])
 
-    @property
+    @cached_property
     def qdd_a(self) -> np.ndarray:
         """Base accelerations (..., N), rad/s^2."""
-        return self.qdd[..., : self.n_arms]
+        return frozen(self.qdd[..., : self.n_arms])
 
 
-@dataclass(frozen=True, eq=False)
+_MOTION = ("x", "xd", "xdd", "q", "qd", "qdd")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Desired):
-    """A desired motion: `Desired` with one row per sample, and the times t (k,) in s.
+    """A desired motion: `Desired` with one row per sample, and the times t (k,) in s; ``trajectory[k]`` is one sample.
 
     x, xd, xdd : (k, 2) in m, m/s, m/s^2.  q, qd, qdd : (k, 2N) in rad, rad/s, rad/s^2, continuous in time.
     """
@@ -58,7 +70,23 @@ class Trajectory(Desired):
         return len(self.t)
 
     def __getitem__(self, k) -> Desired:
-        return Desired(self.n_arms, *(v[k] for v in (self.x, self.xd, self.xdd, self.q, self.qd, self.qdd)))
+        if isinstance(k, int | np.integer):
+            return self._samples[k]
+        return Desired(self.n_arms, *(getattr(self, name)[k] for name in _MOTION))
+
+    def __iter__(self):
+        return iter(self._samples)
+
+    @cached_property
+    def _samples(self) -> list[Desired]:
+        """All samples, made once: a sampled loop asks for each of them, as often as it runs."""
+        names = (*_MOTION, "q_a", "qd_a", "qdd_a")
+        made = []
+        for row in zip(*(getattr(self, name) for name in names), strict=True):
+            sample = object.__new__(Desired)
+            sample.__dict__.update(zip(names, row, strict=True), n_arms=self.n_arms)
+            made.append(sample)
+        return made
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles)."""

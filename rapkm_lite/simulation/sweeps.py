@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..control.laws import Law
-from ..engine import COMPILED, lanes, tables
+from ..control.laws import BadAnswer, as_law
 from ..machine.arguments import real_array
 from ..machine.manipulator import Manipulator
-from ..mechanics.kinematics import inverse_kinematics
+from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory
-from .compiled import LANES, encode, lockstep
-from .energy import antagonistic_energy
+from .compiled import DONE, many
+from .energy import antagonistic_energy, root_mean_square_torque
+from .explain import REASONS
+from .faults import check_faults
+from .loop import LAW_FAILED, own_copy
 from .patience import progress_bar
-from .runs import REASONS, SimulationError, check_setup, simulate
+from .runs import SimulationError, code_of, complete
+from .sensors import Sensors
+from .setup import Setup, prepare
+
+NOT_RUN = -1
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Value):
     """Result of `sweep`, one row per run; rows of failed runs are masked.
 
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
@@ -63,52 +71,80 @@ class Sweep:
 
 def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None, model: Manipulator | None = None,
           velocity_filter: float | None = None, executor: Executor | None = None, failed: str = "raise",
-          chunk: int = 64, progress: bool = False) -> Sweep:
+          chunk: int = 64, progress: bool = False, faults=()) -> Sweep:
     """Run a law on the machine along a trajectory once per row of `offsets`, many runs at a time.
 
     law : one law for all runs, or a sequence of k laws, such as PD with other gains.
     offsets : calibration offsets (k, N) in rad, or (N,) for all runs; the other arguments are those of `simulate`.
-    executor : any `concurrent.futures` executor to spread the chunks of `chunk` runs; default: one thread per core.
-    failed : "raise" stops at the first run that fails; "mask" masks the rows of such runs.
+    executor : any `concurrent.futures` executor to spread the chunks of `chunk` runs; default: one thread per core, or
+        one thread and run by run for laws in Python.
+    failed : "raise" raises the error of the first run that fails; "mask" masks the rows of such runs.
     progress : show a bar.
-    Decentralized laws run 16 side by side; other laws one by one.  The numbers do not depend on executor, chunk or the
-    order of the rows, to the last bit.
-    Raises ValueError for bad arguments, SimulationError naming the run and the time.
+    The numbers do not depend on executor, chunk or the order of the rows, to the last bit.
+    Raises ValueError for bad arguments; SimulationError naming the run and the time, with the run up to there as
+    `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
+    exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
     """
     if failed not in ("raise", "mask"):
         raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
     if not isinstance(chunk, (int, np.integer)) or chunk < 1:
         raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
     laws, offsets = _rows(law, offsets, robot.n_arms)
-    setup = (encoder, model, velocity_filter)
-    trajectory = trajectory.for_robot(check_setup(robot, *setup)[0])
-    inverse_kinematics(robot, trajectory.x[0])
-    own = executor or ThreadPoolExecutor(os.cpu_count())
-    parts = []
+    faults = check_faults(faults)
+    setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
+    in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if code_of(one, setup) is None]
+    if executor is None and in_python:
+        chunk = 1
+    table, errors, jobs = Columns.blank(len(laws), robot.n_arms), {}, {}
+    with _pool(executor, 1 if in_python else os.cpu_count()) as pool:
+        try:
+            for i in range(0, len(laws), chunk):
+                jobs[i] = pool.submit(run_chunk, setup, laws[i : i + chunk], offsets[i : i + chunk])
+            with progress_bar(len(jobs) if progress else 0) as advance:
+                for i, job in jobs.items():
+                    errors |= table.enter(i, *job.result())
+                    advance()
+        except BaseException as error:
+            for i, job in jobs.items():
+                if not job.cancel() and job.done() and job.exception() is None:
+                    table.enter(i, *job.result())
+            finished = np.count_nonzero(table.status == DONE)
+            if finished:
+                error.partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
+                error.add_note(f"{finished} of {len(laws)} runs were finished; they are in the `partial` of this "
+                               "exception, a Sweep whose other rows are masked.")
+            raise
+    result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or table.failed.any())
+    if failed == "raise" and result.failed.any():
+        i = int(np.argmax(result.failed))
+        _raise(i, errors.get(i), setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i], faults, result,
+               int(table.status[i]))
+    return result
+
+
+def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int):
+    """Raise what stopped run i; what the engine stopped runs once more, for its reason and its samples."""
+    if error is None:
+        try:
+            complete(setup, law, faults)
+            error = SimulationError(result.failure_time[i], REASONS[status])
+        except SimulationError as found:
+            error = found
+    if not isinstance(error, SimulationError):
+        error.add_note(f"It was raised at the first sample of run {i} of a sweep.")
+        raise error
+    raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
+
+
+@contextmanager
+def _pool(executor: Executor | None, threads: int):
+    """The executor of the caller, or threads of our own, which end with the sweep."""
+    pool = executor or ThreadPoolExecutor(threads)
     try:
-        jobs = [own.submit(run_chunk, robot, laws[i : i + chunk], trajectory, offsets[i : i + chunk], setup)
-                for i in range(0, len(offsets), chunk)]
-        with progress_bar(len(jobs) if progress else 0) as advance:
-            for job in jobs:
-                parts.append(job.result())
-                advance()
+        yield pool
     finally:
         if executor is None:
-            own.shutdown(cancel_futures=True)
-    *numbers, times, status = (np.concatenate(column) for column in zip(*parts, strict=True))
-    broken = status != tables.DONE
-    if failed == "raise" and broken.any():
-        i = int(np.argmax(broken))
-        reason = REASONS[status[i]]
-        try:
-            simulate(robot, laws[i], trajectory, offsets[i], *setup)
-        except SimulationError as error:
-            reason = error.reason
-        raise SimulationError(times[i], reason, run=i)
-    if failed == "mask":
-        numbers = [np.ma.array(v, mask=np.broadcast_to(broken.reshape(-1, *[1] * (v.ndim - 1)), v.shape))
-                   for v in numbers]
-    return Sweep(robot, law, trajectory, offsets, *numbers, broken, np.ma.array(times, mask=~broken))
+            pool.shutdown(cancel_futures=True)
 
 
 def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
@@ -116,8 +152,10 @@ def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
     offsets = real_array("offsets", offsets)
     if offsets.ndim > 2 or (offsets.ndim and offsets.shape[-1] != N):
         raise ValueError(f"offsets has shape {offsets.shape}; allowed: (k, {N}), one row per run, or ({N},)")
-    several = not isinstance(law, Law) and not callable(law)
+    several = np.iterable(law) and not isinstance(law, str) and not callable(law) and not hasattr(law, "step")
     laws = list(law) if several else [law]
+    for one in laws:
+        as_law(one)
     k = len(offsets) if offsets.ndim == 2 else len(laws)
     if k == 0:
         raise ValueError("offsets or law is empty; allowed: at least one run")
@@ -126,46 +164,62 @@ def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
     return laws if several else laws * k, np.array(np.broadcast_to(offsets, (k, N)))
 
 
-def run_chunk(robot, laws, trajectory, offsets, setup) -> tuple:
-    """Energies, torque norm, antagonistic energy, final position, failure time and status of some runs.
+class Columns(NamedTuple):
+    """The columns of a sweep while it is made; `status` is NOT_RUN until a row is known."""
+
+    energies: np.ndarray
+    torque_norm: np.ndarray
+    antagonistic_energy: np.ndarray
+    x_final: np.ndarray
+    failure_time: np.ndarray
+    status: np.ndarray
+
+    @classmethod
+    def blank(cls, k: int, N: int) -> Columns:
+        return cls(np.zeros((k, N)), np.zeros(k), np.zeros(k), np.zeros((k, 2)), np.zeros(k), np.full(k, NOT_RUN))
+
+    @property
+    def failed(self) -> np.ndarray:
+        return self.status != DONE
+
+    def enter(self, first: int, rows: Columns, errors: dict) -> dict:
+        """Take the rows from `first` on; returns their errors by the rows of the sweep."""
+        for column, part in zip(self, rows, strict=True):
+            column[first : first + len(part)] = part
+        return {first + i: error for i, error in errors.items()}
+
+    def sweep(self, robot, law, trajectory, offsets, mask: bool) -> Sweep:
+        numbers, failed = self[:4], self.failed
+        if mask:
+            numbers = [np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape))
+                       for v in numbers]
+        times = np.ma.array(self.failure_time, mask=~failed | (self.status == NOT_RUN))
+        return Sweep(robot, law, trajectory, offsets, *numbers, failed, times)
+
+
+def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:
+    """The columns of some runs, and what stopped the first one of those in Python that failed, by its row.
 
     A function of values only, so that any executor can send it to another process.
     """
-    model, quantum, tau = check_setup(robot, *setup)
-    own = {id(law): encode(law, model, robot) if isinstance(law, Law) else None for law in laws}
-    codes = [own[id(law)] for law in laws]
-    first = codes[0]
-    together = all(code is not None and code.lockstep and (code.form, code.pose) == (first.form, first.pose)
-                   for code in codes)
-    if not together:
-        rows = [_single(robot, law, trajectory, offset, setup) for law, offset in zip(laws, offsets, strict=True)]
-        return tuple(np.array(column) for column in zip(*rows, strict=True))
-    K_P, K_D = np.array([code.K_P for code in codes]), np.array([code.K_D for code in codes])
-    width = LANES if COMPILED else 1
-    # The last runs fill up with copies of themselves: a lane does not feel its neighbours.
-    index = np.minimum(np.arange(-(-len(laws) // width) * width), len(laws) - 1).reshape(-1, width)
-    parts = [_lockstep(robot, model, trajectory, first, K_P[i], K_D[i], offsets[i], quantum, tau) for i in index]
-    return tuple(np.concatenate(column)[: len(laws)] for column in zip(*parts, strict=True))
-
-
-def _lockstep(robot, model, trajectory, code, K_P, K_D, offsets, quantum, tau) -> tuple:
-    """`run_chunk` for as many runs as the engine takes side by side."""
-    w, blocks = lockstep(robot, model, trajectory, code, K_P, K_D, offsets, quantum, tau)
-    dt = trajectory.dt
-    status, sample = w[lanes.STATUS].astype(int), w[lanes.SAMPLE].astype(int)
-    done = status == tables.DONE
-    weight = robot.resistance / robot.torque_constant**2
-    energies = blocks[lanes.COPPER].T * weight * dt + blocks[lanes.WORK].T
-    norm = np.sqrt(np.where(done, w[lanes.TORQUE2], 0.0) / (len(trajectory) - 1))
-    return (np.where(done[:, None], energies, 0.0), norm, np.where(done, w[lanes.ANTAGONISM] * dt, 0.0),
-            np.where(done[:, None], w[[lanes.X, lanes.Y]].T, 0.0), trajectory.t[np.where(done, 0, sample)], status)
-
-
-def _single(robot, law, trajectory, offset, setup) -> tuple:
-    """The same for one run of any law."""
-    try:
-        run = simulate(robot, law, trajectory, offset, *setup)
-    except SimulationError as error:
-        return np.zeros(robot.n_arms), 0.0, 0.0, np.zeros(2), error.time, error.status
-    norm = np.sqrt(np.mean(np.sum(run.c[:-1] ** 2, axis=-1)))
-    return run.energy, norm, antagonistic_energy(run), run.x[-1], 0.0, tables.DONE
+    codes = {id(law): code_of(law, setup) for law in laws}
+    rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
+    fast = [i for i, law in enumerate(laws) if codes[id(law)] is not None]
+    if fast:
+        parts = many(setup, [codes[id(laws[i])] for i in fast], offsets[fast])
+        for column, part in zip(rows, parts, strict=True):
+            column[fast] = part
+    for i in sorted(set(range(len(laws))) - set(fast)):
+        try:
+            run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
+        except BadAnswer:
+            raise
+        except Exception as error:
+            rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
+            if not errors:
+                errors[i] = error
+        else:
+            values = run.energy, root_mean_square_torque(run), antagonistic_energy(run), run.x[-1], 0.0, DONE
+            for column, value in zip(rows, values, strict=True):
+                column[i] = value
+    return rows, errors

@@ -1,0 +1,103 @@
+"""What a controller knows at one instant, and a law at work from sample to sample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..machine.arguments import ConvergenceError, matvec, positive_number, solve
+from ..machine.manipulator import Manipulator
+from ..mechanics.actuation import control_matrix
+from ..mechanics.closure import estimate_pose
+from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
+from ..mechanics.trajectory import Desired
+from .laws import as_law, ask, coordinates, measured
+
+
+class NoPose(ConvergenceError):
+    """The measured base angles fit no pose of the controller's model."""
+
+
+class Sample:
+    """What a controller knows at one instant.
+
+    t, dt : time and sampling time, s.  model : the controller's own manipulator.
+    q_a, qd_a : measured base angles and rates (N,), rad and rad/s, read-only.  desired : the desired motion.
+    """
+
+    __slots__ = ("_found", "_keeper", "_truth", "desired", "dt", "model", "q_a", "qd_a", "t")
+
+    def __init__(self, keeper: Controller, t: float, q_a, qd_a, desired: Desired, truth=None):
+        self.t, self.dt, self.model, self.q_a, self.qd_a, self.desired = t, keeper.dt, keeper.model, q_a, qd_a, desired
+        self._keeper, self._truth, self._found = keeper, truth, {}
+
+    def errors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Measured minus desired base angles and rates, (N,) each."""
+        desired, N = self.desired, self.model.n_arms
+        return self.q_a - desired.q[:N], self.qd_a - desired.qd[:N]
+
+    def pose(self, source: str | None = "measured") -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Configuration q and rate qd on V, (2N,) each, read-only; found when asked for, and kept.
+
+        source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
+        Raises ConvergenceError when the measured angles fit no pose.
+        """
+        if source is None:
+            return None, None
+        if source not in self._found:
+            q, xd = self._true() if source == "true" else self._measured()
+            qd = matvec(ee_complement(self.model, q), xd)
+            q.setflags(write=False)
+            qd.setflags(write=False)
+            self._found[source] = q, qd
+        return self._found[source]
+
+    def _true(self):
+        if self._truth is None:
+            raise ValueError("truth = None for a law with pose = 'true'; allowed: the true motion (x, xd)")
+        x, xd = self._truth
+        return inverse_kinematics(self.model, x), np.asarray(xd, dtype=float)
+
+    def _measured(self):
+        model, keeper = self.model, self._keeper
+        try:
+            q = estimate_pose(model, self.q_a, self.desired.x if keeper.x is None else keeper.x)
+        except ConvergenceError as error:
+            raise NoPose(str(error)) from error
+        keeper.x = forward_kinematics(model, q)
+        A = control_matrix(model, q)
+        return q, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
+
+
+class Controller:
+    """A law at work: it keeps the law's memory and the last estimate `x` of the end-effector position.
+
+    `simulate` uses one per run.  Use your own in a loop of your own, called once per sample as
+    ``controller(t, q_a, qd_a, desired, truth=(x, xd))`` with measured base angles and rates (N,); the true end-effector
+    motion is needed for a law with pose="true" only.
+    dt : sampling time in s.
+    Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
+
+    >>> import rapkm_lite as rk
+    >>> robot = rk.load()
+    >>> path, controller = rk.hold(robot, [0.0, 0.0]), Controller(rk.PD(7.0, 0.2), robot)
+    >>> controller(0.0, path.q_a[0] + 0.01, path.qd_a[0], path[0]).round(6)
+    array([-0.07, -0.07, -0.07])
+    """
+
+    def __init__(self, law, model: Manipulator, dt: float = 1e-3):
+        self.law, self.model, self.dt, self.x = law, model, positive_number("dt", dt), None
+        self.memory = as_law(law).start(model, self.dt)
+
+    @property
+    def pair(self) -> tuple[int, int] | None:
+        """The independent joints in use, None where the law has none."""
+        return coordinates(self.law, self.memory)
+
+    def __call__(self, t, q_a, qd_a, desired: Desired, truth=None) -> np.ndarray:
+        q_a, qd_a = measured(self.model, q_a, qd_a, desired)
+        return self.command(t, q_a, qd_a, desired, truth)
+
+    def command(self, t, q_a, qd_a, desired, truth=None) -> np.ndarray:
+        """The same without a check of the measurement."""
+        c, self.memory = ask(self.law, self.memory, Sample(self, t, q_a, qd_a, desired, truth))
+        return c

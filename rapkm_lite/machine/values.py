@@ -1,0 +1,157 @@
+"""Values that do not change: what machines, paths, laws, gains, runs and sweeps have in common.
+
+A value is a frozen dataclass on the base `Value`:
+
+    @dataclass(frozen=True, eq=False, repr=False)
+    class Gains(Value):
+        K_P: np.ndarray
+        K_D: np.ndarray = 0.0
+
+        def __post_init__(self):
+            self._set(K_P=real_array("K_P", self.K_P))
+            super().__post_init__()
+
+``eq=False, repr=False`` because `Value` brings both.  A class with its own ``__post_init__`` ends it with the one of
+`Value`, which freezes every array among the fields, in tuples and lists too.  What is computed on demand and kept
+(``functools.cached_property``) is no field: it is neither compared, nor pickled, nor copied.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+
+def frozen(array) -> np.ndarray:
+    """A copy of an array that nobody can write into, and that no ``setflags`` makes writable again.
+
+    The numbers lie in an object of type bytes.  An array that came from here is returned as it is.
+
+    >>> frozen([1.0, 2.0])[0] = 3.0
+    Traceback (most recent call last):
+    ValueError: assignment destination is read-only
+    """
+    if isinstance(array, np.ma.MaskedArray):
+        if _is_frozen(array.data) and _is_frozen(np.ma.getmaskarray(array)):
+            return array
+        return np.ma.MaskedArray(frozen(array.data), frozen(np.ma.getmaskarray(array)), fill_value=array.fill_value)
+    array = np.asarray(array)
+    if array.dtype.hasobject or _is_frozen(array):
+        return array
+    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape) if array.size else _read_only(array)
+
+
+def _is_frozen(array: np.ndarray) -> bool:
+    root = array
+    while isinstance(root, np.ndarray):
+        root = root.base
+    return isinstance(root, bytes) and array.flags.c_contiguous
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array = array.copy()
+    array.setflags(write=False)
+    return array
+
+
+def _frozen(value):
+    """A field as it is kept: arrays frozen, lists and tuples as tuples of such."""
+    if isinstance(value, np.ndarray):
+        return frozen(value)
+    if type(value) in (list, tuple):
+        return tuple(map(_frozen, value))
+    return value
+
+
+class Value:
+    """Base of the frozen dataclasses of this package: read-only arrays, compared by value, printed as typed.
+
+    `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
+    pickling, ``copy.copy`` and ``copy.deepcopy``.  Two values are equal when they have the same type and equal fields
+    (equal shapes and numbers; NaN equals NaN); equal values have equal hashes, computed once.
+    """
+
+    def __post_init__(self):
+        for name, value in self._fields().items():
+            kept = _frozen(value)
+            if kept is not value:
+                object.__setattr__(self, name, kept)
+
+    def _set(self, **fields) -> None:
+        """Set fields while the value is made, as ``__post_init__`` needs it."""
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def _fields(self) -> dict:
+        return {name: self.__dict__[name] for name in _names(type(self))}
+
+    def __getstate__(self) -> dict:
+        return self._fields()
+
+    def __setstate__(self, state: dict) -> None:
+        # Unpickled and copied arrays come back writable.
+        self.__dict__.update({name: _frozen(value) for name, value in state.items()})
+
+    def __eq__(self, other) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(_equal(self.__dict__[name], other.__dict__[name]) for name in _names(type(self)))
+
+    def __hash__(self) -> int:
+        if "_hash" not in self.__dict__:
+            self.__dict__["_hash"] = hash((type(self), *map(_key, self._fields().values())))
+        return self.__dict__["_hash"]
+
+    def __repr__(self) -> str:
+        """The call that makes the value: required fields by position, others by name where they differ from theirs."""
+        parts = []
+        for field in dataclasses.fields(self):
+            value = self.__dict__[field.name]
+            if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+                parts.append(_typed(value))
+            elif not _equal(value, _frozen(field.default)):
+                parts.append(f"{field.name}={_typed(value)}")
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+_known_names: dict[type, tuple[str, ...]] = {}
+
+
+def _names(cls: type) -> tuple[str, ...]:
+    if cls not in _known_names:
+        _known_names[cls] = tuple(field.name for field in dataclasses.fields(cls))
+    return _known_names[cls]
+
+
+def _equal(a, b) -> bool:
+    if isinstance(a, np.ma.MaskedArray) or isinstance(b, np.ma.MaskedArray):
+        masks = np.array_equal(np.ma.getmaskarray(a), np.ma.getmaskarray(b))
+        return masks and _equal(np.ma.filled(a, 0), np.ma.filled(b, 0))
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        if a is None or b is None:
+            return a is b
+        a, b = np.asarray(a), np.asarray(b)
+        return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc" and b.dtype.kind in "fc")
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(_equal, a, b))
+    return a is b or bool(a == b)
+
+
+def _key(value):
+    """Something hashable that is equal for equal values: 1 and 1.0, 0.0 and -0.0 are equal."""
+    if isinstance(value, np.ndarray):
+        numbers = np.ma.filled(value, 0)
+        if numbers.dtype.kind in "biuf":
+            numbers = numbers.astype(float)
+            numbers = np.where(np.isnan(numbers), np.nan, numbers + 0.0)
+        return numbers.item() if value.ndim == 0 else (value.shape, numbers.tobytes())
+    return tuple(map(_key, value)) if isinstance(value, tuple) else value
+
+
+def _typed(value) -> str:
+    if not isinstance(value, np.ndarray):
+        return repr(value)
+    return repr(value.tolist()) if value.size <= 36 else f"<array {value.shape}>"

@@ -1,0 +1,95 @@
+"""Experiments: machine, law, path, sensors and faults that belong together, from data files; the chapter's Table 1."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..control.laws import PD, AntagonismFilter
+from ..machine.datafiles import data_path, known, read_toml
+from ..machine.manipulator import Manipulator, load
+from ..machine.values import Value
+from ..mechanics.trajectory import Trajectory, triangle
+from .faults import Fault, read_fault
+from .runs import Run, simulate
+from .sensors import Sensors
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Experiment(Value):
+    """A machine, a law, a path, sensors and faults that belong together, as read from a data file."""
+
+    robot: Manipulator
+    law: PD
+    trajectory: Trajectory
+    sensors: Sensors
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Calibration offsets (N,), rad."""
+        return self.sensors.offset
+
+    @property
+    def encoder(self) -> float | None:
+        """Counts per turn; None for ideal angles."""
+        return self.sensors.encoder
+
+    def run(self, law=None) -> Run:
+        """Simulate it, by default with its own law."""
+        return simulate(self.robot, self.law if law is None else law, self.trajectory, sensors=self.sensors,
+                        faults=self.faults)
+
+
+def experiment(source="testbed") -> Experiment:
+    """What a data file holds in its tables [manipulator], [control], [path] and [sensor], and in its [[fault]] tables.
+
+    [sensor] holds the arguments of `Sensors`; each [[fault]] holds the `kind` of a fault and its arguments, such as
+    ``kind = "DeadDrive"``, ``drive = 1``, ``time = 0.5``.
+    Raises ValueError for an unknown key or a value out of range.
+    """
+    robot, tables = load(source), read_toml(source)
+    allowed = {"control": ["K_P", "K_D", "dt"], "path": ["side", "duration", "centre", "angle", "rest"],
+               "sensor": ["offset", "encoder", "velocity_filter"]}
+    for table, keys in allowed.items():
+        for key in tables.get(table, {}):
+            known(f"TOML key in [{table}]", key, keys)
+        if table != "sensor" and table not in tables:
+            raise ValueError(f"the file {str(source)!r} lacks the table [{table}], which an experiment needs")
+    control = tables["control"]
+    path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])
+    sensors = Sensors(**tables.get("sensor", {})).of_drives(robot.n_arms)
+    faults = tuple(map(read_fault, tables.get("fault", [])))
+    return Experiment(robot, PD(control["K_P"], control["K_D"]), path, sensors, faults)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Table1(Value):
+    """Electric energies in J, rows without / with filter, columns drives 1 to 3: `measured` and `simulated` (2, 3)."""
+
+    measured: np.ndarray
+    simulated: np.ndarray
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """(simulated - measured) / measured, (2, 3)."""
+        return (self.simulated - self.measured) / self.measured
+
+
+def measured_energies() -> np.ndarray:
+    """The chapter's Table 1, (2, 3) in J: rows without / with filter, columns drives 1 to 3."""
+    with data_path("table1.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+    return np.array([[float(v) for v in row[1:]] for row in rows[1:]])
+
+
+def table1() -> Table1:
+    """Table 1 as measured, and as simulated by the one consistent reading in ``data/table1_reading.toml``.
+
+    The chapter leaves offsets, path placement and gains open; the reading is a plausible explanation, one of many.
+    """
+    reading = experiment("table1_reading")
+    runs = [reading.run(), reading.run(AntagonismFilter(reading.law, pose="true"))]
+    return Table1(measured_energies(), np.stack([run.energy for run in runs]))

@@ -1,0 +1,173 @@
+"""Faults of drives and encoders as values; each writes into one table per run, which the loops only apply.
+
+Drives count from 0, times are in s from the start of the run.  To add a fault, write one more such class with `mark`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..control.laws import torque_limit
+from ..machine.arguments import bounded, exact_array, whole_number
+from ..machine.datafiles import known
+from ..machine.values import Value
+
+
+class FaultTable(NamedTuple):
+    """What is broken at each sample k.
+
+    limit : (N,) largest torque, N m, infinite where there is no limit.
+    alive : (k, N) bool, False where the torque of a drive is zero.
+    held : (k, N) bool, True where an encoder repeats its last reading.
+    jump : (k, N) what has been added to the offset so far, rad.
+    """
+
+    limit: np.ndarray
+    alive: np.ndarray
+    held: np.ndarray
+    jump: np.ndarray
+
+    def act(self, k: int, c: np.ndarray) -> np.ndarray:
+        """The torques that act at sample k when the controller commands c (N,)."""
+        return np.where(self.alive[k], np.clip(c, -self.limit, self.limit), 0.0)
+
+
+class Fault(Value):
+    """Base of the faults."""
+
+    def mark(self, table: FaultTable, t: np.ndarray) -> None:
+        """Write this fault into the table of a run with the times t (k,)."""
+        raise NotImplementedError
+
+    def _check(self) -> None:
+        """Drive and times of a fault, each a plain number."""
+        self._set(drive=whole_number("drive", self.drive, 0))
+        for name in ("time", "start", "stop", "jump"):
+            if hasattr(self, name):
+                value = exact_array(name, getattr(self, name))
+                self._set(**{name: float(value if name == "jump" else bounded(name, value, 0.0, strict=False))})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TorqueLimit(Fault):
+    """The drives give no more than +-limit in N m: one number, or one per drive (infinity: no limit).
+
+    >>> TorqueLimit(0.3)
+    TorqueLimit(0.3)
+    """
+
+    limit: np.ndarray
+
+    def __post_init__(self):
+        self._set(limit=torque_limit(self.limit))
+        super().__post_init__()
+
+    def mark(self, table, t):
+        if self.limit.shape not in ((), table.limit.shape):
+            raise ValueError(f"limit has shape {self.limit.shape}; allowed: one number or {table.limit.shape}")
+        np.minimum(table.limit, self.limit, out=table.limit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeadDrive(Fault):
+    """A drive gives no torque from `time` on; it goes on measuring."""
+
+    drive: int
+    time: float
+
+    def __post_init__(self):
+        self._check()
+        super().__post_init__()
+
+    def mark(self, table, t):
+        table.alive[_from(t, self.time), self.drive] = False
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EncoderDropout(Fault):
+    """An encoder repeats its last reading before `start` for start <= t < stop; at the first sample it reads once.
+
+    Its rate is that of the repeated reading: zero where rates are ideal, else what the velocity filter makes of it.
+    """
+
+    drive: int
+    start: float
+    stop: float
+
+    def __post_init__(self):
+        self._check()
+        if self.stop <= self.start:
+            raise ValueError(f"stop = {self.stop:g} s; allowed: later than start = {self.start:g} s")
+        super().__post_init__()
+
+    def mark(self, table, t):
+        table.held[_from(t, self.start) & ~_from(t, self.stop), self.drive] = True
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OffsetJump(Fault):
+    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds."""
+
+    drive: int
+    time: float
+    jump: float
+
+    def __post_init__(self):
+        self._check()
+        super().__post_init__()
+
+    def mark(self, table, t):
+        table.jump[_from(t, self.time), self.drive] += self.jump
+
+
+KINDS = {kind.__name__: kind for kind in (TorqueLimit, DeadDrive, EncoderDropout, OffsetJump)}
+
+
+def _from(t: np.ndarray, time: float) -> np.ndarray:
+    """True from `time` on; a sample that misses it by rounding only counts."""
+    return t >= time - 1e-6 * t[-1] / (len(t) - 1)
+
+
+def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
+    """The table of a run with the times t (k,) and N drives; None without faults.
+
+    Raises ValueError for what is no fault, and for a drive that there is not.
+    """
+    faults = check_faults(faults)
+    if not faults:
+        return None
+    shape = len(t), N
+    table = FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
+    for fault in faults:
+        if getattr(fault, "drive", 0) >= N:
+            raise ValueError(f"drive = {fault.drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
+        fault.mark(table, t)
+    return table
+
+
+def check_faults(faults) -> tuple[Fault, ...]:
+    """The faults as a tuple; raises ValueError for what is no fault."""
+    faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
+    for fault in faults:
+        if not isinstance(fault, Fault):
+            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(KINDS)}")
+    return faults
+
+
+def read_fault(table) -> Fault:
+    """A fault from a table of a TOML file: its `kind` and its arguments."""
+    if not isinstance(table, dict) or "kind" not in table:
+        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(KINDS)}")
+    values = {key: value for key, value in table.items() if key != "kind"}
+    known("kind of fault", table["kind"], list(KINDS))
+    kind = KINDS[table["kind"]]
+    names = list(kind.__dataclass_fields__)
+    for key in values:
+        known(f"entry of {table['kind']}", key, names)
+    for name in names:
+        if name not in values:
+            raise ValueError(f"the fault {table['kind']} lacks {name!r}; needed: {', '.join(names)}")
+    return kind(**values)

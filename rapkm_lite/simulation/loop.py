@@ -1,0 +1,64 @@
+"""The sampled loop for laws in Python, one page: sense, measure, find the pose, command, record, hold.
+
+The engine has the same loop compiled, for the laws it knows.
+"""
+
+from __future__ import annotations
+
+import copy
+
+from ..control.sample import Controller, NoPose
+from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, Plant
+from .sensors import Encoders
+from .setup import Outcome, Setup, blank
+
+LAW_FAILED = 4
+
+
+def own_copy(law):
+    """The law that a run may change: objects are copied, and so start every run as they were given.
+
+    Raises ValueError when that is impossible.
+    """
+    try:
+        return copy.deepcopy(law)
+    except Exception as error:
+        raise ValueError(f"law = {law!r} cannot be copied ({error}), and so its runs would depend on each other; "
+                         "allowed: an object that copy.deepcopy copies, or a function") from error
+
+
+def closed_loop(setup: Setup, law) -> tuple[Outcome, Exception | None]:
+    """One run with a law or callable that nobody else uses; returns it and the exception that stopped it.
+
+    What goes wrong at the first sample is an error of the caller, and raised as it is.
+    """
+    robot, model, trajectory, sensors, faults = setup
+    plant, encoders = Plant(robot, trajectory), Encoders(sensors, faults, trajectory.dt)
+    controller = Controller(law, model, trajectory.dt)
+    states, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
+    times, dt = trajectory.t.tolist(), trajectory.dt
+    state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
+    last = len(times) - 1
+    k = 0
+    try:
+        for k, t in enumerate(times):
+            q, qd = plant.observe(k, state)                                            # sense
+            angles, rates = encoders.read(k, q, qd)                                    # measure
+            truth = state[:2], state[2:]
+            torque = controller.command(t, angles, rates, trajectory[k], truth)       # pose (if asked for), command
+            if faults is not None:
+                torque = faults.act(k, torque)
+            states[k], q_a[k], qd_a[k], c[k] = state, q, qd, torque                    # record
+            if controller.pair is not None:
+                pairs[k] = controller.pair
+            if k < last:
+                state = plant.hold(state, torque, dt)                                  # hold
+                if state is None:
+                    return Outcome(LEFT_WORKSPACE, k, *history), None
+    except NoPose as error:
+        return Outcome(NO_POSE, k, *history), error
+    except Exception as error:
+        if k == 0:
+            raise
+        return Outcome(LAW_FAILED, k, *history), error
+    return Outcome(DONE, last, *history), None

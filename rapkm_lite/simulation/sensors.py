@@ -1,0 +1,83 @@
+"""What the controller reads: encoders with offsets and counts, and rates from their differences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..machine.arguments import bounded, exact_array, positive_number, real_array
+from ..machine.values import Value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensors(Value):
+    """How the drives measure.
+
+    offset : calibration offsets in rad, measured minus true angle: one number or (N,).
+    encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
+    velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
+        first-order low-pass; None for the true rates.
+    Raises ValueError for values out of range.
+
+    >>> Sensors(encoder=2000)
+    Sensors(encoder=2000)
+    """
+
+    offset: np.ndarray = 0.0
+    encoder: float | None = None
+    velocity_filter: float | None = None
+
+    def __post_init__(self):
+        self._set(offset=real_array("offset", self.offset))
+        if self.encoder is not None:
+            count = positive_number("encoder", self.encoder)
+            self._set(encoder=int(count) if count.is_integer() else count)
+        if self.velocity_filter is not None:
+            tau = bounded("velocity_filter", exact_array("velocity_filter", self.velocity_filter), 0.0, strict=False)
+            self._set(velocity_filter=float(tau))
+        super().__post_init__()
+
+    @property
+    def count(self) -> float | None:
+        """The angle of one encoder count in rad; None for ideal angles."""
+        return None if self.encoder is None else 2 * np.pi / self.encoder
+
+    def of_drives(self, N: int) -> Sensors:
+        """The same for N drives, with one offset each."""
+        if self.offset.shape not in ((), (N,)):
+            raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or ({N},), one per drive")
+        return self.with_offset(np.broadcast_to(self.offset, (N,)))
+
+    def with_offset(self, offset) -> Sensors:
+        """The same with other offsets."""
+        return Sensors(offset, self.encoder, self.velocity_filter)
+
+
+class Encoders:
+    """The encoders of one run: they remember their last reading and the rate filtered from their differences."""
+
+    def __init__(self, sensors: Sensors, faults, dt: float):
+        self._faults, self._dt = faults, dt
+        self._offset, self._count, self._tau = sensors.offset, sensors.count, sensors.velocity_filter
+        self._last, self._slow = None, np.zeros(len(sensors.offset))
+
+    def read(self, k: int, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Measured base angles and rates (N,) at sample k from the true ones."""
+        faults, last = self._faults, self._last
+        angle = q + self._offset if faults is None else q + (self._offset + faults.jump[k])
+        if self._count is not None:
+            angle = self._count * np.floor(angle / self._count + 0.5)
+        if faults is not None and last is not None:
+            angle = np.where(faults.held[k], last, angle)
+        if self._tau is not None:
+            if last is not None:
+                blend = self._dt / (self._tau + self._dt)
+                self._slow = self._slow + blend * ((angle - last) / self._dt - self._slow)
+            rate = self._slow.copy()
+        else:
+            rate = qd.copy() if faults is None else np.where(faults.held[k], 0.0, qd)
+        self._last = angle
+        angle.setflags(write=False)
+        rate.setflags(write=False)
+        return angle, rate

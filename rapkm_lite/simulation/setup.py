@@ -1,0 +1,68 @@
+"""What a run needs but for its law, and how it ended: what the loops take and give."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..machine.manipulator import Manipulator
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.trajectory import Trajectory
+from .faults import FaultTable, fault_table
+from .sensors import Sensors
+
+
+class Setup(NamedTuple):
+    """A checked run but for its law: `trajectory` is that of `model`, `sensors` have (N,) offsets; made by `prepare`.
+
+    faults : the table of all faults, or None for a healthy machine.
+    """
+
+    robot: Manipulator
+    model: Manipulator
+    trajectory: Trajectory
+    sensors: Sensors
+    faults: FaultTable | None
+
+
+class Outcome(NamedTuple):
+    """How a run ended and its history, rows of samples.
+
+    status : DONE, LEFT_WORKSPACE (during the hold after `sample`), or what kept the law from an answer at `sample`.
+    states : (k, 4) true end-effector position and velocity.  q_a, qd_a : (k, N) true base angles and rates.
+    c : (k, N) torques that acted.  pairs : (k, 2) independent joints in use, -1 where there are none.
+    Rows from `sample` on hold nothing when the run has failed; the row `sample` itself counts for LEFT_WORKSPACE.
+    """
+
+    status: int
+    sample: int
+    states: np.ndarray
+    q_a: np.ndarray
+    qd_a: np.ndarray
+    c: np.ndarray
+    pairs: np.ndarray
+
+
+def blank(samples: int, N: int) -> tuple[np.ndarray, ...]:
+    """Room for the history of a run: states, q_a, qd_a, c and pairs of an `Outcome`."""
+    states, q_a, qd_a, c = np.zeros((samples, 4)), *(np.zeros((samples, N)) for _ in range(3))
+    return states, q_a, qd_a, c, np.full((samples, 2), -1)
+
+
+def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=None, faults=()) -> Setup:
+    """The one check of the arguments of `simulate` and `sweep`.
+
+    Raises ValueError for what does not fit together, and where the machine does not reach the start of the path.
+    """
+    model = robot if model is None else model
+    for name, value, kind in (("robot", robot, Manipulator), ("model", model, Manipulator),
+                              ("trajectory", trajectory, Trajectory), ("sensors", sensors, Sensors)):
+        if not isinstance(value, kind):
+            raise ValueError(f"{name} = {value!r}; allowed: a {kind.__name__}")
+    if model.n_arms != robot.n_arms:
+        raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
+    trajectory = trajectory.for_robot(model)
+    inverse_kinematics(robot, trajectory.x[0])
+    N = robot.n_arms
+    return Setup(robot, model, trajectory, sensors.of_drives(N), fault_table(faults, trajectory.t, N))

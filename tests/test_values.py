@@ -1,0 +1,67 @@
+"""Values do not change: read-only to the last array, also unpickled and copied; equal by value; printed as typed."""
+
+import copy
+import pickle
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rapkm_lite.machine.values import Value, frozen
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sample(Value):
+    numbers: np.ndarray
+    parts: tuple = ()
+    scale: float = 1.0
+    extra: np.ndarray | None = None
+
+
+def copies(value):
+    return copy.copy(value), copy.deepcopy(value), pickle.loads(pickle.dumps(value))
+
+
+def test_no_array_of_a_value_can_be_written():
+    given = np.arange(6.0).reshape(2, 3)
+    masked = np.ma.masked_less([1.0, 2.0, 3.0], 1.5)
+    value = Sample(given, [np.ones(2), 3], extra=masked)
+    given[0, 0] = 9.0  # the caller's own array stays the caller's
+    assert value.numbers[0, 0] == 0.0
+    for v in (value, *copies(value)):
+        assert v == value and hash(v) == hash(value)
+        for array in (v.numbers, v.numbers[0], v.parts[0], v.extra, v.extra.data, v.extra.mask):
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0
+            with pytest.raises(ValueError, match="WRITEABLE"):
+                np.asarray(array).setflags(write=True)
+        with pytest.raises(AttributeError):
+            v.scale = 2.0
+
+
+def test_values_are_equal_by_value():
+    value = Sample(np.array([1.0, 0.0, np.nan]), (np.ones(2),))
+    same = Sample(np.array([1.0, -0.0, np.nan]), [np.ones(2, dtype=int)])
+    assert value == same and hash(value) == hash(same) and len({value, same}) == 1
+    for other in (Sample(np.array([1.0, 0.0, 2.0]), (np.ones(2),)), Sample(np.array([1.0, 0.0, np.nan])), 1.0, None,
+                  Sample(np.array([[1.0, 0.0, np.nan]]), (np.ones(2),)), Sample(value.numbers, value.parts, 2.0),
+                  Sample(value.numbers, value.parts, extra=np.zeros(1))):
+        assert value != other
+    assert Sample(np.ma.masked_less([1.0, 2.0], 1.5)) != Sample(np.ma.masked_less([1.0, 2.0], 0.5))
+    assert Sample(np.array(7)) == Sample(7.0) and hash(Sample(np.array(7))) == hash(Sample(7.0))
+
+
+def test_a_value_prints_as_it_was_typed():
+    assert repr(Sample(np.array(7.05))) == "Sample(7.05)"
+    value = Sample(np.array([1.0, 2.0]), scale=3.0, extra=np.array([0.5]))
+    assert repr(value) == "Sample([1.0, 2.0], scale=3.0, extra=[0.5])"
+    assert repr(Sample(np.zeros((40, 2)))) == "Sample(<array (40, 2)>)"
+
+
+@pytest.mark.parametrize("array", [np.zeros((0, 2)), np.float64(2.0), np.arange(4)[::2], np.ones((2, 2), order="F"),
+                                   np.array([True, False]), np.array(["a", "b"])], ids=str)
+def test_frozen_keeps_shape_type_and_numbers(array):
+    kept = frozen(array)
+    assert kept.shape == np.shape(array) and kept.dtype == np.asarray(array).dtype and np.array_equal(kept, array)
+    assert kept.flags.c_contiguous and not kept.flags.writeable
+    assert frozen(kept) is kept or kept.size == 0
