@@ -15,11 +15,53 @@ from .laws import computed_torque
 from .leaves import solve2
 from .pose import measured_pose, measured_rate, true_pose
 from .rows import (
-    A1, A2, ANTAGONISM, B1, B2, COPPER, EASE, ED, GAIN_D, GAIN_I, GAIN_P, JOINT_J, JOINT_K, LAST, LIMIT, LOW, MEMORY,
-    OFFSET, OLD, QD, READ, SAMPLE, SLOW, STATUS, TORQUE2, VX, VY, WEIGHT, WORK, C, E, Q, X, Y, at, of,
+    A1,
+    A2,
+    ANTAGONISM,
+    B1,
+    B2,
+    COPPER,
+    EASE,
+    ED,
+    GAIN_D,
+    GAIN_I,
+    GAIN_P,
+    JOINT_J,
+    JOINT_K,
+    LIMIT,
+    MEMORY,
+    OFFSET,
+    OLD,
+    QD,
+    READ,
+    SAMPLE,
+    SLOW,
+    STATUS,
+    TORQUE2,
+    VX,
+    VY,
+    WEIGHT,
+    WORK,
+    C,
+    E,
+    Q,
+    X,
+    Y,
+    at,
+    of,
+    want,
 )
 from .tables import (
-    ANGLE, COMMAND_FILTER, DONE, FORCE_FILTER, LEFT_WORKSPACE, MEASURED, NO_FILTER, PD, PID, RATE, SINGULAR, want,
+    ANGLE,
+    COMMAND_FILTER,
+    DONE,
+    FORCE_FILTER,
+    MEASURED,
+    NO_FILTER,
+    PD,
+    PID,
+    RATE,
+    SINGULAR,
 )
 
 
@@ -42,12 +84,12 @@ def measure(lanes, arms, sensor, faulty, faults, row, w, dt, k):
         for j in range(L):
             angle = w[at(Q, i, j, W, L)] + w[at(OFFSET, i, j, W, L)]
             if len(faulty) > 0:
-                angle += faults.jump[k, i]
+                angle += faults.jump[k][i]
             if sensor.quantized:
                 angle = sensor.quantum * math.floor(angle / sensor.quantum + 0.5)
             rate = w[at(QD, i, j, W, L)]
             if len(faulty) > 0:
-                held = faults.held[k, i] > 0.0
+                held = k > 0 and faults.held[k][i] > 0.0
                 angle, rate = w[at(READ, i, j, W, L)] if held else angle, 0.0 if held else rate
             if sensor.filtered:
                 slow = w[at(SLOW, i, j, W, L)]
@@ -150,7 +192,7 @@ def break_drives(lanes, arms, faults, w, k):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            c, limit = w[at(C, i, j, W, L)] * faults.alive[k, i], faults.limit[k, i]
+            c, limit = w[at(C, i, j, W, L)] * faults.alive[k][i], faults.limit[i]
             w[at(C, i, j, W, L)] = min(max(c, -limit), limit)
 
 

@@ -11,11 +11,59 @@ import math
 from .jit import leaf, outlined
 from .leaves import accelerations, drag, geometry, inertia, share, small_angle, solve2
 from .rows import (
-    ACC, AD, AX, AY, B1, B2, BX, BY, C, FRICTION, FX, FY, HALF, INV, KX, KY, L1SQ, L2SQ, LOW, M11, M12, M22, MEAN,
-    MODE, NEAR, PUSH, QD, S1, S2, SAMPLE, SCALE, STATUS, STEP, STEPS, SVX, SVY, SX, SY, TVX, TVY, TX, TY, VX, VY, W1,
-    W2, Q, X, Y, at, of,
+    ACC,
+    AD,
+    AX,
+    AY,
+    B1,
+    B2,
+    BX,
+    BY,
+    FRICTION,
+    FX,
+    FY,
+    HALF,
+    INV,
+    KX,
+    KY,
+    L1SQ,
+    L2SQ,
+    LOW,
+    M11,
+    M12,
+    M22,
+    MEAN,
+    MODE,
+    PUSH,
+    QD,
+    S1,
+    S2,
+    SAMPLE,
+    SCALE,
+    STATUS,
+    STEP,
+    STEPS,
+    SVX,
+    SVY,
+    SX,
+    SY,
+    TVX,
+    TVY,
+    TX,
+    TY,
+    VX,
+    VY,
+    W1,
+    W2,
+    C,
+    Q,
+    X,
+    Y,
+    at,
+    of,
+    want,
 )
-from .tables import ANGLE, COS, DONE, LEFT_WORKSPACE, SIN, TOO_STIFF, want
+from .tables import ANGLE, COS, DONE, LEFT_WORKSPACE, SIN, TOO_STIFF
 
 # Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
 STIFF, FAST, MOST_STEPS = 1.5, 1.0, 4000.0
@@ -28,7 +76,7 @@ def seen(arm, env, extra, place, x, y, vx, vy, dt):
     place : what `geometry` gives.
     """
     base_x, base_y, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction = arm
-    ax, ay, dx, dy, ad, inv, _ = place
+    ax, ay, dx, dy, ad, inv, area2 = place
     bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
     base, back = bx * vx + by * vy, lx * vx + ly * vy
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
@@ -38,7 +86,7 @@ def seen(arm, env, extra, place, x, y, vx, vy, dt):
         fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
     # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector coordinates
     # a Runge-Kutta step could jump over that instant.
-    return base, bx, by, base_acc, m11, m12, m22, fx, fy, 1.0 - dt * ad * inv * (base + back)
+    return base, bx, by, base_acc, m11, m12, m22, fx, fy, min(area2, 1.0 - dt * ad * inv * (base + back))
 
 
 @outlined

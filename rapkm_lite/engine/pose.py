@@ -7,10 +7,48 @@ import math
 from .jit import leaf, outlined
 from .leaves import geometry, small_angle, solve2
 from .rows import (
-    A1, A2, B1, B2, BX, BY, ED, FAR, GX, GY, HALF, L1SQ, L2SQ, MEAN, MODE, MODEL, NEAR, P11, P12, P22, PVX, PVY, PX,
-    PX1, PX2, PY, PY1, PY2, SAMPLE, SCALE, STATUS, TODO, VX, VY, E, X, Y, at, of,
+    A1,
+    A2,
+    B1,
+    B2,
+    BX,
+    BY,
+    ED,
+    FAR,
+    GX,
+    GY,
+    HALF,
+    L1SQ,
+    L2SQ,
+    MEAN,
+    MODE,
+    MODEL,
+    NEAR,
+    P11,
+    P12,
+    P22,
+    PVX,
+    PVY,
+    PX,
+    PX1,
+    PX2,
+    PY,
+    PY1,
+    PY2,
+    SAMPLE,
+    SCALE,
+    STATUS,
+    TODO,
+    VX,
+    VY,
+    E,
+    X,
+    Y,
+    at,
+    of,
+    want,
 )
-from .tables import COS, DONE, NO_POSE, RATE, SIN, want
+from .tables import COS, DONE, NO_POSE, RATE, SIN
 
 
 @leaf

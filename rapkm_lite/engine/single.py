@@ -4,15 +4,54 @@ from __future__ import annotations
 
 import math
 
-from .jit import leaf, outlined
+from .jit import kernel, leaf, outlined
 from .leaves import geometry, share, small_angle, solve2
-from .plant import FAST, MOST_STEPS, STIFF, seen, stiffness
+from .plant import FAST, MOST_STEPS, STIFF, mend, seen, stiffness
 from .rows import (
-    ACC, AD, AX, AY, B1, B2, BX, BY, C, FRICTION, FX, FY, HALF, INV, L1SQ, L2SQ, LOW, M11, M12, M22, MEAN, MODE, NEAR,
-    PUSH, QD, S1, S2, SCALE, STATUS, STEPS, UX, UY, VX, VY, W1, W2, Q, X, Y, of, total,
+    ACC,
+    AD,
+    AX,
+    AY,
+    B1,
+    B2,
+    BX,
+    BY,
+    FRICTION,
+    FX,
+    FY,
+    HALF,
+    INV,
+    L1SQ,
+    L2SQ,
+    LOW,
+    M11,
+    M12,
+    M22,
+    MEAN,
+    MODE,
+    NEAR,
+    PUSH,
+    QD,
+    S1,
+    S2,
+    SCALE,
+    STEPS,
+    UX,
+    UY,
+    VX,
+    VY,
+    W1,
+    W2,
+    WANTED,
+    C,
+    Q,
+    X,
+    Y,
+    of,
+    total,
+    want,
 )
-from .rows import ANGLE as DESIRED
-from .tables import ANGLE, COS, SIN, want
+from .tables import ANGLE, COS, SIN
 
 
 @leaf
@@ -22,7 +61,8 @@ def sense(arms, env, extra, row, w, dt):
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
     for i in range(W):
         # Into the table first: beside another array the loop below would not become vector instructions.
-        w[DESIRED * W + i], w[UX * W + i], w[UY * W + i] = want(row, ANGLE, i, W), want(row, COS, i, W), want(row, SIN, i, W)
+        w[WANTED * W + i] = want(row, ANGLE, i, W)
+        w[UX * W + i], w[UY * W + i] = want(row, COS, i, W), want(row, SIN, i, W)
     for i in range(W):
         arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
                w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
@@ -31,7 +71,7 @@ def sense(arms, env, extra, row, w, dt):
         ax, ay, ux, uy = place[0], place[1], w[UX * W + i], w[UY * W + i]
         s, t = (ux * ay - uy * ax) * w[SCALE * W + i], ux * ax + uy * ay
         w[NEAR * W + i] = min(0.1 - abs(s), t)
-        w[Q * W + i], w[QD * W + i] = w[DESIRED * W + i] + small_angle(s), rate
+        w[Q * W + i], w[QD * W + i] = w[WANTED * W + i] + small_angle(s), rate
         w[AX * W + i], w[AY * W + i], w[AD * W + i] = ax, ay, place[4]
         w[INV * W + i], w[B1 * W + i], w[B2 * W + i] = place[5], bx, by
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
@@ -124,3 +164,35 @@ def hold(arms, env, extra, w, dt):
         x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
         x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, dt)
     w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
+
+
+@leaf
+def put(arms, w, x, y, vx, vy):
+    """Write the state of the machine."""
+    W = len(arms)
+    w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
+
+
+@kernel
+def observe(arms, machine, row, x, y, vx, vy, w, q, qd):
+    """True base angles and rates (N,) for a controller in Python; `row` is the desired motion."""
+    put(arms, w, x, y, vx, vy)
+    if sense(arms, machine.env, machine.extra, row, w, 0.0) > 0:
+        mend(((),), arms, row, w)
+    for i in range(len(q)):
+        q[i], qd[i] = w[Q * len(arms) + i], w[QD * len(arms) + i]
+
+
+@kernel
+def advance(arms, machine, row, x, y, vx, vy, w, c, dt):
+    """`hold` for a controller in Python: the state after the torques c (N,), and a number not positive for a lost arm."""
+    W = len(arms)
+    put(arms, w, x, y, vx, vy)
+    sense(arms, machine.env, machine.extra, row, w, dt)
+    for i in range(len(c)):
+        w[C * W + i] = c[i]
+    hold(arms, machine.env, machine.extra, w, dt)
+    low = w[LOW * W]
+    for i in range(1, W):
+        low = min(low, w[LOW * W + i])
+    return w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)], low

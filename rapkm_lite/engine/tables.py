@@ -6,8 +6,6 @@ from collections import namedtuple
 
 import numpy as np
 
-from .jit import leaf
-
 # What a run ended with; laws; filters; pose sources.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
 PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(8)
@@ -21,28 +19,24 @@ Law = namedtuple("Law", "form filter pose same switched")
 Faults = namedtuple("Faults", "limit alive held jump")
 History = namedtuple("History", "states q_a qd_a c pairs")
 
-# Rows of the arm table, (14, N).
-ARM_ROWS = 15
-
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
-ANGLE, RATE, ACCELERATION, ELBOW, ELBOW_RATE, ELBOW_ACCELERATION, COS, SIN, ELBOW_COS, ELBOW_SIN = range(10)
+(ANGLE, RATE, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, COS, SIN, ELBOW_COS, ELBOW_SIN) = range(9)
 
 
-@leaf
-def want(row, block, i, W):
-    """Desired motion of arm i at a sample."""
-    return row[6 + block * W + i]
+def arm_table(robot, width: int) -> np.ndarray:
+    """The constants of each arm that the kernels need, (15, width), in the order of `rows`.
 
-
-def arm_table(robot) -> np.ndarray:
-    """The constants of each arm that the kernels need, (15, N), in the order of `rows`."""
+    Arms beyond the machine's are copies of its first one, without mass and friction.
+    """
     l1, l2 = robot.lengths.T
     proximal, distal, _ = robot.arm_inertias.T
     w1, w2 = robot.arm_moments.T
-    mass = _tip_masses(robot)
-    return np.stack([
-        *robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2, robot.mode,
-        proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction, 1 / l1, 1 / (l1 * l2)])
+    mass, none = _tip_masses(robot), np.arange(width) >= robot.n_arms
+    geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2, robot.mode]
+    masses = [proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction]
+    table = np.stack([*geometry, *masses, 1 / l1, 1 / (l1 * l2)])[:, _filled(robot.n_arms, width)]
+    table[len(geometry) : len(geometry) + len(masses), none] = 0.0
+    return table
 
 
 def _tip_masses(robot) -> np.ndarray:
@@ -59,20 +53,20 @@ def environment(robot) -> np.ndarray:
 
 
 def motion_table(trajectory, width: int) -> np.ndarray:
-    """Desired motion per sample, (k, 6 + 10 width); arms beyond the machine's are copies of its first one."""
+    """Desired motion per sample, (k, 6 + 9 width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
     q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
-    blocks = [q[:, :N], qd[:, :N], qdd[:, :N], q[:, N:], qd[:, N:], qdd[:, N:],
+    blocks = [q[:, :N], qd[:, :N], qdd[:, :N], qd[:, N:], qdd[:, N:],
               np.cos(q[:, :N]), np.sin(q[:, :N]), np.cos(q[:, N:]), np.sin(q[:, N:])]
-    arms = np.minimum(np.arange(width), N) % N
+    arms = _filled(N, width)
     return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks)])
+
+
+def _filled(N: int, width: int) -> np.ndarray:
+    """Indices of the arms in a row of `width`: those beyond the machine's are copies of its first one."""
+    return np.where(np.arange(width) < N, np.arange(width), 0)
 
 
 def sizes(count: int) -> tuple:
     """A tuple of `count` nothings: the compiler knows the length of a tuple, but not that of an array."""
     return ((),) * count
-
-
-def machine(robot) -> Machine:
-    """Environment of a machine; `extra` has an entry when it has gravity or friction."""
-    return Machine(environment(robot), sizes(int(bool(robot.friction.any() or robot.gravity.any()))))
