@@ -93,12 +93,12 @@ from .tables import (
 
 
 @outlined
-def look(lanes, drives, arms, row, w):
+def look(lanes, drives, arms, table, o, w):
     """The model at the pose: rows b and l of its rates, a.d, 1 / (a x d), and the errors of the elbows."""
     L, N, W = len(lanes), len(drives), len(arms)
     far = 0
     for i in range(N):
-        cos, sin, rate = want(row, ELBOW_COS, i, W), want(row, ELBOW_SIN, i, W), want(row, ELBOW_RATE, i, W)
+        cos, sin, rate = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W), want(table, o, ELBOW_RATE, i, W)
         for j in range(L):
             ax, ay, dx, dy, ad, inv, _ = geometry(
                 w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
@@ -115,7 +115,7 @@ def look(lanes, drives, arms, row, w):
             far += 1 if min(0.1 - abs(s), t) < 0.0 else 0
     if far > 0:
         for i in range(N):
-            cos, sin = want(row, ELBOW_COS, i, W), want(row, ELBOW_SIN, i, W)
+            cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
             for j in range(L):
                 ad, den = w[at(MAD, i, j, W, L)], 1.0 / w[at(MINV, i, j, W, L)]
                 w[at(ELBOW_E, i, j, W, L)] = math.atan2(cos * den - sin * ad, cos * ad + sin * den)
@@ -150,7 +150,7 @@ def best_pair(lanes, drives, arms, w):
 
 
 @leaf
-def joint(drives, arms, row, w, which, j, L):
+def joint(drives, arms, table, o, w, which, j, L):
     """Of the joint whose number stands in the run row `which`: its row of F, its acceleration at zero xdd, its errors,
     desired rate and acceleration."""
     N, W = len(drives), len(arms)
@@ -165,33 +165,33 @@ def joint(drives, arms, row, w, which, j, L):
         acc += b * w[at(ACC_B, i, j, W, L)] + s * w[at(ACC_E, i, j, W, L)]
         e += b * w[at(E, i, j, W, L)] + s * w[at(ELBOW_E, i, j, W, L)]
         ed += b * w[at(ED, i, j, W, L)] + s * w[at(ELBOW_ED, i, j, W, L)]
-        rate += b * want(row, RATE, i, W) + s * want(row, ELBOW_RATE, i, W)
-        desired += b * want(row, ACCELERATION, i, W) + s * want(row, ELBOW_ACCELERATION, i, W)
+        rate += b * want(table, o, RATE, i, W) + s * want(table, o, ELBOW_RATE, i, W)
+        desired += b * want(table, o, ACCELERATION, i, W) + s * want(table, o, ELBOW_ACCELERATION, i, W)
     return fx, fy, acc, e, ed, rate, desired
 
 
 @outlined
-def reference(lanes, drives, arms, law, row, w):
+def reference(lanes, drives, arms, law, table, o, w):
     """The reference rate u: the velocity of the pose, in APD laws what the desired rates of the coordinates mean."""
     L, N, W = len(lanes), len(drives), len(arms)
     if law.form == REDUNDANT_APD:
         for j in range(L):
             fx = fy = 0.0
             for i in range(N):
-                a1, a2, rate, elbow = (w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], want(row, RATE, i, W),
-                                       want(row, ELBOW_RATE, i, W))
+                a1, a2, rate, elbow = (w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], want(table, o, RATE, i, W),
+                                       want(table, o, ELBOW_RATE, i, W))
                 fx += a1 * rate - (a1 + w[at(L1, i, j, W, L)]) * elbow
                 fy += a2 * rate - (a2 + w[at(L2, i, j, W, L)]) * elbow
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = solve2(
                 w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy)
     elif law.form == APD:
         for j in range(L):
-            a11, a12, _, _, _, r1, _ = joint(drives, arms, row, w, JOINT_J, j, L)
-            a21, a22, _, _, _, r2, _ = joint(drives, arms, row, w, JOINT_K, j, L)
+            a11, a12, _, _, _, r1, _ = joint(drives, arms, table, o, w, JOINT_J, j, L)
+            a21, a22, _, _, _, r2, _ = joint(drives, arms, table, o, w, JOINT_K, j, L)
             task = w[of(JOINT_J, j, W, L)] < 0.0
             det = 1.0 if task else a11 * a22 - a12 * a21
-            w[of(REF_X, j, W, L)] = row[2] if task else (a22 * r1 - a12 * r2) / det
-            w[of(REF_Y, j, W, L)] = row[3] if task else (a11 * r2 - a21 * r1) / det
+            w[of(REF_X, j, W, L)] = table[o + 2] if task else (a22 * r1 - a12 * r2) / det
+            w[of(REF_Y, j, W, L)] = table[o + 3] if task else (a11 * r2 - a21 * r1) / det
     else:
         for j in range(L):
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
@@ -221,17 +221,17 @@ def shares(lanes, drives, arms, model, w):
 
 
 @outlined
-def minimal_feedback(lanes, drives, arms, law, row, w):
+def minimal_feedback(lanes, drives, arms, law, table, o, w):
     """w and g of APD and CTC for two joints or, where JOINT_J is negative, the end-effector position."""
     L, W = len(lanes), len(arms)
     for j in range(L):
-        a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, row, w, JOINT_J, j, L)
-        a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, row, w, JOINT_K, j, L)
+        a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
+        a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
         task = w[of(JOINT_J, j, W, L)] < 0.0
         a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
-        e1, e2 = w[of(PX, j, W, L)] - row[0] if task else e1, w[of(PY, j, W, L)] - row[1] if task else e2
-        e1d, e2d = w[of(PVX, j, W, L)] - row[2] if task else e1d, w[of(PVY, j, W, L)] - row[3] if task else e2d
-        v1, v2 = row[4] if task else v1 - acc1, row[5] if task else v2 - acc2
+        e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
+        e1d, e2d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d, w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
+        v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
         s1 = w[of(PAIR_P1, j, W, L)] * e1 + w[of(PAIR_D1, j, W, L)] * e1d
         s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
         force = law.form == APD
@@ -256,7 +256,7 @@ def gram(lanes, drives, arms, w):
 
 
 @outlined
-def redundant_feedback(lanes, drives, arms, law, row, w):
+def redundant_feedback(lanes, drives, arms, law, table, o, w):
     """w and g of (28) and (32) in all joints: w = F^+ (v - Fdot u), or F^T G (v - Fdot u) as a force in line 2."""
     L, N, W = len(lanes), len(drives), len(arms)
     force, line2 = law.form == REDUNDANT_APD, law.form == REDUNDANT_CTC_LINE2
@@ -269,16 +269,16 @@ def redundant_feedback(lanes, drives, arms, law, row, w):
             s = w[at(GAIN_P, i, j, W, L)] * w[at(E, i, j, W, L)] + w[at(GAIN_D, i, j, W, L)] * w[at(ED, i, j, W, L)]
             t = (w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
                  + w[at(ELBOW_D, i, j, W, L)] * w[at(ELBOW_ED, i, j, W, L)])
-            r = want(row, ACCELERATION, i, W) - w[at(ACC_B, i, j, W, L)]
-            q = want(row, ELBOW_ACCELERATION, i, W) - w[at(ACC_E, i, j, W, L)]
+            r = want(table, o, ACCELERATION, i, W) - w[at(ACC_B, i, j, W, L)]
+            q = want(table, o, ELBOW_ACCELERATION, i, W) - w[at(ACC_E, i, j, W, L)]
             ad, inv = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)]
             l1sq, l2sq = w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)]
             if force:
                 gx, gy = gx - bx * s - ex * t, gy - by * s - ey * t
                 # The part of the desired rates that is not tangent, turned by Fdot^T.
                 base, back = inv * (bx * vx + by * vy), inv * (lx * vx + ly * vy)
-                rest = want(row, RATE, i, W) - (bx * ux + by * uy)
-                bend = want(row, ELBOW_RATE, i, W) - (ex * ux + ey * uy)
+                rest = want(table, o, RATE, i, W) - (bx * ux + by * uy)
+                bend = want(table, o, ELBOW_RATE, i, W) - (ex * ux + ey * uy)
                 p, b = base * ad * (rest - bend) - base * l1sq * bend, back * l2sq * (rest - bend) - back * ad * bend
                 tx, ty = tx + bx * p + lx * b, ty + by * p + ly * b
             else:
@@ -299,8 +299,9 @@ def redundant_feedback(lanes, drives, arms, law, row, w):
 def distribute(lanes, drives, arms, env, w):
     """c = A (A^T A)^-1 (M w + h + g), weighted where W is not the identity."""
     L, N, W = len(lanes), len(drives), len(arms)
+    mass = env[3]
     for j in range(L):
-        m11, m12, m22 = env[3], 0.0, env[3]
+        m11, m12, m22 = mass, 0.0, mass
         n11 = n12 = n22 = 0.0
         fx, fy = w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)]
         for i in range(N):
@@ -315,18 +316,18 @@ def distribute(lanes, drives, arms, env, w):
 
 
 @leaf
-def computed_torque(lanes, drives, arms, model, law, row, w):
+def computed_torque(lanes, drives, arms, model, law, table, o, w):
     """Drive torques C of the laws with a model, at the pose PX, PY, PVX, PVY."""
-    look(lanes, drives, arms, row, w)
+    look(lanes, drives, arms, table, o, w)
     if law.switched:
         best_pair(lanes, drives, arms, w)
     redundant = law.form >= REDUNDANT_APD
     if redundant:
         gram(lanes, drives, arms, w)
-    reference(lanes, drives, arms, law, row, w)
+    reference(lanes, drives, arms, law, table, o, w)
     shares(lanes, drives, arms, model, w)
     if redundant:
-        redundant_feedback(lanes, drives, arms, law, row, w)
+        redundant_feedback(lanes, drives, arms, law, table, o, w)
     else:
-        minimal_feedback(lanes, drives, arms, law, row, w)
+        minimal_feedback(lanes, drives, arms, law, table, o, w)
     distribute(lanes, drives, arms, model.env, w)

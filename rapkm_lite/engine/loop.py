@@ -66,60 +66,78 @@ from .tables import (
 
 
 @leaf
-def sense(lanes, drives, arms, machine, row, w, dt):
+def sense(lanes, drives, arms, machine, table, o, w, dt):
     """True base angles and rates, and the geometry and shares of the arms that the hold starts from."""
     if len(lanes) == 1:
-        far = single.sense(arms, machine.env, machine.extra, row, w, dt)
+        far = single.sense(arms, machine.env, machine.extra, table, 0, w, dt)
     else:
-        far = plant.sense(lanes, arms, machine.env, machine.extra, row, w, dt)
+        far = plant.sense(lanes, arms, machine.env, machine.extra, table, o, w, dt)
     if far > 0:
-        plant.mend(lanes, arms, row, w)
+        plant.mend(lanes, arms, table, o, w)
 
 
 @leaf
-def measure(lanes, arms, sensor, faulty, faults, row, w, dt, k):
+def measure(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
     """Readings of the encoders with offsets, counts and faults, rates from their differences; the errors E, ED."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            angle = w[at(Q, i, j, W, L)] + w[at(OFFSET, i, j, W, L)]
-            if len(faulty) > 0:
-                angle += faults.jump[k][i]
-            if sensor.quantized:
-                angle = sensor.quantum * math.floor(angle / sensor.quantum + 0.5)
-            rate = w[at(QD, i, j, W, L)]
-            if len(faulty) > 0:
-                held = k > 0 and faults.held[k][i] > 0.0
-                angle, rate = w[at(READ, i, j, W, L)] if held else angle, 0.0 if held else rate
-            if sensor.filtered:
-                slow = w[at(SLOW, i, j, W, L)]
-                # Nothing to compare the first reading with.
-                rate = slow + sensor.blend * ((angle - w[at(READ, i, j, W, L)]) / dt - slow) if k > 0 else 0.0
-                w[at(SLOW, i, j, W, L)] = rate
-            w[at(READ, i, j, W, L)] = angle
-            w[at(E, i, j, W, L)], w[at(ED, i, j, W, L)] = angle - want(row, ANGLE, i, W), rate - want(row, RATE, i, W)
+            w[at(E, i, j, W, L)] = w[at(Q, i, j, W, L)] + w[at(OFFSET, i, j, W, L)]
+            w[at(ED, i, j, W, L)] = w[at(QD, i, j, W, L)]
+    if len(faulty) > 0 or sensor.quantized or sensor.filtered:
+        read(lanes, arms, sensor, faulty, faults, w, dt, k)
+    for i in range(W):
+        angle, rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
+        for j in range(L):
+            w[at(E, i, j, W, L)] -= angle
+            w[at(ED, i, j, W, L)] -= rate
+
+
+@outlined
+def read(lanes, arms, sensor, faulty, faults, w, dt, k):
+    """What real encoders make of the angles and rates in E, ED."""
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        if len(faulty) > 0:
+            for j in range(L):
+                w[at(E, i, j, W, L)] += faults.jump[k][i]
+        if sensor.quantized:
+            for j in range(L):
+                w[at(E, i, j, W, L)] = sensor.quantum * math.floor(w[at(E, i, j, W, L)] / sensor.quantum + 0.5)
+        if len(faulty) > 0 and k > 0 and faults.held[k][i] > 0.0:
+            for j in range(L):
+                w[at(E, i, j, W, L)], w[at(ED, i, j, W, L)] = w[at(READ, i, j, W, L)], 0.0
+        if sensor.filtered:
+            # Nothing to compare the first reading with.
+            blend = sensor.blend if k > 0 else 0.0
+            for j in range(L):
+                rate, slow = (w[at(E, i, j, W, L)] - w[at(READ, i, j, W, L)]) / dt, w[at(SLOW, i, j, W, L)]
+                w[at(SLOW, i, j, W, L)] = slow + blend * (rate - slow)
+                w[at(ED, i, j, W, L)] = w[at(SLOW, i, j, W, L)]
+        for j in range(L):
+            w[at(READ, i, j, W, L)] = w[at(E, i, j, W, L)]
 
 
 @leaf
-def find_pose(lanes, drives, arms, law, smooth, row, w, k):
+def find_pose(lanes, drives, arms, law, smooth, table, o, w, k):
     """The pose that the law and its filter go by; none for decentralized laws."""
     if law.pose == MEASURED:
-        measured_pose(lanes, drives, arms, row, w, k, smooth)
+        measured_pose(lanes, drives, arms, table, o, w, k, smooth)
         if law.form > PID:
-            measured_rate(lanes, drives, arms, row, w)
+            measured_rate(lanes, drives, arms, table, o, w)
     else:
         true_pose(lanes, drives, arms, law, w)
 
 
 @leaf
-def command(lanes, drives, arms, model, law, row, w, dt):
+def command(lanes, drives, arms, model, law, table, o, w, dt):
     """Drive torques C."""
     if law.form == PD:
         proportional(lanes, arms, w)
     elif law.form == PID:
         integral(lanes, arms, w, dt)
     else:
-        computed_torque(lanes, drives, arms, model, law, row, w)
+        computed_torque(lanes, drives, arms, model, law, table, o, w)
     if law.filter == FORCE_FILTER:
         force_filter(lanes, drives, arms, w)
     elif law.filter == COMMAND_FILTER:
@@ -243,18 +261,19 @@ def closed_loops(lanes, drives, arms, faulty, machine, model, motion, sensor, la
 
     A single run leaves its history, a study its sums and final states in w, both their status.
     """
-    L, W, samples = len(lanes), len(arms), len(motion.table)
+    L, table, columns = len(lanes), motion.table, 6 + 9 * len(arms)
+    samples = len(table) // columns
     for k in range(samples):
-        row = motion.table[k]
-        sense(lanes, drives, arms, machine, row, w, motion.dt)
+        o = k * columns
+        sense(lanes, drives, arms, machine, table, o, w, motion.dt)
         if L > 1:
             add_work(lanes, drives, arms, w)
-        measure(lanes, arms, sensor, faulty, faults, row, w, motion.dt, k)
+        measure(lanes, arms, sensor, faulty, faults, table, o, w, motion.dt, k)
         if law.form > PID or law.filter != NO_FILTER:
-            find_pose(lanes, drives, arms, law, not sensor.quantized, row, w, k)
+            find_pose(lanes, drives, arms, law, not sensor.quantized, table, o, w, k)
         if L > 1 and k + 1 == samples:
             return k
-        command(lanes, drives, arms, model, law, row, w, motion.dt)
+        command(lanes, drives, arms, model, law, table, o, w, motion.dt)
         if len(faulty) > 0:
             break_drives(lanes, arms, faults, w, k)
         if L == 1:
@@ -272,7 +291,7 @@ def closed_loops(lanes, drives, arms, faulty, machine, model, motion, sensor, la
     return samples - 1
 
 
-@outlined
+@leaf
 def lost(lanes, drives, arms, w, k):
     """Mark runs whose torques are not finite; true when all have ended."""
     L, W = len(lanes), len(arms)

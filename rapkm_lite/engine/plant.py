@@ -90,12 +90,12 @@ def seen(arm, env, extra, place, x, y, vx, vy, dt):
 
 
 @outlined
-def sense(lanes, arms, env, extra, row, w, dt):
+def sense(lanes, arms, env, extra, table, o, w, dt):
     """Base angles and rates, geometry and shares of all arms; returns how many arms are far from where they should be."""
     L, W = len(lanes), len(arms)
     count = 0
     for i in range(W):
-        angle, ux, uy = want(row, ANGLE, i, W), want(row, COS, i, W), want(row, SIN, i, W)
+        angle, ux, uy = want(table, o, ANGLE, i, W), want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             x, y, vx, vy = w[of(X, j, W, L)], w[of(Y, j, W, L)], w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             arm = (w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)],
@@ -118,16 +118,16 @@ def sense(lanes, arms, env, extra, row, w, dt):
 
 
 @leaf
-def mend(lanes, arms, row, w):
+def mend(lanes, arms, table, o, w):
     """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent."""
     L, W = len(lanes), len(arms)
     for i in range(W):
-        ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+        ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             ax, ay = w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)]
             s, t = ux * ay - uy * ax, ux * ax + uy * ay
             if not (abs(s * w[at(SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
-                w[at(Q, i, j, W, L)] = want(row, ANGLE, i, W) + math.atan2(s, t)
+                w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + math.atan2(s, t)
 
 
 @outlined
@@ -151,8 +151,9 @@ def pull(lanes, arms, env, extra, w):
 def join(lanes, arms, env, w):
     """End-effector accelerations from the shares of the arms."""
     L, W = len(lanes), len(arms)
+    mass = env[3]
     for j in range(L):
-        m11, m12, m22, fx, fy = env[3], -0.0, env[3], -0.0, -0.0
+        m11, m12, m22, fx, fy = mass, -0.0, mass, -0.0, -0.0
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
             fx, fy = fx + w[at(FX, i, j, W, L)], fy + w[at(FY, i, j, W, L)]
@@ -176,9 +177,9 @@ def stiffness(friction, env, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
 def count_steps(lanes, arms, env, w, dt):
     """Steps of equal length that each run needs in a hold because of friction; returns the largest number."""
     L, W = len(lanes), len(arms)
-    most = 1.0
+    most, mass = 1.0, env[3]
     for j in range(L):
-        m11, m12, m22 = env[3], -0.0, env[3]
+        m11, m12, m22 = mass, -0.0, mass
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
         stiff, fast, near = 0.0, 0.0, 0.0
@@ -261,7 +262,7 @@ def hold(lanes, arms, env, extra, w, dt, k):
     return judge(lanes, arms, w, k)
 
 
-@outlined
+@leaf
 def judge(lanes, arms, w, k):
     """Mark the runs that were lost in the hold after sample k; returns how many runs have ended."""
     L, W = len(lanes), len(arms)

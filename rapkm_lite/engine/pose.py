@@ -80,11 +80,11 @@ def control_rows(lanes, drives, arms, w):
 
 
 @outlined
-def newton_step(lanes, drives, arms, row, w, tolerance):
+def newton_step(lanes, drives, arms, table, o, w, tolerance):
     """One Newton step for the least-squares pose of all runs; returns how many need another one."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
-        ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+        ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             l2sq = w[at(MODEL + L2SQ, i, j, W, L)]
             ax, ay, dx, dy, ad, inv, area2 = geometry(
@@ -126,7 +126,7 @@ def newton_step(lanes, drives, arms, row, w, tolerance):
 
 
 @outlined
-def gauss_newton(drives, arms, row, w, j, L, x, y, tolerance):
+def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
     """Least-squares pose of one run from a rough start; returns it, and whether it converged."""
     N, W = len(drives), len(arms)
     for _ in range(50):
@@ -138,7 +138,7 @@ def gauss_newton(drives, arms, row, w, j, L, x, y, tolerance):
             if not area2 > 0.0:
                 return x, y, False
             bx, by = dx * inv, dy * inv
-            ux, uy = want(row, COS, i, W), want(row, SIN, i, W)
+            ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
             r = w[at(E, i, j, W, L)] - math.atan2(ux * ay - uy * ax, ux * ax + uy * ay)
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
@@ -150,7 +150,7 @@ def gauss_newton(drives, arms, row, w, j, L, x, y, tolerance):
 
 
 @leaf
-def measured_pose(lanes, drives, arms, row, w, k, smooth):
+def measured_pose(lanes, drives, arms, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
     tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
@@ -165,14 +165,14 @@ def measured_pose(lanes, drives, arms, row, w, k, smooth):
     count = L
     for _ in range(12):
         if count > 0:
-            count = newton_step(lanes, drives, arms, row, w, tolerance)
+            count = newton_step(lanes, drives, arms, table, o, w, tolerance)
     rough = 0.0
     for j in range(L):
         rough += w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)]
     if rough > 0.0:
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
-                px, py, found = gauss_newton(drives, arms, row, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)],
+                px, py, found = gauss_newton(drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)],
                                              tolerance)
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
@@ -180,12 +180,12 @@ def measured_pose(lanes, drives, arms, row, w, k, smooth):
 
 
 @outlined
-def measured_rate(lanes, drives, arms, row, w):
+def measured_rate(lanes, drives, arms, table, o, w):
     """End-effector velocity by least squares from the measured base rates."""
     L, N, W = len(lanes), len(drives), len(arms)
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            a1, a2, rate = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(ED, i, j, W, L)] + want(row, RATE, i, W)
+            a1, a2, rate = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(ED, i, j, W, L)] + want(table, o, RATE, i, W)
             m11, m12, m22, fx, fy = m11 + a1 * a1, m12 + a1 * a2, m22 + a2 * a2, fx + a1 * rate, fy + a2 * rate
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve2(m11, m12, m22, fx, fy)

@@ -40,9 +40,9 @@ def of(row, j, W, L):
 
 
 @leaf
-def want(row, block, i, W):
+def want(table, o, block, i, W):
     """Desired motion of arm i at a sample, from a block of `tables.motion_table`."""
-    return row[6 + block * W + i]
+    return table[o + 6 + block * W + i]
 
 
 @leaf

@@ -55,14 +55,26 @@ from .tables import ANGLE, COS, SIN
 
 
 @leaf
-def sense(arms, env, extra, row, w, dt):
+def fetch(row, block, W, table, o, w):
+    """Copy a block of the desired motion into a row; four numbers are read before they are written, as one vector."""
+    if W == 4:
+        a, b, c, d = (want(table, o, block, 0, W), want(table, o, block, 1, W), want(table, o, block, 2, W),
+                      want(table, o, block, 3, W))
+        w[row * W], w[row * W + 1], w[row * W + 2], w[row * W + 3] = a, b, c, d
+    else:
+        for i in range(W):
+            w[row * W + i] = want(table, o, block, i, W)
+
+
+@leaf
+def sense(arms, env, extra, table, o, w, dt):
     """As `plant.sense`."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    for i in range(W):
-        # Into the table first: beside another array the loop below would not become vector instructions.
-        w[WANTED * W + i] = want(row, ANGLE, i, W)
-        w[UX * W + i], w[UY * W + i] = want(row, COS, i, W), want(row, SIN, i, W)
+    # Into the table first: beside another array the loop below would not become vector instructions.
+    fetch(WANTED, ANGLE, W, table, o, w)
+    fetch(UX, COS, W, table, o, w)
+    fetch(UY, SIN, W, table, o, w)
     for i in range(W):
         arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
                w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
@@ -174,21 +186,21 @@ def put(arms, w, x, y, vx, vy):
 
 
 @kernel
-def observe(arms, machine, row, x, y, vx, vy, w, q, qd):
+def observe(arms, machine, table, x, y, vx, vy, w, q, qd):
     """True base angles and rates (N,) for a controller in Python; `row` is the desired motion."""
     put(arms, w, x, y, vx, vy)
-    if sense(arms, machine.env, machine.extra, row, w, 0.0) > 0:
-        mend(((),), arms, row, w)
+    if sense(arms, machine.env, machine.extra, table, 0, w, 0.0) > 0:
+        mend(((),), arms, table, 0, w)
     for i in range(len(q)):
         q[i], qd[i] = w[Q * len(arms) + i], w[QD * len(arms) + i]
 
 
 @kernel
-def advance(arms, machine, row, x, y, vx, vy, w, c, dt):
+def advance(arms, machine, table, x, y, vx, vy, w, c, dt):
     """`hold` for a controller in Python: the state after the torques c (N,), and a number not positive for a lost arm."""
     W = len(arms)
     put(arms, w, x, y, vx, vy)
-    sense(arms, machine.env, machine.extra, row, w, dt)
+    sense(arms, machine.env, machine.extra, table, 0, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
     hold(arms, machine.env, machine.extra, w, dt)

@@ -205,7 +205,7 @@ def _machine(robot, width: int) -> tables.Machine:
 
 
 def _motion(trajectory, width: int) -> tables.Motion:
-    return tables.Motion(_plain(np.ascontiguousarray(tables.motion_table(trajectory, width))), trajectory.dt)
+    return tables.Motion(_plain(tables.motion_table(trajectory, width).ravel()), trajectory.dt)
 
 
 def _sensor(sensors, dt: float) -> tables.Sensor:
@@ -236,6 +236,9 @@ class Plant:
         work[: rows.MODEL * W] = tables.arm_table(robot, W).ravel()
         self._w, self._arms = _plain(work), tables.sizes(W)
         self._machine, self._motion = _made_for(robot, 0, _machine), _made_for(trajectory, W, _motion)
+        table = self._motion.table
+        columns = len(table) // len(trajectory)
+        self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         start = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
         with patience("plant", W, len(self._machine.extra)):
             self.observe(0, start)
@@ -244,13 +247,13 @@ class Plant:
     def observe(self, k: int, state) -> tuple[np.ndarray, np.ndarray]:
         """True base angles and rates (N,) at sample k."""
         q, qd = np.empty(self._N), np.empty(self._N)
-        self._observe(self._arms, self._machine, self._motion.table[k], *state, self._w, q, qd)
+        self._observe(self._arms, self._machine, self._table[k], *state, self._w, q, qd)
         return q, qd
 
     def hold(self, state, c: np.ndarray, dt: float):
         """The state after the torques c (N,) were held for dt; None when the machine has left the workspace."""
         try:
-            *state, low = self._advance(self._arms, self._machine, self._motion.table[0], *state, self._w, c, dt)
+            *state, low = self._advance(self._arms, self._machine, self._table[0], *state, self._w, c, dt)
         except (ArithmeticError, ValueError):
             return None
         x, y, vx, vy = state
