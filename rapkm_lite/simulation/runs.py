@@ -10,7 +10,7 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
-from ..machine.values import Value
+from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, FAULTS, LEFT_WORKSPACE, encode, single
@@ -72,12 +72,12 @@ class Run(Value):
     def q(self) -> np.ndarray:
         """All joint angles (k, 2N), rad, closed by construction."""
         elbows = inverse_kinematics(self.robot, self.x)[:, self.robot.n_arms :]
-        return np.concatenate([self.q_a, elbows], axis=-1)
+        return frozen(np.concatenate([self.q_a, elbows], axis=-1))
 
     @cached_property
     def qd(self) -> np.ndarray:
         """All joint rates (k, 2N), rad/s."""
-        return matvec(ee_complement(self.robot, self.q), self.xd)
+        return frozen(matvec(ee_complement(self.robot, self.q), self.xd))
 
     @property
     def dt(self) -> float:
