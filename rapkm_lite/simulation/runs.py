@@ -121,6 +121,7 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
 
     law : a law of `rapkm_lite.control`, a `Law` of your own, or any callable ``(t, q_a, qd_a, desired) -> c`` with c
         (N,) in N m.  An object in Python is copied for the run and the copy is `Run.law`: equal calls, equal numbers.
+        (A function that remembers in variables outside cannot be copied: write an object, or a `Law` with `start`.)
     offset : calibration offsets (N,) in rad, measured minus true angle.
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles.
