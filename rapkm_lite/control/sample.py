@@ -10,7 +10,7 @@ from ..mechanics.actuation import control_matrix
 from ..mechanics.closure import estimate_pose
 from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
-from .laws import as_law, ask, coordinates, measured
+from .grammar import as_law, ask, coordinates, measured
 
 
 class NoPose(ConvergenceError):

@@ -35,13 +35,14 @@ class SimulationError(RuntimeError):
         self.time, self.reason, self.partial, self.run, self.sweep = float(time), reason, partial, run, sweep
 
     def __reduce__(self):
-        kept = {"__cause__": self.__cause__ if _picklable(self.__cause__) else None, "__notes__": _notes(self)}
-        return SimulationError, (self.time, self.reason, self.partial, self.run, self.sweep), kept
+        cause = self.__cause__ if _picklable(self.__cause__) else None
+        arguments = self.time, self.reason, self.partial, self.run, self.sweep
+        return SimulationError, arguments, (cause, list(getattr(self, "__notes__", [])))
 
     def __setstate__(self, state):
-        self.__cause__ = state["__cause__"]
-        for note in state["__notes__"]:
-            self.add_note(note)
+        self.__cause__, notes = state
+        if notes:
+            self.__notes__ = notes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,10 +169,6 @@ def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
     states = states[rows]
     return Run(setup.robot, law, setup.trajectory, setup.sensors, faults, setup.trajectory.t[rows], states[:, :2],
                states[:, 2:], q_a, qd_a, c, pairs)
-
-
-def _notes(error: BaseException) -> tuple[str, ...]:
-    return tuple(getattr(error, "__notes__", ()))
 
 
 def _picklable(error) -> bool:
