@@ -149,7 +149,8 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
-        error.add_note(f"It was raised at the first sample of run {i} of a sweep.")
+        error.add_note(f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`.")
+        error.partial = result
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
 
