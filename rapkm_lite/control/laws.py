@@ -148,9 +148,10 @@ class AntagonismFilter(LawValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CommandFilter(LawValue):
-    """Command form (17)-(18): the PD drives get filtered commands, c = -K_P R_P e - K_D R_D ed.
+    """Command form: PD drives that get the commands (18), whose errors are filtered as in (17):
 
-    R_P = (A^T K_P)^+ A^T K_P and R_D alike; the end-effector force is that of (16), the torques only for K = k I.
+    c = -K_P R_P e - K_D R_D ed, R_P = (A^T K_P)^+ A^T K_P and R_D alike.  The end-effector force is that of (16), the
+    torques only for K = k_P I.
     """
 
     law: PD
