@@ -7,7 +7,8 @@ from .control.computed_torque import (
     RedundantCTC,
     SwitchedCTC,
 )
-from .control.laws import PD, PID, AntagonismFilter, CommandFilter, Law
+from .control.grammar import Law
+from .control.laws import PD, PID, AntagonismFilter, CommandFilter
 from .control.sample import Controller, Sample
 from .control.stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
 from .machine.arguments import ConvergenceError

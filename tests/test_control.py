@@ -261,6 +261,56 @@ def test_lyapunov_function_falls_at_the_rate_of_the_damping():
                     rk.kinetic_energy(ROBOT, q, qd) + 20 * ((q - target)[:, :3] ** 2).sum(-1), rtol=1e-9)
 
 
+@pytest.mark.parametrize("gains", [(40.0, 1.5), (np.full(3, 40.0), np.full(3, 1.5))], ids=["all joints", "(29)"])
+def test_third_term_of_the_lyapunov_function(gains):
+    """dV/dt = ed^T G~ edd + ed^T dG~/dt ed / 2 + e^T K_P ed + eps (ed^T G~ ed + e^T G~ edd) / 2 at ed = 0."""
+    x = np.array([[0.05, 0.03], [-0.04, 0.02], [0.0, -0.05]])
+    q, still = rk.inverse_kinematics(ROBOT, x), np.zeros((3, 6))
+    target = rk.inverse_kinematics(ROBOT, x + [2e-3, -1e-3])
+    desired = rk.Desired(3, x + [2e-3, -1e-3], 0 * x, 0 * x, target, still, still)
+    law, eps, e = rk.RedundantAPD(*gains), 3.0, q - target
+    qdd, _ = rk.forward_dynamics(ROBOT, q, still, torque(law, ROBOT, q, still, desired))
+    D = rk.closed_loop_projector(rk.redundant_control_matrix(ROBOT, q))
+    G, _, _ = rk.redundant_dynamics(ROBOT, q, still)
+    K = np.diag([40.0] * 3 + [40.0 if np.ndim(gains[0]) == 0 else 0.0] * 3)
+    rate = eps / 2 * np.einsum("ki,kij,kj->k", e, G, qdd)
+    assert_allclose(rate, -eps / 2 * np.einsum("ki,kij,kj->k", e, D @ K, e), rtol=1e-9)
+    assert np.all(rate < 0)
+    ed = mv(rk.orthogonal_complement(ROBOT, q), np.ones((3, 2)))
+    V = [rk.lyapunov_function(ROBOT, q, e, ed, gains[0], eps=eps) for eps in (0.0, 3.0)]
+    assert_allclose(V[1] - V[0], 1.5 * np.einsum("ki,kij,kj->k", e, G, ed), rtol=1e-12)
+    with pytest.raises(ValueError, match="eps = -1; allowed: >= 0"):
+        rk.lyapunov_function(ROBOT, q, e, ed, 40.0, eps=-1.0)
+
+
+def test_gains_29_on_the_driven_joints():
+    """The formulas (28) and (32), line 1, with K = diag(K_1, ..., K_m, 0, ..., 0) in our order of the joints."""
+    q, qd, desired = state_and_target(ROBOT)
+    K_P, K_D = np.array([50.0, 60.0, 70.0, 0, 0, 0]), np.array([5.0, 6.0, 7.0, 0, 0, 0])
+    feedback = K_P * (q - desired.q) + K_D * (qd - desired.qd)
+    G, C, Q = rk.redundant_dynamics(ROBOT, q, qd)
+    pinv = np.linalg.pinv(T(rk.redundant_control_matrix(ROBOT, q)), rcond=1e-9)
+    for law, expected in ((rk.RedundantAPD, mv(G, desired.qdd) + mv(C, desired.qd) + Q - feedback),
+                          (rk.RedundantCTC, mv(G, desired.qdd - feedback) + mv(C, qd) + Q)):
+        found = torque(law(K_P[:3], K_D[:3]), ROBOT, q, qd, desired)
+        assert_allclose(found, mv(pinv, expected), rtol=0, atol=1e-9 * np.abs(found).max())
+
+
+def test_the_two_lines_of_28_are_two_laws():
+    """They agree without error only: line 2 has N_J (G qdd^d + C qd^d + Q) in place of G~ qdd^d + C~ qd^d + Q~."""
+    q, qd, desired = state_and_target(ROBOT)
+    pinv = np.linalg.pinv(T(rk.redundant_control_matrix(ROBOT, q)), rcond=1e-9)
+    G, C, Q = rk.mass_matrix(ROBOT, q), rk.coriolis_matrix(ROBOT, q, qd), rk.generalized_forces(ROBOT, q, qd)
+    line_2 = lambda desired: mv(pinv, mv(G, desired.qdd) + mv(C, desired.qd) + Q  # noqa: E731
+                                - 50.0 * (q - desired.q) - 5.0 * (qd - desired.qd))
+    law = rk.RedundantAPD(50.0, 5.0)
+    apart = norm(torque(law, ROBOT, q, qd, desired) - line_2(desired)) / norm(line_2(desired))
+    assert np.median(apart) > 1e-4
+    _, _, qdd, (x, xd, xdd) = random_motion(ROBOT, len(q), bend=0.3)
+    exact = rk.Desired(3, x, xd, xdd, q, qd, qdd)
+    assert_allclose(torque(law, ROBOT, q, qd, exact), line_2(exact), rtol=0, atol=1e-9)
+
+
 # (32)-(35): the redundant CTC law.
 def test_closed_loop_of_the_redundant_ctc():
     # (33): N_J G N_J (edd + K_D ed + K_P e) = 0 for line 1, and N_J G (...) = 0 for line 2.

@@ -35,7 +35,7 @@ from ..mechanics.dynamics import (
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .laws import LawValue, gain, measured
+from .grammar import LawValue, gain, measured
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, matvec, positive_number, solve
+from ..machine.arguments import ConvergenceError, matvec, one_of, positive_number, solve
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix
 from ..mechanics.closure import estimate_pose
 from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
-from .laws import as_law, ask, coordinates, measured
+from .grammar import as_law, ask, coordinates, measured
 
 
 class NoPose(ConvergenceError):
@@ -44,6 +44,7 @@ class Sample:
         if source is None:
             return None, None
         if source not in self._found:
+            one_of("pose", source, ("measured", "true"))
             q, xd = self._true() if source == "true" else self._measured()
             qd = matvec(ee_complement(self.model, q), xd)
             q.setflags(write=False)

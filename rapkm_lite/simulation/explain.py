@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from ..control.laws import PD, PID, AntagonismFilter, BadAnswer, CommandFilter, coordinates
+from ..control.grammar import BadAnswer, coordinates
+from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..control.sample import Controller
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .compiled import LEFT_WORKSPACE, NO_POSE, SINGULAR, Plant

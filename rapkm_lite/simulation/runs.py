@@ -10,7 +10,7 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
-from ..machine.values import Value
+from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, FAULTS, LEFT_WORKSPACE, encode, single
@@ -35,13 +35,14 @@ class SimulationError(RuntimeError):
         self.time, self.reason, self.partial, self.run, self.sweep = float(time), reason, partial, run, sweep
 
     def __reduce__(self):
-        kept = {"__cause__": self.__cause__ if _picklable(self.__cause__) else None, "__notes__": _notes(self)}
-        return SimulationError, (self.time, self.reason, self.partial, self.run, self.sweep), kept
+        cause = self.__cause__ if _picklable(self.__cause__) else None
+        arguments = self.time, self.reason, self.partial, self.run, self.sweep
+        return SimulationError, arguments, (cause, list(getattr(self, "__notes__", [])))
 
     def __setstate__(self, state):
-        self.__cause__ = state["__cause__"]
-        for note in state["__notes__"]:
-            self.add_note(note)
+        self.__cause__, notes = state
+        if notes:
+            self.__notes__ = notes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,12 +73,12 @@ class Run(Value):
     def q(self) -> np.ndarray:
         """All joint angles (k, 2N), rad, closed by construction."""
         elbows = inverse_kinematics(self.robot, self.x)[:, self.robot.n_arms :]
-        return np.concatenate([self.q_a, elbows], axis=-1)
+        return frozen(np.concatenate([self.q_a, elbows], axis=-1))
 
     @cached_property
     def qd(self) -> np.ndarray:
         """All joint rates (k, 2N), rad/s."""
-        return matvec(ee_complement(self.robot, self.q), self.xd)
+        return frozen(matvec(ee_complement(self.robot, self.q), self.xd))
 
     @property
     def dt(self) -> float:
@@ -121,6 +122,7 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
 
     law : a law of `rapkm_lite.control`, a `Law` of your own, or any callable ``(t, q_a, qd_a, desired) -> c`` with c
         (N,) in N m.  An object in Python is copied for the run and the copy is `Run.law`: equal calls, equal numbers.
+        (A function that remembers in variables outside cannot be copied: write an object, or a `Law` with `start`.)
     offset : calibration offsets (N,) in rad, measured minus true angle.
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles.
@@ -167,10 +169,6 @@ def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
     states = states[rows]
     return Run(setup.robot, law, setup.trajectory, setup.sensors, faults, setup.trajectory.t[rows], states[:, :2],
                states[:, 2:], q_a, qd_a, c, pairs)
-
-
-def _notes(error: BaseException) -> tuple[str, ...]:
-    return tuple(getattr(error, "__notes__", ()))
 
 
 def _picklable(error) -> bool:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..control.laws import BadAnswer, as_law
+from ..control.grammar import BadAnswer, as_law
 from ..machine.arguments import real_array
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value
@@ -85,41 +85,59 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
     exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
     """
-    if failed not in ("raise", "mask"):
-        raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
-    if not isinstance(chunk, (int, np.integer)) or chunk < 1:
-        raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
+    _check_options(failed, chunk)
     laws, offsets = _rows(law, offsets, robot.n_arms)
     faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
     in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if code_of(one, setup) is None]
-    if executor is None and in_python:
-        chunk = 1
-    table, errors, jobs = Columns.blank(len(laws), robot.n_arms), {}, {}
+    width = 1 if executor is None and in_python else chunk
+    chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
+    table = Columns.blank(len(laws), robot.n_arms)
     with _pool(executor, 1 if in_python else os.cpu_count()) as pool:
         try:
-            for i in range(0, len(laws), chunk):
-                jobs[i] = pool.submit(run_chunk, setup, laws[i : i + chunk], offsets[i : i + chunk])
-            with progress_bar(len(jobs) if progress else 0) as advance:
-                for i, job in jobs.items():
-                    errors |= table.enter(i, *job.result())
-                    advance()
+            errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
-            for i, job in jobs.items():
-                if not job.cancel() and job.done() and job.exception() is None:
-                    table.enter(i, *job.result())
             finished = np.count_nonzero(table.status == DONE)
             if finished:
                 error.partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
                 error.add_note(f"{finished} of {len(laws)} runs were finished; they are in the `partial` of this "
                                "exception, a Sweep whose other rows are masked.")
             raise
-    result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or table.failed.any())
-    if failed == "raise" and result.failed.any():
+    broken = table.failed.any()
+    result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
+    if failed == "raise" and broken:
         i = int(np.argmax(result.failed))
-        _raise(i, errors.get(i), setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i], faults, result,
-               int(table.status[i]))
+        own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
+        _raise(i, errors.get(i), own, laws[i], faults, result, int(table.status[i]))
     return result
+
+
+def _check_options(failed, chunk) -> None:
+    if failed not in ("raise", "mask"):
+        raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
+    if not isinstance(chunk, (int, np.integer)) or chunk < 1:
+        raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
+
+
+def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
+    """Run the chunks, by their first rows; fills the table and returns what stopped rows in Python.
+
+    Whatever goes wrong, what is finished is in the table, and what waits is cancelled.
+    """
+    jobs, errors = {}, {}
+    try:
+        for i, arguments in chunks.items():
+            jobs[i] = pool.submit(run_chunk, *arguments)
+        with progress_bar(len(jobs) if progress else 0) as advance:
+            for i, job in jobs.items():
+                errors |= table.enter(i, *job.result())
+                advance()
+    except BaseException:
+        for i, job in jobs.items():
+            if not job.cancel() and job.done() and job.exception() is None:
+                table.enter(i, *job.result())
+        raise
+    return errors
 
 
 def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int):
@@ -131,7 +149,8 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
-        error.add_note(f"It was raised at the first sample of run {i} of a sweep.")
+        error.add_note(f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`.")
+        error.partial = result
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
 

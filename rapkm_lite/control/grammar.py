@@ -1,0 +1,150 @@
+"""The grammar of laws: what a law is asked, and what it may remember.
+
+A law maps what a controller knows to drive torques.  Two ways to ask it:
+
+``law.torque(model, q, qd, q_a, qd_a, desired)`` is the formula: pose and rate on V (..., 2N), measured base angles and
+rates (..., N), desired motion; one instant or many.  `model` is the controller's own manipulator.
+
+``law.start(model, dt) -> memory`` and ``law.step(memory, sample) -> (c, memory)`` are the law at work, sampled every
+dt: what it remembers is in `memory` and nowhere else.  A law without memory inherits both.
+
+Errors are measured minus desired.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..machine.arguments import bounded, check_leading, joint_vectors, one_of, positive_definite, real_array
+from ..machine.manipulator import Manipulator
+from ..machine.values import Value
+from ..mechanics.trajectory import Desired
+
+
+class Law:
+    """Base of all laws, also of those that users write.
+
+    pose : from where `step` takes the configuration: "measured", the least-squares pose of the measured base angles
+        (`estimate_pose`); "true", the true one, for study; None for a law that needs no pose.
+
+    A law of your own gives `torque`, or `start` and `step` when it remembers something:
+
+    >>> import rapkm_lite as rk
+    >>> class Push(rk.Law):
+    ...     def step(self, memory, sample):
+    ...         return np.array([0.01, 0.0, 0.0]), memory
+    >>> robot = rk.load()
+    >>> bool(rk.simulate(robot, Push(), rk.hold(robot, [0.0, 0.0], 0.1)).x[-1, 0] != 0.0)
+    True
+    """
+
+    pose: str | None = "measured"
+
+    def start(self, model: Manipulator, dt: float):
+        """The memory at the beginning of a run sampled every dt in s."""
+        return None
+
+    def step(self, memory, sample) -> tuple[np.ndarray, object]:
+        """Drive torques c (N,) in N m at a `Sample`, and the memory for the next one."""
+        q, qd = sample.pose(self.pose)
+        return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
+
+    def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
+        """Drive torques c (..., N) in N m."""
+        raise NotImplementedError(f"{self!r} has no torque without its memory; needed: start and step, as in simulate")
+
+    def coordinates(self, memory) -> tuple[int, int] | None:
+        """The two independent joints that the law works in, given its memory; None where it has none."""
+        return None
+
+    def _check_pose(self) -> None:
+        one_of("pose", self.pose, ("measured", "true"))
+
+
+class Function(Law):
+    """A function ``(t, q_a, qd_a, desired) -> c`` in the grammar of a law; it may keep what it is given."""
+
+    pose = None
+
+    def __init__(self, function):
+        self.function = function
+
+    def step(self, memory, sample):
+        return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
+
+
+def as_law(law) -> Law:
+    """The law itself, or a callable in the grammar of a law; raises ValueError for anything else."""
+    if not isinstance(law, type):
+        if hasattr(law, "start") and hasattr(law, "step"):
+            return law
+        if callable(law):
+            return Function(law)
+    raise ValueError(f"law = {law!r}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
+
+
+def coordinates(law, memory) -> tuple[int, int] | None:
+    """`Law.coordinates` of any law or callable."""
+    return law.coordinates(memory) if hasattr(law, "coordinates") else None
+
+
+class BadAnswer(ValueError):
+    """What a law answered is not what a law should answer."""
+
+
+def ask(law, memory, sample) -> tuple[np.ndarray, object]:
+    """`step` of a law or callable, with an answer that fits: N finite torques, and the memory.
+
+    Raises BadAnswer, a ValueError that says what to change.
+    """
+    answer = as_law(law).step(memory, sample)
+    if type(answer) is not tuple or len(answer) != 2:
+        raise BadAnswer(f"{type(law).__name__}.step returned {answer!r}; allowed: the pair (c, memory)")
+    c, memory = answer
+    # The cheap test first: it lets pass what is surely fine.
+    if type(c) is np.ndarray and c.dtype == float and c.shape == sample.q_a.shape and c.dot(c) < 1e200:
+        return c, memory
+    if c is None:
+        raise BadAnswer("law returned None; allowed: the drive torques c, an array (N,) in N m (is a return missing?)")
+    try:
+        c = real_array(f"law(t = {sample.t:.4f} s, ...)", c)
+    except ValueError as error:
+        raise BadAnswer(str(error)) from None
+    if c.shape != sample.q_a.shape:
+        raise BadAnswer(f"law returned the shape {c.shape}; allowed: {sample.q_a.shape}, one torque in N m per drive")
+    return c, memory
+
+
+class LawValue(Law, Value):
+    """Base of the laws of this package: frozen dataclasses, compared by value, printed as typed."""
+
+    def __repr__(self):
+        parts = []
+        for name, value in self._fields().items():
+            if name == "law":
+                parts.append(repr(value))
+            elif not (value is None and name == "W") and not (np.ndim(value) == 0 and value == math.inf):
+                parts.append(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value!r}")
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+def gain(name: str, value, zero: bool = False) -> np.ndarray:
+    """A positive number, diagonal or matrix of whatever size; the size is checked where the machine is known.
+
+    zero : also numbers and diagonals that are zero.
+    """
+    K = real_array(name, value)
+    if K.size == 0:
+        raise ValueError(f"{name} has shape {K.shape}; allowed: one number, one per coordinate, or a matrix")
+    return bounded(name, K, 0.0, strict=not zero) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
+
+
+def measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
+    """The measured base angles and rates, after a check that they fit the model and the desired motion."""
+    q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
+    if desired.n_arms != model.n_arms:
+        raise ValueError(f"desired has {desired.n_arms} arms, the model {model.n_arms}; allowed: the same number")
+    check_leading(q_a=q_a.shape[:-1], desired=desired.q.shape[:-1])
+    return q_a, qd_a

@@ -1,0 +1,263 @@
+"""Faults of drives and encoders, against their definitions in a few NumPy lines on what a run recorded."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rapkm_lite as rk
+from rapkm_lite.simulation.faults import Fault, fault_table
+
+ROBOT = rk.load().replace(friction=0.0)
+PATH = rk.circle(ROBOT, radius=0.02, duration=0.3)
+OFFSET = np.array([4e-3, -2e-3, 5e-3])
+PD = rk.PD(7.05, 0.225)
+QUANTUM = 2 * np.pi / 2000
+
+
+class Reader(rk.Law):
+    """PD that keeps its readings."""
+
+    pose = None
+
+    def start(self, model, dt):
+        self.readings = []
+        return self.readings
+
+    def step(self, memory, sample):
+        memory.append(np.concatenate([sample.q_a, sample.qd_a]))
+        e, ed = sample.errors()
+        return -7.05 * e - 0.225 * ed, memory
+
+
+def observed(faults, **options):
+    """A run, and the angles and rates (k, 3) that its controller read."""
+    run = rk.simulate(ROBOT, Reader(), PATH, OFFSET, faults=faults, **options)
+    readings = np.array(run.law.readings)
+    return run, readings[:, :3], readings[:, 3:]
+
+
+def commanded(q, qd):
+    return -7.05 * (q - PATH.q_a) - 0.225 * (qd - PATH.qd_a)
+
+
+def rates(q, tau):
+    """Backward differences of the readings through the low-pass of `velocity_filter`."""
+    rate = np.zeros_like(q)
+    for k in range(1, len(q)):
+        rate[k] = rate[k - 1] + PATH.dt / (tau + PATH.dt) * ((q[k] - q[k - 1]) / PATH.dt - rate[k - 1])
+    return rate
+
+
+def test_no_faults_change_nothing():
+    for none in ((), None, [rk.TorqueLimit(np.inf)], [rk.DeadDrive(0, 9.0)], [rk.OffsetJump(1, 9.0, 1.0)]):
+        run, q, qd = observed(none)
+        assert_array_equal(run.c, observed(())[0].c)
+        assert_allclose(run.c, rk.simulate(ROBOT, PD, PATH, OFFSET).c, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("limit", [0.15, [0.1, np.inf, 0.2]], ids=["one", "each"])
+def test_torque_limit(limit):
+    run, q, qd = observed(rk.TorqueLimit(limit))
+    wanted = commanded(q, qd)
+    assert_allclose(run.c, np.clip(wanted, -np.array(limit), np.array(limit)), rtol=0, atol=1e-14)
+    assert (np.abs(wanted) > limit).any() and not (np.abs(wanted) > limit).all()
+    # Two limits: the lower one counts.
+    assert_array_equal(observed([rk.TorqueLimit(limit), rk.TorqueLimit(1.0), rk.TorqueLimit(limit)])[0].c,
+                       observed([rk.TorqueLimit(np.minimum(limit, 1.0))])[0].c)
+
+
+def test_dead_drive():
+    run, q, qd = observed([rk.DeadDrive(1, 0.1)])
+    wanted = commanded(q, qd)
+    wanted[100:, 1] = 0.0  # t[100] = 0.1 s
+    assert_allclose(run.c, wanted, rtol=0, atol=1e-14)
+    assert np.abs(run.c[99, 1]) > 0.0
+    assert_array_equal(run.energy, rk.copper_loss(ROBOT, run.c[:-1], PATH.dt) + rk.mechanical_work(run))
+
+
+@pytest.mark.parametrize("encoder", [None, 2000], ids=["ideal", "counts"])
+def test_offset_jump(encoder):
+    run, q, qd = observed([rk.OffsetJump(2, 0.1, -3e-3), rk.OffsetJump(2, 0.2, 1e-3), rk.OffsetJump(0, 0.0, 2e-3)],
+                          encoder=encoder)
+    added = np.zeros_like(q)
+    added[:, 0] = 2e-3
+    added[100:, 2] = -3e-3
+    added[200:, 2] = -2e-3
+    expected = run.q_a + OFFSET + added
+    if encoder:
+        expected = QUANTUM * np.floor(expected / QUANTUM + 0.5)  # the jump comes before the rounding
+    assert_allclose(q, expected, rtol=0, atol=1e-12)
+    assert_array_equal(qd, run.qd_a)
+
+
+@pytest.mark.parametrize(("start", "stop", "first", "last"), [(0.1, 0.2, 100, 199), (0.0, 0.05, 0, 49),
+                                                            (0.25, 1.0, 250, 300)])
+@pytest.mark.parametrize("encoder", [None, 2000], ids=["ideal", "counts"])
+def test_encoder_dropout_with_ideal_rates(start, stop, first, last, encoder):
+    run, q, qd = observed([rk.EncoderDropout(1, start, stop)], encoder=encoder)
+    true = run.q_a + OFFSET
+    if encoder:
+        true = QUANTUM * np.floor(true / QUANTUM + 0.5)
+    expected, rate = true.copy(), run.qd_a.copy()
+    expected[first : last + 1, 1] = true[max(first - 1, 0), 1]
+    rate[first : last + 1, 1] = 0.0
+    assert_allclose(q, expected, rtol=0, atol=1e-12)
+    assert_array_equal(qd, rate)
+
+
+def test_encoder_dropout_with_filtered_rates():
+    """Rates belong to readings: those of a repeated reading decay, and its end is one large difference."""
+    run, q, qd = observed([rk.EncoderDropout(1, 0.1, 0.2)], encoder=2000, velocity_filter=3e-3)
+    expected = QUANTUM * np.floor((run.q_a + OFFSET) / QUANTUM + 0.5)
+    expected[100:200, 1] = expected[99, 1]
+    assert_allclose(q, expected, rtol=0, atol=1e-12)
+    assert_allclose(qd, rates(q, 3e-3), rtol=0, atol=1e-9)
+    assert np.abs(qd[190:200, 1]).max() < 1e-9 < np.abs(qd[200, 1])
+
+
+def test_a_jump_under_a_dropout_is_read_when_the_encoder_comes_back():
+    run, q, _ = observed([rk.EncoderDropout(0, 0.1, 0.2), rk.OffsetJump(0, 0.15, 5e-3)])
+    expected = run.q_a + OFFSET
+    expected[150:, 0] += 5e-3
+    expected[100:200, 0] = expected[99, 0]
+    assert_allclose(q, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.CommandFilter(PD), rk.CTC(900.0, 60.0, None),
+                                 rk.RedundantCTC(900.0, 60.0), rk.SwitchedCTC(900.0, 60.0)],
+                         ids=lambda law: type(law).__name__)
+def test_laws_of_the_package_meet_the_same_faults(law):
+    """The torques of a healthy controller on the readings, then the faults of the drives."""
+    path = rk.circle(ROBOT, radius=0.05, duration=0.15)
+    faults = [rk.TorqueLimit(0.35), rk.DeadDrive(0, 0.12), rk.OffsetJump(1, 0.05, 2e-3),
+              rk.EncoderDropout(2, 0.03, 0.06)]
+    run = rk.simulate(ROBOT, law, path, OFFSET, faults=faults)
+    read, rate = run.q_a + OFFSET, run.qd_a.copy()
+    read[50:, 1] += 2e-3
+    read[30:60, 2], rate[30:60, 2] = read[29, 2], 0.0
+    controller = rk.Controller(law, ROBOT, path.dt)
+    c = np.array([controller(t, read[k], rate[k], path[k]) for k, t in enumerate(path.t)])
+    limited = np.clip(c, -0.35, 0.35)
+    limited[120:, 0] = 0.0
+    assert_allclose(run.c, limited, rtol=0, atol=1e-9)
+    assert (limited != c).any()
+
+
+def test_sweeps_meet_the_same_faults():
+    faults, offsets = [rk.DeadDrive(0, 0.1), rk.TorqueLimit(0.3)], np.array([OFFSET, 0 * OFFSET, -OFFSET])
+    for law in (PD, rk.RedundantCTC(900.0, 60.0)):
+        path = rk.circle(ROBOT, radius=0.02, duration=0.15)
+        study = rk.sweep(ROBOT, law, path, offsets, faults=faults)
+        for i in range(3):
+            run = rk.simulate(ROBOT, law, path, offsets[i], faults=faults)
+            assert_allclose(study.energies[i], run.energy, rtol=0, atol=1e-11)
+            assert_allclose(study.x_final[i], run.x[-1], rtol=0, atol=1e-12)
+
+
+def test_a_run_knows_its_sensors_and_faults():
+    faults, sensors = [rk.DeadDrive(0, 0.1)], rk.Sensors(OFFSET, 2000, 2e-3)
+    run = rk.simulate(ROBOT, PD, PATH, OFFSET, 2000, velocity_filter=2e-3, faults=faults)
+    assert run.faults == (rk.DeadDrive(0, 0.1),) and run.sensors == sensors
+    assert run == rk.simulate(ROBOT, PD, PATH, sensors=sensors, faults=faults) == pickle.loads(pickle.dumps(run))
+    assert run != rk.simulate(ROBOT, PD, PATH, sensors=sensors)
+    with pytest.raises(ValueError, match="allowed: one of both"):
+        rk.simulate(ROBOT, PD, PATH, OFFSET, sensors=sensors)
+
+
+def test_times_between_samples_and_on_them():
+    """A fault acts from the first sample at or after its time."""
+    t = np.arange(301) * (0.3 / 300)
+    for k in range(301):
+        assert np.argmin(fault_table([rk.DeadDrive(0, k * 1e-3)], t, 3).alive[:, 0]) == k
+    assert np.argmin(fault_table([rk.DeadDrive(0, 0.1004)], t, 3).alive[:, 0]) == 101
+    assert fault_table([], t, 3) is None
+
+
+def test_a_new_fault_is_one_class():
+    class Weak(Fault):
+        """All drives give half from the start on."""
+
+        def mark(self, table, t):
+            np.minimum(table.limit, 0.05, out=table.limit)
+
+    assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weak()]).c).max() == 0.05
+
+
+TOML = """
+name = "broken"
+[manipulator]
+base = [[-0.2, -0.1], [0.2, -0.1], [0.0, 0.2]]
+lengths = 0.25
+masses = 0.1
+[control]
+K_P = 7.0
+K_D = 0.2
+[path]
+side = 0.05
+duration = 0.3
+[sensor]
+offset = [1e-3, 0.0, 0.0]
+encoder = 2000
+velocity_filter = 2e-3
+"""
+FAULTS = """
+[[fault]]
+kind = "DeadDrive"
+drive = 1
+time = 0.1
+[[fault]]
+kind = "TorqueLimit"
+limit = [0.3, 0.3, inf]
+"""
+
+
+def test_the_same_in_a_data_file(tmp_path):
+    file = tmp_path / "broken.toml"
+    file.write_text(TOML + FAULTS)
+    given = rk.experiment(file)
+    assert given.faults == (rk.DeadDrive(1, 0.1), rk.TorqueLimit([0.3, 0.3, np.inf]))
+    assert given.sensors == rk.Sensors([1e-3, 0.0, 0.0], 2000, 2e-3)
+    run = rk.simulate(given.robot, given.law, given.trajectory, [1e-3, 0, 0], 2000, velocity_filter=2e-3,
+                      faults=[rk.DeadDrive(1, 0.1), rk.TorqueLimit([0.3, 0.3, np.inf])])
+    assert given.run() == run and not run.c[100:, 1].any()
+    assert rk.experiment(file) == given == pickle.loads(pickle.dumps(given))
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ('[[fault]]\ndrive = 1\n', r"allowed: a table with kind = one of TorqueLimit, DeadDrive"),
+    ('[[fault]]\nkind = "DeadDrives"\n', r"unknown kind of fault 'DeadDrives' \(did you mean 'DeadDrive'\?\)"),
+    ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive lacks 'time'; needed: drive, time"),
+    ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\ntimes = 1\n', r"unknown entry of DeadDrive 'times' \(did you mean"),
+])
+def test_mistakes_in_a_data_file(tmp_path, text, message):
+    file = tmp_path / "broken.toml"
+    file.write_text(TOML + text)
+    with pytest.raises(ValueError, match=message):
+        rk.experiment(file)
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: rk.TorqueLimit(-0.1), r"limit = -0\.1; allowed: >= 0"),
+    (lambda: rk.TorqueLimit(np.nan), "limit = nan; allowed: finite numbers"),
+    (lambda: rk.TorqueLimit(None), "limit = None is not numeric"),
+    (lambda: rk.TorqueLimit(np.ones((2, 2))), r"limit has shape \(2, 2\)"),
+    (lambda: rk.DeadDrive(-1, 0.1), "drive = -1; allowed: >= 0"),
+    (lambda: rk.DeadDrive(1.5, 0.1), r"drive = 1\.5; allowed: whole numbers"),
+    (lambda: rk.DeadDrive(1, -0.1), r"time = -0\.1; allowed: >= 0"),
+    (lambda: rk.DeadDrive(1, None), "time = None is not numeric"),
+    (lambda: rk.OffsetJump(1, 0.1, np.inf), "jump = inf; allowed: finite numbers"),
+    (lambda: rk.EncoderDropout(1, 0.2, 0.2), r"stop = 0\.2 s; allowed: later than start = 0\.2 s"),
+    (lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.DeadDrive(3, 0.1)]), "drive = 3 in .*; allowed: 0 to 2, drives"),
+    (lambda: rk.sweep(ROBOT, PD, PATH, OFFSET, faults=[rk.DeadDrive(3, 0.1)]), "drive = 3"),
+    (lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.TorqueLimit([1.0, 2.0])]), r"limit has shape \(2,\); .* \(3,\)"),
+    (lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]), "faults holds 'dead'; allowed: TorqueLimit, DeadDrive"),
+    (lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive), "faults holds .*; allowed: TorqueLimit"),
+    (lambda: rk.Sensors(encoder=0), "encoder = 0; allowed: > 0"),
+    (lambda: rk.Sensors(velocity_filter=-1.0), "velocity_filter = -1; allowed: >= 0"),
+    (lambda: rk.simulate(ROBOT, PD, PATH, sensors=2000), "sensors = 2000; allowed: a Sensors"),
+])
+def test_bad_faults_and_sensors(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

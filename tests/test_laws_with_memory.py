@@ -1,0 +1,315 @@
+"""Laws with memory: what a run may remember, and that nothing else does; against loops of a few NumPy lines."""
+
+import copy
+import pickle
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rapkm_lite as rk
+
+ROBOT = rk.load().replace(friction=0.0)
+PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
+OFFSET = np.array([4e-3, -2e-3, 5e-3])
+PD = rk.PD(7.05, 0.225)
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+
+
+class PI:
+    """A law as a student writes it: an object that adds up its error."""
+
+    def __init__(self):
+        self.sum, self.times = np.zeros(3), []
+
+    def __call__(self, t, q_a, qd_a, desired):
+        self.times.append(t)
+        e = q_a - desired.q_a
+        self.sum += 1e-3 * e
+        return -7.05 * e - 0.225 * (qd_a - desired.qd_a) - 40.0 * self.sum
+
+
+class Recorder(rk.Law):
+    """PD that keeps what it is given, and asks for no pose."""
+
+    pose = None
+
+    def start(self, model, dt):
+        self.dt, self.seen = dt, []
+        return self.seen
+
+    def step(self, memory, sample):
+        memory.append((sample.t, sample.dt, sample.q_a, sample.qd_a))
+        e, ed = sample.q_a - sample.desired.q_a, sample.qd_a - sample.desired.qd_a
+        return -7.05 * e - 0.225 * ed, memory
+
+
+def pid_by_hand(q, qd, path, K_P, K_I, K_D, limit):
+    """Torques of PID with conditional integration for the readings q, qd of a run."""
+    integral, torques = np.zeros(3), []
+    for k in range(len(path)):
+        e, ed = q[k] - path.q_a[k], qd[k] - path.qd_a[k]
+        grown = integral + K_I * path.dt * e
+        c = -(K_P * e + K_D * ed + grown)
+        integral = np.where(np.abs(c) <= limit, grown, integral)
+        torques.append(np.clip(c, -limit, limit))
+    return np.array(torques)
+
+
+# Equal calls, equal numbers.
+def test_an_object_runs_twice_with_equal_numbers_and_stays_as_it_was():
+    law = PI()
+    one, two = (rk.simulate(ROBOT, law, PATH, OFFSET) for _ in range(2))
+    assert_array_equal(one.c, two.c)
+    assert not law.times and not law.sum.any()
+    assert_array_equal(one.law.times, PATH.t)  # what it recorded can be read from the copy that ran
+    assert one.law.sum.any() and one.law is not two.law
+    inside = rk.simulate(ROBOT, rk.AntagonismFilter(law), PATH, OFFSET).law.law
+    assert_array_equal(inside.times, PATH.t)
+    assert_array_equal(rk.simulate(ROBOT, law.__call__, PATH, OFFSET).c, one.c)  # a bound method has an object too
+
+
+def test_equal_rows_of_a_sweep_are_equal_and_are_single_runs():
+    law, run = PI(), rk.simulate(ROBOT, PI(), PATH, OFFSET)
+    study = rk.sweep(ROBOT, law, PATH, [OFFSET] * 3)
+    for i in range(3):
+        assert_array_equal(study.energies[i], run.energy)
+    assert not law.times
+
+
+@pytest.mark.parametrize("law", [PI(), rk.PID(7.05, 40.0, 0.225), rk.AntagonismFilter(rk.SwitchedCTC(900.0, 60.0))],
+                         ids=["object", "PID", "filtered switching"])
+def test_bits_do_not_depend_on_executor_chunk_or_order(law):
+    path = rk.circle(ROBOT, radius=0.05, duration=0.05)
+    offsets = np.random.default_rng(1).normal(0.0, 3e-3, (5, 3))
+    study = rk.sweep(ROBOT, law, path, offsets)
+    others = [rk.sweep(ROBOT, [law] * 5, path, offsets, chunk=3)]
+    with ThreadPoolExecutor(3) as threads, ProcessPoolExecutor(2) as processes:
+        others += [rk.sweep(ROBOT, law, path, offsets, executor=pool, chunk=2) for pool in (threads, processes)]
+    turned = rk.sweep(ROBOT, law, path, offsets[::-1])
+    for name in COLUMNS:
+        for other in others:
+            assert_array_equal(getattr(other, name), getattr(study, name))
+        assert_array_equal(getattr(turned, name)[::-1], getattr(study, name))
+
+
+def test_a_law_that_cannot_be_copied_is_refused():
+    class Stream:
+        def __init__(self):
+            self.lines = (line for line in "abc")
+
+        def __call__(self, t, q_a, qd_a, desired):
+            return np.zeros(3)
+
+    for call in (lambda: rk.simulate(ROBOT, Stream(), PATH), lambda: rk.sweep(ROBOT, Stream(), PATH, OFFSET)):
+        with pytest.raises(ValueError, match=r"cannot be copied .* allowed: an object that copy\.deepcopy copies"):
+            call()
+    with pytest.raises(ValueError, match="allowed: a law of this package or a function"):
+        rk.simulate(ROBOT, rk.PD, PATH)
+
+
+# The grammar.
+def test_pid_with_anti_windup():
+    seen = rk.simulate(ROBOT, Recorder(), PATH, OFFSET)
+    gains = {"K_P": np.array([7.0, 6.0, 5.0]), "K_I": 90.0, "K_D": 0.2}
+    # Memory is worth something here: the limit is met, and left again.
+    for limit in (np.inf, 0.3, np.array([0.2, np.inf, 0.4])):
+        run = rk.simulate(ROBOT, rk.PID(**gains, limit=limit), PATH, OFFSET)
+        c = pid_by_hand(run.q_a + OFFSET, run.qd_a, PATH, **gains, limit=limit)
+        assert_allclose(run.c, c, rtol=0, atol=1e-12)
+        held = np.abs(run.c) == limit
+        assert not np.isfinite(limit).all() or (held.any() and not held.all())
+    assert_allclose(rk.simulate(ROBOT, rk.PID(7.05, 0.0, 0.225), PATH, OFFSET).c, seen.c, rtol=0, atol=1e-10)
+    full = rk.PID(np.diag(gains["K_P"]), 90.0 * np.eye(3), 0.2 * np.eye(3))
+    assert_allclose(rk.simulate(ROBOT, full, PATH, OFFSET).c,
+                    rk.simulate(ROBOT, rk.PID(**gains), PATH, OFFSET).c, rtol=0, atol=1e-10)
+
+
+def test_pid_leaves_no_error_at_rest_where_pd_does():
+    heavy = ROBOT.replace(gravity=(0.0, -1.0))
+    stay = rk.hold(heavy, [0.02, 0.01], 4.0)
+    pd, pid = (rk.simulate(heavy, law, stay) for law in (PD, rk.PID(7.05, 20.0, 0.225)))
+    q = stay.q[0]
+    wrench = rk.minimal_dynamics(heavy, q, 0 * q)[2]
+    expected = rk.steady_state_error(rk.control_matrix(heavy, q), 7.05, np.zeros(3), wrench)  # (14), to first order
+    assert_allclose(pd.error[-1], expected, atol=0.05 * np.abs(expected).max())
+    assert np.abs(pid.error[-1]).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_the_sampling_time_and_the_measurement_reach_the_law():
+    path = rk.circle(ROBOT, radius=0.05, duration=0.3, dt=2e-3)
+    run = rk.simulate(ROBOT, Recorder(), path, OFFSET)
+    t, dt, q_a, qd_a = (np.array(column) for column in zip(*run.law.seen, strict=True))
+    assert_array_equal(t, path.t)
+    assert run.law.dt == path.dt and np.all(dt == path.dt)
+    assert_array_equal(q_a, run.q_a + OFFSET)  # kept between the calls, and still what they were
+    assert_array_equal(qd_a, run.qd_a)
+    slow = rk.PID(7.05, 40.0, 0.225)
+    run = rk.simulate(ROBOT, slow, path, OFFSET)
+    assert_allclose(run.c, pid_by_hand(run.q_a + OFFSET, run.qd_a, path, 7.05, 40.0, 0.225, np.inf), atol=1e-12)
+
+
+def test_a_law_of_the_package_in_a_loop_of_your_own():
+    law = rk.AntagonismFilter(rk.PID(7.05, 40.0, 0.225))
+    run = rk.simulate(ROBOT, law, PATH, OFFSET)
+    controller = rk.Controller(law, ROBOT, PATH.dt)
+    c = [controller(t, run.q_a[k] + OFFSET, run.qd_a[k], PATH[k]) for k, t in enumerate(PATH.t.tolist())]
+    assert_array_equal(run.c, c)
+    memory = law.start(ROBOT, PATH.dt)
+    assert_array_equal(memory, np.zeros(3))
+
+
+# Filters hand the memory on.
+@pytest.mark.parametrize("offset", [0.0, OFFSET], ids=["no offset", "offset"])
+def test_a_filter_around_switching_keeps_its_switching(offset):
+    """Torques of a CTC law are free of antagonism at its own pose: the filter there changes nothing but rounding."""
+    law, path = rk.SwitchedCTC(900.0, 60.0), rk.triangle(ROBOT, duration=1.2, dt=2e-3)
+    plain, filtered = (rk.simulate(ROBOT, one, path, offset) for one in (law, rk.AntagonismFilter(law)))
+    assert plain.switches == filtered.switches >= 3
+    assert_array_equal(plain.pairs, filtered.pairs)
+    assert_allclose(filtered.c, plain.c, rtol=0, atol=1e-9)
+
+
+def test_a_filter_multiplies_the_torques_of_switching_by_r_at_its_own_pose():
+    law = rk.SwitchedCTC(900.0, 60.0, pose="true")
+    path = rk.triangle(ROBOT, duration=1.2, dt=2e-3)
+    run = rk.simulate(ROBOT, rk.AntagonismFilter(law), path, OFFSET)  # the filter at the measured pose
+    pair, x, different = None, path.x[0], 0.0
+    for k in range(len(path)):
+        q, qd, q_a = run.q[k], run.qd[k], run.q_a[k] + OFFSET
+        pair = law.choose(ROBOT, q, pair)
+        inner = law.fixed(pair).torque(ROBOT, q, qd, q_a, run.qd_a[k], path[k])
+        q_m = rk.estimate_pose(ROBOT, q_a, x)
+        x = rk.forward_kinematics(ROBOT, q_m)
+        assert tuple(run.pairs[k]) == pair
+        assert_allclose(run.c[k], rk.antagonism_filter(rk.control_matrix(ROBOT, q_m)) @ inner, rtol=0, atol=1e-9)
+        different = max(different, np.abs(run.c[k] - inner).max())
+    assert different > 1e-6 and run.switches >= 3
+
+
+def test_filters_around_an_integral_a_callable_and_another_filter():
+    gains = (7.05, 40.0, 0.225)
+    run = rk.simulate(ROBOT, rk.AntagonismFilter(rk.PID(*gains), pose="true"), PATH, OFFSET)
+    R = rk.antagonism_filter(rk.control_matrix(ROBOT, run.q))
+    c = pid_by_hand(run.q_a + OFFSET, run.qd_a, PATH, *gains, np.inf)
+    assert_allclose(run.c, np.einsum("kij,kj->ki", R, c), rtol=0, atol=1e-11)
+    twice = rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(*gains), pose="true"), pose="true")  # R R = R
+    assert_allclose(rk.simulate(ROBOT, twice, PATH, OFFSET).c, run.c, rtol=0, atol=1e-9)
+    student = rk.simulate(ROBOT, rk.AntagonismFilter(PI(), pose="true"), PATH, OFFSET)
+    assert_allclose(student.c, run.c, rtol=0, atol=1e-9)
+
+
+def test_weighted_filter_makes_the_least_heat_at_the_same_force():
+    robot = ROBOT.replace(resistance=[0.05, 0.05, 3.0])
+    heat = robot.resistance / robot.torque_constant**2
+    raw, plain, weighted = (rk.simulate(robot, law, PATH, OFFSET) for law in (
+        PD, rk.AntagonismFilter(PD, pose="true"), rk.AntagonismFilter(PD, pose="true", W=heat)))
+    n, A = rk.null_vector(robot, weighted.q), rk.control_matrix(robot, weighted.q)
+    # Stationary along the one direction that does not change the force: n^T W c = 0.
+    assert_allclose(np.einsum("ki,i,ki->k", n, heat, weighted.c), 0.0, atol=1e-9)
+    e, ed = weighted.q_a + OFFSET - PATH.q_a, weighted.qd_a - PATH.qd_a
+    force = lambda c: np.einsum("kij,ki->kj", A, c)  # noqa: E731
+    assert_allclose(force(weighted.c), force(-7.05 * e - 0.225 * ed), atol=1e-10)
+    for W in (2.0, np.full(3, 2.0), 2.0 * np.eye(3)):
+        same = rk.simulate(robot, rk.AntagonismFilter(PD, pose="true", W=W), PATH, OFFSET)
+        assert_allclose(same.c, plain.c, rtol=0, atol=1e-9)
+    copper = [rk.copper_loss(robot, run.c[:-1], run.dt).sum() for run in (raw, plain, weighted)]
+    assert copper[2] < copper[1] and copper[2] < copper[0]
+    with pytest.raises(ValueError, match="W"):
+        rk.AntagonismFilter(PD, W=-1.0)
+
+
+def test_a_bare_law_finds_no_pose():
+    """A law that does not ask for a pose does not care that the angles fit none."""
+    far = 2.5 * np.array([1.0, -1.0, 1.0])
+    still = rk.hold(ROBOT, [0.0, 0.0], 0.01)
+    rk.simulate(ROBOT, Recorder(), still, far)
+    with pytest.raises(rk.SimulationError, match="fit no pose"):
+        rk.simulate(ROBOT, rk.AntagonismFilter(Recorder()), still, far)
+
+
+# What a law may do with what it is given.
+def test_a_law_cannot_shift_the_path():
+    before = PATH.q.copy()
+
+    def writes(t, q_a, qd_a, desired):
+        desired.q[:3] += 0.1
+        return np.zeros(3)
+
+    def own(t, q_a, qd_a, desired):
+        q_a -= desired.q_a
+        qd_a -= desired.qd_a
+        return -7.05 * q_a - 0.225 * qd_a
+
+    with pytest.raises(ValueError, match="read-only"):
+        rk.simulate(ROBOT, writes, PATH)
+    assert_array_equal(PATH.q, before)
+    run = rk.simulate(ROBOT, own, PATH, OFFSET)
+    assert_allclose(run.c, rk.simulate(ROBOT, PD, PATH, OFFSET).c, rtol=0, atol=1e-9)
+    inside = rk.simulate(ROBOT, rk.AntagonismFilter(own), PATH, OFFSET)
+    assert_allclose(inside.c, rk.simulate(ROBOT, rk.AntagonismFilter(PD), PATH, OFFSET).c, rtol=0, atol=1e-9)
+
+
+VALUES = {
+    "PD(K_P=7.05, K_D=0.225)": PD,
+    "AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')": rk.AntagonismFilter(PD),
+    "AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='true', W=[1.0, 2.0, 3.0])":
+        rk.AntagonismFilter(PD, "true", [1, 2, 3]),
+    "PID(K_P=7.0, K_I=1.0, K_D=0.2)": rk.PID(7.0, 1.0, 0.2),
+    "PID(K_P=7.0, K_I=1.0, K_D=0.2, limit=[0.1, inf, 0.2])": rk.PID(7.0, 1.0, 0.2, [0.1, np.inf, 0.2]),
+    "CTC(K_P=900.0, K_D=60.0, independent=None, pose='measured')": rk.CTC(900, 60, None),
+    "SwitchedCTC(K_P=900.0, K_D=60.0, hysteresis=1.2, pose='measured')": rk.SwitchedCTC(900, 60),
+    "Sensors(encoder=2000)": rk.Sensors(encoder=2000),
+    "TorqueLimit(0.3)": rk.TorqueLimit(0.3), "DeadDrive(1, 0.5)": rk.DeadDrive(1, 0.5),
+    "EncoderDropout(0, 0.1, 0.2)": rk.EncoderDropout(0, 0.1, 0.2),
+    "OffsetJump(2, 0.1, -0.002)": rk.OffsetJump(2, 0.1, -2e-3),
+}
+
+
+@pytest.mark.parametrize("text", VALUES)
+def test_values_compare_print_and_travel(text):
+    value = VALUES[text]
+    assert repr(value) == text
+    again = eval(text, {**vars(rk), "inf": np.inf})
+    for other in (again, pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value)):
+        assert other == value and hash(other) == hash(value)
+        for array in vars(other).values():
+            assert not isinstance(array, np.ndarray) or not array.flags.writeable
+    assert value not in (None, PD.K_P, 7.05) and len({*map(repr, VALUES.values())}) == len(VALUES)
+
+
+def test_runs_and_sweeps_are_values():
+    run, study = rk.simulate(ROBOT, PD, PATH, OFFSET), rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2)
+    for value, other in ((run, rk.simulate(ROBOT, rk.PD(7.05, 0.225), PATH, OFFSET)),
+                         (study, rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2))):
+        assert value == other == pickle.loads(pickle.dumps(value)) == copy.deepcopy(value)
+    assert run != rk.simulate(ROBOT, PD, PATH, 1.1 * OFFSET)
+    for array in (run.c, run.q_a, run.t, run.q, run.qd, study.energies, pickle.loads(pickle.dumps(run)).c):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: rk.PID(7.0, -1.0, 0.2), "K_I = -1; allowed: >= 0"),
+    (lambda: rk.PID(7.0, 1.0, 0.2, limit=-0.1), r"limit = -0\.1; allowed: >= 0"),
+    (lambda: rk.PID(7.0, 1.0, 0.2, limit="x"), "limit = .* is not numeric"),
+    (lambda: rk.simulate(ROBOT, rk.PID(7.0, [1.0, 2.0], 0.2), PATH), r"K_I has shape \(2,\); allowed: .* \(3,\)"),
+    (lambda: rk.simulate(ROBOT, rk.PID(7.0, 1.0, 0.2, [1.0, 2.0]), PATH), r"limit has shape \(2,\)"),
+    (lambda: rk.CommandFilter(rk.PID(7.0, 1.0, 0.2)), "allowed: PD, whose commands are filtered"),
+    (lambda: rk.Controller(PD, ROBOT, dt=0.0), "dt = 0; allowed: > 0"),
+])
+def test_bad_arguments(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_step_must_answer_with_the_torques_and_the_memory():
+    class Half(rk.Law):
+        def step(self, memory, sample):
+            return np.zeros(3)
+
+    with pytest.raises(ValueError, match=r"Half.step returned .* allowed: the pair \(c, memory\)"):
+        rk.simulate(ROBOT, Half(), PATH)
+    with pytest.raises(NotImplementedError, match="no torque without its memory"):
+        rk.PID(7.0, 1.0, 0.2).torque(ROBOT, None, None, None, None, None)

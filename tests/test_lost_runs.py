@@ -1,0 +1,254 @@
+"""Nothing is lost: a run that stops keeps its samples and the reason, a sweep its finished rows."""
+
+import os
+import pickle
+import sys
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import rapkm_lite as rk
+
+ROBOT = rk.load().replace(friction=0.0)
+PATH = rk.circle(ROBOT, radius=0.03, duration=0.3)
+OFFSET = np.array([4e-3, -2e-3, 5e-3])
+PD = rk.PD(7.05, 0.225)
+
+
+def pd(t, q_a, qd_a, desired):
+    return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
+
+
+class FailsAt:
+    """PD that does something else from `time` on."""
+
+    def __init__(self, time, act):
+        self.time, self.act = time, act
+
+    def __call__(self, t, q_a, qd_a, desired):
+        return pd(t, q_a, qd_a, desired) if t < self.time - 1e-9 else self.act()
+
+
+def boom():
+    raise KeyError("gain table")
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def die():
+    os._exit(1)
+
+
+def lost(robot, law, path, offset=0.0, **options):
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(robot, law, path, offset, **options)
+    return caught.value
+
+
+def consistent(error, rows):
+    """The part of the run that an error carries is a `Run` of so many rows, ready to be looked at."""
+    run = error.partial
+    assert isinstance(run, rk.Run) and len(run) == rows
+    N = run.robot.n_arms
+    shapes = {"t": (rows,), "x": (rows, 2), "xd": (rows, 2), "q_a": (rows, N), "qd_a": (rows, N), "c": (rows, N),
+              "q": (rows, 2 * N), "qd": (rows, 2 * N), "error": (rows, N), "pairs": (rows, 2), "energy": (N,)}
+    for name, shape in shapes.items():
+        assert getattr(run, name).shape == shape and np.all(np.isfinite(getattr(run, name)))
+    assert np.all(run.energy == rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
+    assert repr(run).startswith("Run(")
+
+
+# Single runs.
+def test_an_exception_of_the_law_keeps_the_samples_before_it():
+    error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)
+    assert error.time == PATH.t[100] and error.reason == "the law raised KeyError: 'gain table'"
+    assert str(error) == "at t = 0.1000 s the law raised KeyError: 'gain table'"
+    assert isinstance(error.__cause__, KeyError) and error.run is None and error.sweep is None
+    consistent(error, 100)
+    whole = rk.simulate(ROBOT, pd, PATH, OFFSET)
+    for name in ("t", "x", "xd", "q_a", "qd_a", "c"):
+        assert_array_equal(getattr(error.partial, name), getattr(whole, name)[:100])
+
+
+@pytest.mark.parametrize(("answer", "reason"), [
+    (lambda: None, "law returned None"), (lambda: np.array([0.0, np.nan, 0.0]), r"[1] = nan; allowed: finite numbers"),
+    (lambda: [1.0], "law returned the shape (1,); allowed: (3,)"), (lambda: "c", "is not numeric"),
+])
+def test_a_bad_answer_later_on(answer, reason):
+    error = lost(ROBOT, FailsAt(0.1, answer), PATH)
+    assert reason in error.reason and isinstance(error.__cause__, ValueError)
+    consistent(error, 100)
+
+
+def test_the_first_sample_belongs_to_the_caller():
+    with pytest.raises(KeyError, match="gain table"):
+        rk.simulate(ROBOT, FailsAt(0.0, boom), PATH)
+    for answer, message in ((lambda: None, "law returned None"), (lambda: np.full(3, np.nan), r"\[0\] = nan")):
+        with pytest.raises(ValueError, match=message):
+            rk.simulate(ROBOT, FailsAt(0.0, answer), PATH)
+
+
+def test_an_interrupt_comes_through():
+    with pytest.raises(KeyboardInterrupt):
+        rk.simulate(ROBOT, FailsAt(0.1, interrupt), PATH)
+
+
+@pytest.mark.parametrize("law", [rk.PD(1e4, 0.225), rk.PD(1e4 * np.eye(3), 0.225),
+                                 rk.AntagonismFilter(rk.PD(1e4, 0.225))], ids=["engine", "Python", "filter"])
+def test_a_machine_that_leaves_the_workspace(law):
+    error = lost(ROBOT, law, PATH, OFFSET)
+    k = round(error.time / PATH.dt)
+    consistent(error, k + (error.__cause__ is None))  # the torques of the last sample acted, but for a lost pose
+    assert "unstable gain" in error.reason and 0 < k < 300
+
+
+def test_angles_that_fit_no_pose():
+    far = 2.5 * np.array([1.0, -1.0, 1.0])
+    still = rk.hold(ROBOT, [0.0, 0.0], 0.01)
+    for law in (rk.AntagonismFilter(PD), rk.AntagonismFilter(pd), rk.CTC(900.0, 60.0)):
+        error = lost(ROBOT, law, still, far)
+        assert "fit no pose" in error.reason and error.time == 0.0
+        consistent(error, 0)
+    jump = lost(ROBOT, rk.AntagonismFilter(pd), still, faults=[rk.OffsetJump(i, 0.005, far[i]) for i in range(3)])
+    assert jump.time == still.t[5] and isinstance(jump.__cause__, rk.ConvergenceError)
+    consistent(jump, 5)
+
+
+def test_a_singularity_of_the_coordinates():
+    path = rk.triangle(ROBOT, duration=1.5)
+    error = lost(ROBOT, rk.CTC(900.0, 60.0, (1, 2)), path, OFFSET)
+    assert "singularity of its independent drives 2 and 3" in error.reason
+    consistent(error, len(error.partial))
+    assert abs(len(error.partial) - error.time / path.dt) <= 1 and np.all(error.partial.pairs == (1, 2))
+
+
+def test_a_law_of_the_user_is_asked_at_samples_only():
+    """A constant push drives the machine out; nobody calls the law to explain that."""
+    asked = []
+
+    def push(t, q_a, qd_a, desired):
+        asked.append(t)
+        return np.array([0.3, 0.0, 0.0])
+
+    for law in (push, rk.AntagonismFilter(push, pose="true")):
+        asked.clear()
+        error = lost(ROBOT, law, rk.hold(ROBOT, (0.0, 0.0), 1.0))
+        consistent(error, len(asked))
+        assert_array_equal(asked, error.partial.t)
+
+
+class Custom(Exception):
+    """An exception that plain pickle cannot make again."""
+
+    def __init__(self, one, two):
+        super().__init__(one)
+        self.two = two
+
+
+def test_errors_travel():
+    error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)
+    error.add_note("seen")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.time, again.reason) == (str(error), error.time, error.reason)
+    assert again.__notes__ == ["seen"] and repr(again.__cause__) == repr(error.__cause__)
+    assert_array_equal(again.partial.c, error.partial.c)
+
+    def custom():
+        raise Custom(1, 2)
+
+    law = FailsAt(0.1, custom)
+    with pytest.raises(rk.SimulationError, match="the law raised Custom: 1") as caught:
+        rk.simulate(ROBOT, lambda *sample: law(*sample), PATH)
+    assert isinstance(caught.value.__cause__, Custom)
+    caught.value.partial = None  # a lambda cannot travel
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+# Sweeps.
+LAWS = [pd, FailsAt(0.1, boom), PD, rk.PD(1e4, 0.225), FailsAt(0.0, boom)]
+
+
+def test_a_sweep_masks_what_failed():
+    study = rk.sweep(ROBOT, LAWS, PATH, OFFSET, failed="mask")
+    assert study.failed.tolist() == [False, True, False, True, True]
+    assert study.failure_time[1] == PATH.t[100] and study.failure_time[4] == 0.0
+    assert study.failure_time.mask.tolist() == [True, False, True, False, False]
+    assert study.energies.mask[:, 0].tolist() == study.failed.tolist()
+    assert_array_equal(study.energies[0], rk.simulate(ROBOT, pd, PATH, OFFSET).energy)
+    assert "5 runs, 3 failed" in repr(study)
+
+
+@pytest.mark.parametrize("in_process", [False, True])
+def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
+    pool = ProcessPoolExecutor(2) if in_process else None
+    try:
+        with pytest.raises(rk.SimulationError, match=r"run 1: at t = 0\.1000 s the law raised KeyError") as caught:
+            rk.sweep(ROBOT, LAWS[:4], PATH, OFFSET, executor=pool, chunk=2)
+    finally:
+        if pool:
+            pool.shutdown()
+    error = caught.value
+    assert error.run == 1 and isinstance(error.__cause__, KeyError)
+    consistent(error, 100)
+    assert error.sweep.failed.tolist() == [False, True, False, True]
+    assert_array_equal(error.sweep.energies[0], rk.simulate(ROBOT, pd, PATH, OFFSET).energy)
+    with pytest.raises(rk.SimulationError, match=r"run 0: .*unstable gain") as caught:
+        rk.sweep(ROBOT, LAWS[3], PATH, [OFFSET, OFFSET])
+    consistent(caught.value, round(caught.value.time / PATH.dt) + 1)
+    with pytest.raises(KeyError, match="gain table") as first:
+        rk.sweep(ROBOT, [pd, LAWS[4]], PATH, OFFSET)
+    assert "first sample of run 1" in first.value.__notes__[-1]
+    assert first.value.partial.failed.tolist() == [False, True]
+
+
+def test_a_bad_first_answer_is_no_failed_row():
+    with pytest.raises(ValueError, match="law returned None"):
+        rk.sweep(ROBOT, [pd, lambda *sample: None], PATH, OFFSET, failed="mask")
+
+
+class Pool(Executor):
+    """Does its jobs at once, but for the one that raises and all after it."""
+
+    def __init__(self, broken: int, error: BaseException):
+        self.broken, self.error, self.futures = broken, error, []
+
+    def submit(self, function, *arguments):
+        future, n = Future(), len(self.futures)
+        self.futures.append(future)
+        if n < self.broken:
+            future.set_result(function(*arguments))
+        elif n == self.broken:
+            future.set_exception(self.error)
+        return future
+
+
+@pytest.mark.parametrize("law", [PD, pd], ids=["engine", "Python"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), BrokenProcessPool("a process died")], ids=["Ctrl-C", "died"])
+def test_finished_chunks_are_on_the_exception_and_the_rest_is_cancelled(law, error):
+    offsets = np.random.default_rng(1).normal(0.0, 3e-3, (8, 3))
+    pool = Pool(2, error)
+    with pytest.raises(type(error)) as caught:
+        rk.sweep(ROBOT, law, PATH, offsets, executor=pool, chunk=2)
+    assert [future.cancelled() for future in pool.futures] == [False, False, False, True]
+    part = caught.value.partial
+    assert isinstance(part, rk.Sweep) and part.failed.tolist() == [False] * 4 + [True] * 4
+    assert part.failure_time.mask.all()  # the others did not fail, they never ran
+    assert_array_equal(part.energies[:4], rk.sweep(ROBOT, law, PATH, offsets[:4]).energies)
+    assert part.energies.mask[4:].all()
+    assert "4 of 8 runs were finished" in caught.value.__notes__[-1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")
+def test_a_process_that_dies_takes_no_finished_rows_along():
+    offsets = np.zeros((6, 3))
+    laws = [pd, pd, FailsAt(0.1, die), pd, pd, pd]
+    with ProcessPoolExecutor(1) as pool, pytest.raises(BrokenProcessPool) as caught:
+        rk.sweep(ROBOT, laws, PATH, offsets, executor=pool, chunk=1)
+    part = caught.value.partial
+    assert part.failed.tolist() == [False, False, True, True, True, True]
+    assert_array_equal(part.energies[0], rk.simulate(ROBOT, pd, PATH).energy)
