@@ -11,85 +11,8 @@ import math
 
 from .jit import leaf, outlined
 from .leaves import accelerations, drag, geometry, inertia, small_angle, solve2
-from .rows import (
-    A1,
-    A2,
-    ACC_B,
-    ACC_E,
-    ACC_X,
-    ACC_Y,
-    BEST,
-    BEST_J,
-    BEST_K,
-    BX,
-    BY,
-    EASE,
-    ED,
-    ELBOW_D,
-    ELBOW_E,
-    ELBOW_ED,
-    ELBOW_P,
-    ELBOW_SCALE,
-    FRICTION,
-    G11,
-    G12,
-    G22,
-    GAIN_D,
-    GAIN_P,
-    GX,
-    GY,
-    HALF,
-    HYSTERESIS,
-    JOINT_J,
-    JOINT_K,
-    L1,
-    L1SQ,
-    L2,
-    L2SQ,
-    MAD,
-    MEAN,
-    MINV,
-    MODE,
-    MODEL,
-    NOW,
-    P11,
-    P12,
-    P22,
-    PAIR_D1,
-    PAIR_D2,
-    PAIR_P1,
-    PAIR_P2,
-    PUSH_X,
-    PUSH_Y,
-    PVX,
-    PVY,
-    PX,
-    PY,
-    REF_X,
-    REF_Y,
-    S1,
-    S2,
-    SCALE,
-    TIP,
-    W1,
-    W2,
-    C,
-    E,
-    at,
-    of,
-    want,
-)
-from .tables import (
-    ACCELERATION,
-    APD,
-    ELBOW_ACCELERATION,
-    ELBOW_COS,
-    ELBOW_RATE,
-    ELBOW_SIN,
-    RATE,
-    REDUNDANT_APD,
-    REDUNDANT_CTC_LINE2,
-)
+from .rows import *
+from .tables import *
 
 
 @outlined
@@ -98,7 +21,8 @@ def look(lanes, drives, arms, table, o, w):
     L, N, W = len(lanes), len(drives), len(arms)
     far = 0
     for i in range(N):
-        cos, sin, rate = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W), want(table, o, ELBOW_RATE, i, W)
+        cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
+        rate = want(table, o, ELBOW_RATE, i, W)
         for j in range(L):
             ax, ay, dx, dy, ad, inv, _ = geometry(
                 w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
@@ -198,7 +122,7 @@ def reference(lanes, drives, arms, law, table, o, w):
 
 
 @outlined
-def shares(lanes, drives, arms, model, w):
+def shares(lanes, drives, arms, extra, w):
     """Shares of the arms in M and h, and the accelerations of their joints at zero xdd, with the reference rate."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
@@ -210,11 +134,13 @@ def shares(lanes, drives, arms, model, w):
                                                w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)])
             m11, m12, m22, fx, fy = inertia(w[at(MODEL + S1, i, j, W, L)], w[at(MODEL + S2, i, j, W, L)],
                                             bx, by, lx, ly, base_acc, back_acc)
-            if len(model.extra) > 0:
-                drive, distal = drag(w[at(MODEL + W1, i, j, W, L)], w[at(MODEL + W2, i, j, W, L)],
-                                     w[at(MODEL + FRICTION, i, j, W, L)], model.env, lx / inv, ly / inv, bx / inv,
-                                     by / inv, base)
-                fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
+            if len(extra) > 0:
+                env = (w[of(ENVIRONMENT + GRAVITY_X, j, W, L)], w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
+                       w[of(ENVIRONMENT + SHARPNESS, j, W, L)])
+                place = lx / inv, ly / inv, bx / inv, by / inv, ad, inv, 0.0
+                gx, gy = drag(w[at(MODEL + W1, i, j, W, L)], w[at(MODEL + W2, i, j, W, L)],
+                              w[at(MODEL + FRICTION, i, j, W, L)], env, place, base)
+                fx, fy = fx + gx, fy + gy
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = m11, m12, m22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = -fx, -fy
             w[at(ACC_B, i, j, W, L)], w[at(ACC_E, i, j, W, L)] = base_acc, -base_acc - back_acc
@@ -230,7 +156,8 @@ def minimal_feedback(lanes, drives, arms, law, table, o, w):
         task = w[of(JOINT_J, j, W, L)] < 0.0
         a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
         e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
-        e1d, e2d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d, w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
+        e1d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d
+        e2d = w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
         v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
         s1 = w[of(PAIR_P1, j, W, L)] * e1 + w[of(PAIR_D1, j, W, L)] * e1d
         s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
@@ -296,11 +223,11 @@ def redundant_feedback(lanes, drives, arms, law, table, o, w):
 
 
 @outlined
-def distribute(lanes, drives, arms, env, w):
+def distribute(lanes, drives, arms, w):
     """c = A (A^T A)^-1 (M w + h + g), weighted where W is not the identity."""
     L, N, W = len(lanes), len(drives), len(arms)
-    mass = env[3]
     for j in range(L):
+        mass = w[of(ENVIRONMENT + MASS, j, W, L)]
         m11, m12, m22 = mass, 0.0, mass
         n11 = n12 = n22 = 0.0
         fx, fy = w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)]
@@ -315,8 +242,8 @@ def distribute(lanes, drives, arms, env, w):
             w[at(C, i, j, W, L)] = w[at(EASE, i, j, W, L)] * (w[at(A1, i, j, W, L)] * gx + w[at(A2, i, j, W, L)] * gy)
 
 
-@leaf
-def computed_torque(lanes, drives, arms, model, law, table, o, w):
+@outlined
+def computed_torque(lanes, drives, arms, extra, law, table, o, w):
     """Drive torques C of the laws with a model, at the pose PX, PY, PVX, PVY."""
     look(lanes, drives, arms, table, o, w)
     if law.switched:
@@ -325,9 +252,9 @@ def computed_torque(lanes, drives, arms, model, law, table, o, w):
     if redundant:
         gram(lanes, drives, arms, w)
     reference(lanes, drives, arms, law, table, o, w)
-    shares(lanes, drives, arms, model, w)
+    shares(lanes, drives, arms, extra, w)
     if redundant:
         redundant_feedback(lanes, drives, arms, law, table, o, w)
     else:
         minimal_feedback(lanes, drives, arms, law, table, o, w)
-    distribute(lanes, drives, arms, model.env, w)
+    distribute(lanes, drives, arms, w)

@@ -79,25 +79,24 @@ def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
 
 
 @leaf
-def drag(w1, w2, friction, env, ax, ay, dx, dy, base):
-    """Gravity and friction of an arm at its two links: torques in N m that oppose the drive and the distal link."""
-    return (w1 * (env[0] * ay - env[1] * ax) + friction * smooth_sign(base * env[2]),
-            w2 * (env[0] * dy - env[1] * dx))
+def drag(w1, w2, friction, env, place, base):
+    """Force of gravity and friction on an arm whose base turns at the rate `base`.
+
+    env : gravity vector, and the sharpness 1 / v0 of the friction law.
+    """
+    ax, ay, dx, dy, _, inv, _ = place
+    drive = w1 * (env[0] * ay - env[1] * ax) + friction * smooth_sign(base * env[2])
+    distal = w2 * (env[0] * dy - env[1] * dx)
+    return inv * (ax * distal - dx * drive), inv * (ay * distal - dy * drive)
 
 
 @leaf
-def share(arm, env, extra, x, y, vx, vy):
-    """An arm in the equations of motion, without its torque: m11, m12, m22, fx, fy; b; (a x d)^2.
-
-    arm : base_x, base_y, l1^2, l2^2, half, mean, mode, S1, S2, w1, w2, friction (`tables.arm_table`).
-    """
-    base_x, base_y, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction = arm
-    ax, ay, dx, dy, ad, inv, area2 = geometry(base_x, base_y, l1sq, half, mean, mode, x, y)
+def share(s1, s2, l1sq, l2sq, place, vx, vy):
+    """An arm in the equations of motion: m11, m12, m22, fx, fy of `inertia`; b; base rate and its part of the base
+    acceleration at zero xdd; decay rate of a x d, 1/s."""
+    ax, ay, dx, dy, ad, inv, _ = place
     bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
     base, back = bx * vx + by * vy, lx * vx + ly * vy
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
-    if len(extra) > 0:
-        drive, distal = drag(w1, w2, friction, env, ax, ay, dx, dy, base)
-        fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
-    return m11, m12, m22, fx, fy, bx, by, area2
+    return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv * (base + back)

@@ -14,99 +14,29 @@ from .jit import kernel, leaf, outlined
 from .laws import computed_torque
 from .leaves import solve2
 from .pose import measured_pose, measured_rate, true_pose
-from .rows import (
-    A1,
-    A2,
-    ANTAGONISM,
-    B1,
-    B2,
-    COPPER,
-    EASE,
-    ED,
-    GAIN_D,
-    GAIN_I,
-    GAIN_P,
-    JOINT_J,
-    JOINT_K,
-    LIMIT,
-    MEMORY,
-    OFFSET,
-    OLD,
-    QD,
-    READ,
-    SAMPLE,
-    SLOW,
-    STATUS,
-    TORQUE2,
-    VX,
-    VY,
-    WEIGHT,
-    WORK,
-    C,
-    E,
-    Q,
-    X,
-    Y,
-    at,
-    of,
-    want,
-)
-from .tables import (
-    ANGLE,
-    COMMAND_FILTER,
-    DONE,
-    FORCE_FILTER,
-    MEASURED,
-    NO_FILTER,
-    PD,
-    PID,
-    RATE,
-    SINGULAR,
-)
+from .rows import *
+from .tables import *
 
 
-@leaf
-def sense(lanes, drives, arms, machine, table, o, w, dt):
-    """True base angles and rates, and the geometry and shares of the arms that the hold starts from."""
-    if len(lanes) == 1:
-        far = single.sense(arms, machine.env, machine.extra, table, 0, w, dt)
-    else:
-        far = plant.sense(lanes, arms, machine.env, machine.extra, table, o, w, dt)
-    if far > 0:
-        plant.mend(lanes, arms, table, o, w)
-
-
-@leaf
-def measure(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
-    """Readings of the encoders with offsets, counts and faults, rates from their differences; the errors E, ED."""
+@outlined
+def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
+    """Errors E, ED of real encoders: jumps of their offset, counts, dropouts, rates from their differences."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
             w[at(E, i, j, W, L)] = w[at(Q, i, j, W, L)] + w[at(OFFSET, i, j, W, L)]
             w[at(ED, i, j, W, L)] = w[at(QD, i, j, W, L)]
-    if len(faulty) > 0 or sensor.quantized or sensor.filtered:
-        read(lanes, arms, sensor, faulty, faults, w, dt, k)
-    for i in range(W):
-        angle, rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
-        for j in range(L):
-            w[at(E, i, j, W, L)] -= angle
-            w[at(ED, i, j, W, L)] -= rate
-
-
-@outlined
-def read(lanes, arms, sensor, faulty, faults, w, dt, k):
-    """What real encoders make of the angles and rates in E, ED."""
-    L, W = len(lanes), len(arms)
-    for i in range(W):
         if len(faulty) > 0:
             for j in range(L):
-                w[at(E, i, j, W, L)] += faults.jump[k][i]
+                w[at(E, i, j, W, L)] += faults[(k * 4 + JUMP) * W + i]
         if sensor.quantized:
             for j in range(L):
                 w[at(E, i, j, W, L)] = sensor.quantum * math.floor(w[at(E, i, j, W, L)] / sensor.quantum + 0.5)
-        if len(faulty) > 0 and k > 0 and faults.held[k][i] > 0.0:
+        if len(faulty) > 0 and faults[(k * 4 + HELD) * W + i] > 0.0:
             for j in range(L):
-                w[at(E, i, j, W, L)], w[at(ED, i, j, W, L)] = w[at(READ, i, j, W, L)], 0.0
+                # An encoder that repeats itself has read once.
+                w[at(E, i, j, W, L)] = w[at(READ, i, j, W, L)] if k > 0 else w[at(E, i, j, W, L)]
+                w[at(ED, i, j, W, L)] = 0.0
         if sensor.filtered:
             # Nothing to compare the first reading with.
             blend = sensor.blend if k > 0 else 0.0
@@ -116,32 +46,8 @@ def read(lanes, arms, sensor, faulty, faults, w, dt, k):
                 w[at(ED, i, j, W, L)] = w[at(SLOW, i, j, W, L)]
         for j in range(L):
             w[at(READ, i, j, W, L)] = w[at(E, i, j, W, L)]
-
-
-@leaf
-def find_pose(lanes, drives, arms, law, smooth, table, o, w, k):
-    """The pose that the law and its filter go by; none for decentralized laws."""
-    if law.pose == MEASURED:
-        measured_pose(lanes, drives, arms, table, o, w, k, smooth)
-        if law.form > PID:
-            measured_rate(lanes, drives, arms, table, o, w)
-    else:
-        true_pose(lanes, drives, arms, law, w)
-
-
-@leaf
-def command(lanes, drives, arms, model, law, table, o, w, dt):
-    """Drive torques C."""
-    if law.form == PD:
-        proportional(lanes, arms, w)
-    elif law.form == PID:
-        integral(lanes, arms, w, dt)
-    else:
-        computed_torque(lanes, drives, arms, model, law, table, o, w)
-    if law.filter == FORCE_FILTER:
-        force_filter(lanes, drives, arms, w)
-    elif law.filter == COMMAND_FILTER:
-        command_filter(lanes, drives, arms, w)
+            w[at(E, i, j, W, L)] -= want(table, o, ANGLE, i, W)
+            w[at(ED, i, j, W, L)] -= want(table, o, RATE, i, W)
 
 
 @leaf
@@ -210,19 +116,21 @@ def break_drives(lanes, arms, faults, w, k):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            c, limit = w[at(C, i, j, W, L)] * faults.alive[k][i], faults.limit[i]
+            c, limit = w[at(C, i, j, W, L)] * faults[(k * 4 + ALIVE) * W + i], faults[(k * 4 + LIMITED) * W + i]
             w[at(C, i, j, W, L)] = min(max(c, -limit), limit)
 
 
 @leaf
 def record(drives, arms, history, w, k):
     """A sample of a single run."""
-    W = len(arms)
-    s, q, qd, c, pairs = history.states, history.q_a, history.qd_a, history.c, history.pairs
-    s[k, 0], s[k, 1], s[k, 2], s[k, 3] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    for i in range(len(drives)):
-        q[k, i], qd[k, i], c[k, i] = w[at(Q, i, 0, W, 1)], w[at(QD, i, 0, W, 1)], w[at(C, i, 0, W, 1)]
-    pairs[k, 0], pairs[k, 1] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
+    N, W = len(drives), len(arms)
+    o = k * (6 + 3 * N)
+    history[o], history[o + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
+    history[o + 2], history[o + 3] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    for i in range(N):
+        history[o + 4 + i], history[o + 4 + N + i] = w[at(Q, i, 0, W, 1)], w[at(QD, i, 0, W, 1)]
+        history[o + 4 + 2 * N + i] = w[at(C, i, 0, W, 1)]
+    history[o + 4 + 3 * N], history[o + 5 + 3 * N] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
 
 
 @outlined
@@ -256,39 +164,70 @@ def add_work(lanes, drives, arms, w):
 
 
 @kernel
-def closed_loops(lanes, drives, arms, faulty, machine, model, motion, sensor, law, faults, w, history):
-    """Sampled runs side by side, whatever their law; returns the sample where the last of them ended.
+def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, dt, table, faults, w, history):
+    """Sampled runs side by side, whatever their law: a single run with its history, a study with sums in w.
 
-    A single run leaves its history, a study its sums and final states in w, both their status.
+    The sizes of the first tuples tell the compiler what there is: runs, drives, arms of a row, faults, friction or
+    gravity of the machine and of the model.
     """
-    L, table, columns = len(lanes), motion.table, 6 + 9 * len(arms)
+    L, columns = len(lanes), 6 + 9 * len(arms)
     samples = len(table) // columns
+    real = len(faulty) > 0 or sensor.quantized or sensor.filtered
     for k in range(samples):
         o = k * columns
-        sense(lanes, drives, arms, machine, table, o, w, motion.dt)
+
+        # Sense: the machine as it is, and what the hold will start from.
         if L > 1:
+            far = plant.sense(lanes, arms, extra, table, o, w, dt)
             add_work(lanes, drives, arms, w)
-        measure(lanes, arms, sensor, faulty, faults, table, o, w, motion.dt, k)
+        else:
+            far = single.sense(arms, extra, table, o, w, dt)
+        if far > 0:
+            plant.mend(lanes, arms, table, o, w)
+
+        # Measure: ideal encoders have their errors from `sense`.
+        if real:
+            read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k)
+
+        # Pose: where the controller thinks the machine is, if its law or filter asks.
         if law.form > PID or law.filter != NO_FILTER:
-            find_pose(lanes, drives, arms, law, not sensor.quantized, table, o, w, k)
+            if law.pose == MEASURED:
+                measured_pose(lanes, drives, arms, table, o, w, k, not sensor.quantized)
+                measured_rate(lanes, drives, arms, table, o, w)
+            else:
+                true_pose(lanes, drives, arms, law, w)
         if L > 1 and k + 1 == samples:
-            return k
-        command(lanes, drives, arms, model, law, table, o, w, motion.dt)
+            return
+
+        # Command: the law, the filter around it, and what is left of both in broken drives.
+        if law.form == PD:
+            proportional(lanes, arms, w)
+        elif law.form == PID:
+            integral(lanes, arms, w, dt)
+        else:
+            computed_torque(lanes, drives, arms, model_extra, law, table, o, w)
+        if law.filter == FORCE_FILTER:
+            force_filter(lanes, drives, arms, w)
+        elif law.filter == COMMAND_FILTER:
+            command_filter(lanes, drives, arms, w)
         if len(faulty) > 0:
             break_drives(lanes, arms, faults, w, k)
-        if L == 1:
-            record(drives, arms, history, w, k)
-            if lost(lanes, drives, arms, w, k) or k + 1 == samples:
-                return k
-            single.hold(arms, machine.env, machine.extra, w, motion.dt)
-            if plant.judge(lanes, arms, w, k) > 0:
-                return k
-        else:
+
+        # Record.
+        if L > 1:
             add_up(lanes, drives, arms, w)
-            lost(lanes, drives, arms, w, k)
-            if plant.hold(lanes, arms, machine.env, machine.extra, w, motion.dt, k) == L:
-                return k
-    return samples - 1
+        else:
+            record(drives, arms, history, w, k)
+        if lost(lanes, drives, arms, w, k) or k + 1 == samples:
+            return
+
+        # Hold.
+        if L > 1:
+            plant.hold(lanes, arms, extra, w, dt)
+        else:
+            single.hold(arms, extra, w, dt)
+        if plant.judge(lanes, arms, w, k) == L:
+            return
 
 
 @leaf

@@ -9,110 +9,49 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import accelerations, drag, geometry, inertia, share, small_angle, solve2
-from .rows import (
-    ACC,
-    AD,
-    AX,
-    AY,
-    B1,
-    B2,
-    BX,
-    BY,
-    FRICTION,
-    FX,
-    FY,
-    HALF,
-    INV,
-    KX,
-    KY,
-    L1SQ,
-    L2SQ,
-    LOW,
-    M11,
-    M12,
-    M22,
-    MEAN,
-    MODE,
-    PUSH,
-    QD,
-    S1,
-    S2,
-    SAMPLE,
-    SCALE,
-    STATUS,
-    STEP,
-    STEPS,
-    SVX,
-    SVY,
-    SX,
-    SY,
-    TVX,
-    TVY,
-    TX,
-    TY,
-    VX,
-    VY,
-    W1,
-    W2,
-    C,
-    Q,
-    X,
-    Y,
-    at,
-    of,
-    want,
-)
-from .tables import ANGLE, COS, DONE, LEFT_WORKSPACE, SIN, TOO_STIFF
+from .leaves import drag, geometry, share, small_angle, solve2
+from .rows import *
+from .tables import *
 
 # Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
 STIFF, FAST, MOST_STEPS = 1.5, 1.0, 4000.0
 
 
-@leaf
-def seen(arm, env, extra, place, x, y, vx, vy, dt):
-    """An arm at a sample: its rates, shares as in `leaves.share`, and a number that is not positive for a lost arm.
-
-    place : what `geometry` gives.
-    """
-    base_x, base_y, l1sq, l2sq, half, mean, mode, s1, s2, w1, w2, friction = arm
-    ax, ay, dx, dy, ad, inv, area2 = place
-    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
-    base, back = bx * vx + by * vy, lx * vx + ly * vy
-    base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
-    m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
-    if len(extra) > 0:
-        drive, distal = drag(w1, w2, friction, env, ax, ay, dx, dy, base)
-        fx, fy = fx - bx * drive + lx * distal, fy - by * drive + ly * distal
-    # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector coordinates
-    # a Runge-Kutta step could jump over that instant.
-    return base, bx, by, base_acc, m11, m12, m22, fx, fy, min(area2, 1.0 - dt * ad * inv * (base + back))
-
-
 @outlined
-def sense(lanes, arms, env, extra, table, o, w, dt):
-    """Base angles and rates, geometry and shares of all arms; returns how many arms are far from where they should be."""
+def sense(lanes, arms, extra, table, o, w, dt):
+    """Base angles and rates, geometry and shares of all arms; returns how many arms are far from where they should."""
     L, W = len(lanes), len(arms)
     count = 0
     for i in range(W):
-        angle, ux, uy = want(table, o, ANGLE, i, W), want(table, o, COS, i, W), want(table, o, SIN, i, W)
+        wanted, wanted_rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
+        ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            x, y, vx, vy = w[of(X, j, W, L)], w[of(Y, j, W, L)], w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-            arm = (w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)],
-                   w[at(HALF, i, j, W, L)], w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[at(S1, i, j, W, L)],
-                   w[at(S2, i, j, W, L)], w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)])
-            place = geometry(arm[0], arm[1], arm[2], arm[4], arm[5], arm[6], x, y)
-            rate, bx, by, acc, m11, m12, m22, fx, fy, low = seen(arm, env, extra, place, x, y, vx, vy, dt)
+            place = geometry(
+                w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(HALF, i, j, W, L)],
+                w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[of(X, j, W, L)], w[of(Y, j, W, L)])
+            m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
+                w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
+                w[of(VX, j, W, L)], w[of(VY, j, W, L)])
+            if len(extra) > 0:
+                env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
+                gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
+                              place, rate)
+                fx, fy = fx + gx, fy + gy
             ax, ay = place[0], place[1]
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             s, t = (ux * ay - uy * ax) * w[at(SCALE, i, j, W, L)], ux * ax + uy * ay
             near = min(0.1 - abs(s), t)
-            w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = angle + small_angle(s), rate
+            angle = small_angle(s)
+            w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
+            w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
+            w[at(ED, i, j, W, L)] = rate - wanted_rate
             w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)], w[at(AD, i, j, W, L)] = ax, ay, place[4]
             w[at(INV, i, j, W, L)], w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = place[5], bx, by
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)], w[at(ACC, i, j, W, L)] = fx, fy, acc
-            w[at(LOW, i, j, W, L)] = low
+            # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector
+            # coordinates a Runge-Kutta step could jump over that instant.
+            w[at(LOW, i, j, W, L)] = min(place[6], 1.0 - dt * decay)
             count += 1 if near < 0.0 else 0
     return count
 
@@ -127,32 +66,40 @@ def mend(lanes, arms, table, o, w):
             ax, ay = w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)]
             s, t = ux * ay - uy * ax, ux * ax + uy * ay
             if not (abs(s * w[at(SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
-                w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + math.atan2(s, t)
+                angle = math.atan2(s, t)
+                w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + angle
+                w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
 
 
 @outlined
-def pull(lanes, arms, env, extra, w):
-    """Shares of all arms at the state of a stage, under the torques PUSH."""
+def pull(lanes, arms, extra, w):
+    """Shares of all arms at the state of a stage, under the torques C."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            arm = (w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)],
-                   w[at(HALF, i, j, W, L)], w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[at(S1, i, j, W, L)],
-                   w[at(S2, i, j, W, L)], w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)])
-            m11, m12, m22, fx, fy, bx, by, area2 = share(
-                arm, env, extra, w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(SVX, j, W, L)], w[of(SVY, j, W, L)])
-            c = w[at(PUSH, i, j, W, L)]
+            place = geometry(
+                w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(HALF, i, j, W, L)],
+                w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[of(SX, j, W, L)], w[of(SY, j, W, L)])
+            m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
+                w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
+                w[of(SVX, j, W, L)], w[of(SVY, j, W, L)])
+            if len(extra) > 0:
+                env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
+                gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
+                              place, rate)
+                fx, fy = fx + gx, fy + gy
+            c = w[at(C, i, j, W, L)]
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c
-            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
+            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], place[6])
 
 
 @outlined
-def join(lanes, arms, env, w):
+def join(lanes, arms, w):
     """End-effector accelerations from the shares of the arms."""
     L, W = len(lanes), len(arms)
-    mass = env[3]
     for j in range(L):
+        mass = w[of(MASS, j, W, L)]
         m11, m12, m22, fx, fy = mass, -0.0, mass, -0.0, -0.0
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
@@ -161,7 +108,7 @@ def join(lanes, arms, env, w):
 
 
 @leaf
-def stiffness(friction, env, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
+def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
     """What friction of a drive asks of a hold: lambda dt, |qdd| dt / v0, and 1 where the drive can pass zero in it.
 
     lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
@@ -169,22 +116,23 @@ def stiffness(friction, env, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
     gx, gy = solve2(m11, m12, m22, bx, by)
     yields = friction * (bx * gx + by * gy)
     qdd = abs(bx * kx + by * ky + acc)
-    passes = abs(rate) < 20.0 / env[2] + (qdd + 2.0 * yields) * dt
-    return yields * env[2] * dt, (qdd + yields) * dt * env[2], 1.0 if passes and friction > 0.0 else 0.0
+    passes = abs(rate) < 20.0 / sharpness + (qdd + 2.0 * yields) * dt
+    return yields * sharpness * dt, (qdd + yields) * dt * sharpness, 1.0 if passes and friction > 0.0 else 0.0
 
 
 @outlined
-def count_steps(lanes, arms, env, w, dt):
+def count_steps(lanes, arms, w, dt):
     """Steps of equal length that each run needs in a hold because of friction; returns the largest number."""
     L, W = len(lanes), len(arms)
-    most, mass = 1.0, env[3]
+    most = 1.0
     for j in range(L):
+        mass, sharpness = w[of(MASS, j, W, L)], w[of(SHARPNESS, j, W, L)]
         m11, m12, m22 = mass, -0.0, mass
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
         stiff, fast, near = 0.0, 0.0, 0.0
         for i in range(W):
-            a, b, c = stiffness(w[at(FRICTION, i, j, W, L)], env, m11, m12, m22, w[at(B1, i, j, W, L)],
+            a, b, c = stiffness(w[at(FRICTION, i, j, W, L)], sharpness, m11, m12, m22, w[at(B1, i, j, W, L)],
                                 w[at(B2, i, j, W, L)], w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)],
                                 w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
@@ -212,7 +160,7 @@ def stage(lanes, arms, w, part, weight):
 
 
 @leaf
-def step(lanes, arms, env, extra, w):
+def step(lanes, arms, extra, w):
     """A Runge-Kutta step (order 4) of length STEP after its first stage."""
     L, W = len(lanes), len(arms)
     for j in range(L):
@@ -221,8 +169,8 @@ def step(lanes, arms, env, extra, w):
         w[of(TX, j, W, L)] = w[of(TY, j, W, L)] = w[of(TVX, j, W, L)] = w[of(TVY, j, W, L)] = 0.0
     stage(lanes, arms, w, 0.5, 1.0)
     for s in range(3):
-        pull(lanes, arms, env, extra, w)
-        join(lanes, arms, env, w)
+        pull(lanes, arms, extra, w)
+        join(lanes, arms, w)
         # The last stage leaves its state unused.
         stage(lanes, arms, w, 0.5 if s == 0 else 1.0, 1.0 if s == 2 else 2.0)
     for j in range(L):
@@ -234,32 +182,30 @@ def step(lanes, arms, env, extra, w):
 
 
 @leaf
-def hold(lanes, arms, env, extra, w, dt, k):
-    """Hold the torques C for dt; returns how many runs have ended."""
+def hold(lanes, arms, extra, w, dt):
+    """Hold the torques C for dt."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
             c = w[at(C, i, j, W, L)]
-            w[at(PUSH, i, j, W, L)] = c
             w[at(FX, i, j, W, L)] += w[at(B1, i, j, W, L)] * c
             w[at(FY, i, j, W, L)] += w[at(B2, i, j, W, L)] * c
-    join(lanes, arms, env, w)
+    join(lanes, arms, w)
     most = 1.0
     for j in range(L):
         w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
     if len(extra) > 0:
-        most = count_steps(lanes, arms, env, w, dt)
-    step(lanes, arms, env, extra, w)
+        most = count_steps(lanes, arms, w, dt)
+    step(lanes, arms, extra, w)
     for s in range(1, int(most)):
         for j in range(L):
             # A run that needs fewer steps stands still while others go on.
             w[of(STEP, j, W, L)] = w[of(STEP, j, W, L)] if s < w[of(STEPS, j, W, L)] else 0.0
             w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
             w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-        pull(lanes, arms, env, extra, w)
-        join(lanes, arms, env, w)
-        step(lanes, arms, env, extra, w)
-    return judge(lanes, arms, w, k)
+        pull(lanes, arms, extra, w)
+        join(lanes, arms, w)
+        step(lanes, arms, extra, w)
 
 
 @leaf

@@ -4,54 +4,13 @@ from __future__ import annotations
 
 import math
 
-from .jit import leaf, outlined
+from .jit import outlined
 from .leaves import geometry, small_angle, solve2
-from .rows import (
-    A1,
-    A2,
-    B1,
-    B2,
-    BX,
-    BY,
-    ED,
-    FAR,
-    GX,
-    GY,
-    HALF,
-    L1SQ,
-    L2SQ,
-    MEAN,
-    MODE,
-    MODEL,
-    NEAR,
-    P11,
-    P12,
-    P22,
-    PVX,
-    PVY,
-    PX,
-    PX1,
-    PX2,
-    PY,
-    PY1,
-    PY2,
-    SAMPLE,
-    SCALE,
-    STATUS,
-    TODO,
-    VX,
-    VY,
-    E,
-    X,
-    Y,
-    at,
-    of,
-    want,
-)
-from .tables import COS, DONE, NO_POSE, RATE, SIN
+from .rows import *
+from .tables import *
 
 
-@leaf
+@outlined
 def true_pose(lanes, drives, arms, law, w):
     """The true end-effector position and velocity, and A there."""
     L, W = len(lanes), len(arms)
@@ -149,7 +108,7 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
     return x, y, False
 
 
-@leaf
+@outlined
 def measured_pose(lanes, drives, arms, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
@@ -186,6 +145,7 @@ def measured_rate(lanes, drives, arms, table, o, w):
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            a1, a2, rate = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(ED, i, j, W, L)] + want(table, o, RATE, i, W)
+            a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
+            rate = w[at(ED, i, j, W, L)] + want(table, o, RATE, i, W)
             m11, m12, m22, fx, fy = m11 + a1 * a1, m12 + a1 * a2, m22 + a2 * a2, fx + a1 * rate, fy + a2 * rate
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve2(m11, m12, m22, fx, fy)

@@ -18,13 +18,15 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
 (Q, QD, AX, AY, AD, INV, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 17)
 # The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
 (E, ED, LAST, SLOW, READ, MEMORY, A1, A2, P11, P12, P22, GX, GY, L1, L2, MAD, MINV, ACC_B, ACC_E, ELBOW_E, ELBOW_ED,
- C, PUSH, OLD, COPPER, WORK, WANTED, UX, UY) = range(FY + 1, FY + 30)
+ C, OLD, COPPER, WORK, WANTED, WANTED_RATE, UX, UY) = range(FY + 1, FY + 30)
 BLOCKS = UY + 1
 
 (X, Y, VX, VY, KX, KY, SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS, PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR,
- JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS, REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
- BEST, BEST_J, BEST_K, NOW, TORQUE2, ANTAGONISM, STATUS, SAMPLE) = range(50)
-SINGLES = 50
+ JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS, REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12,
+ G22, BEST, BEST_J, BEST_K, NOW, TORQUE2, ANTAGONISM, STATUS, SAMPLE, GRAVITY_X, GRAVITY_Y, SHARPNESS,
+ MASS) = range(54)
+# The environment of the machine as in `tables.environment`, and after it that of the model.
+ENVIRONMENT, SINGLES = 4, 58
 
 
 @leaf

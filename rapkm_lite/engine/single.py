@@ -5,53 +5,10 @@ from __future__ import annotations
 import math
 
 from .jit import kernel, leaf, outlined
-from .leaves import geometry, share, small_angle, solve2
-from .plant import FAST, MOST_STEPS, STIFF, mend, seen, stiffness
-from .rows import (
-    ACC,
-    AD,
-    AX,
-    AY,
-    B1,
-    B2,
-    BX,
-    BY,
-    FRICTION,
-    FX,
-    FY,
-    HALF,
-    INV,
-    L1SQ,
-    L2SQ,
-    LOW,
-    M11,
-    M12,
-    M22,
-    MEAN,
-    MODE,
-    NEAR,
-    PUSH,
-    QD,
-    S1,
-    S2,
-    SCALE,
-    STEPS,
-    UX,
-    UY,
-    VX,
-    VY,
-    W1,
-    W2,
-    WANTED,
-    C,
-    Q,
-    X,
-    Y,
-    of,
-    total,
-    want,
-)
-from .tables import ANGLE, COS, SIN
+from .leaves import drag, geometry, share, small_angle, solve2
+from .plant import FAST, MOST_STEPS, STIFF, mend, stiffness
+from .rows import *
+from .tables import *
 
 
 @leaf
@@ -67,7 +24,7 @@ def fetch(row, block, W, table, o, w):
 
 
 @leaf
-def sense(arms, env, extra, table, o, w, dt):
+def sense(arms, extra, table, o, w, dt):
     """As `plant.sense`."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
@@ -75,19 +32,27 @@ def sense(arms, env, extra, table, o, w, dt):
     fetch(WANTED, ANGLE, W, table, o, w)
     fetch(UX, COS, W, table, o, w)
     fetch(UY, SIN, W, table, o, w)
+    fetch(WANTED_RATE, RATE, W, table, o, w)
+    env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
-               w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
-        place = geometry(arm[0], arm[1], arm[2], arm[4], arm[5], arm[6], x, y)
-        rate, bx, by, acc, m11, m12, m22, fx, fy, low = seen(arm, env, extra, place, x, y, vx, vy, dt)
+        place = geometry(w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
+                         w[MODE * W + i], x, y)
+        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
+        if len(extra) > 0:
+            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
+            fx, fy = fx + gx, fy + gy
         ax, ay, ux, uy = place[0], place[1], w[UX * W + i], w[UY * W + i]
         s, t = (ux * ay - uy * ax) * w[SCALE * W + i], ux * ax + uy * ay
         w[NEAR * W + i] = min(0.1 - abs(s), t)
-        w[Q * W + i], w[QD * W + i] = w[WANTED * W + i] + small_angle(s), rate
+        angle = small_angle(s)
+        w[Q * W + i], w[QD * W + i] = w[WANTED * W + i] + angle, rate
+        w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - w[WANTED_RATE * W + i]
         w[AX * W + i], w[AY * W + i], w[AD * W + i] = ax, ay, place[4]
         w[INV * W + i], w[B1 * W + i], w[B2 * W + i] = place[5], bx, by
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
-        w[FX * W + i], w[FY * W + i], w[ACC * W + i], w[LOW * W + i] = fx, fy, acc, low
+        w[FX * W + i], w[FY * W + i], w[ACC * W + i] = fx, fy, acc
+        w[LOW * W + i] = min(place[6], 1.0 - dt * decay)
     near = w[NEAR * W]
     for i in range(1, W):
         near = min(near, w[NEAR * W + i])
@@ -95,86 +60,92 @@ def sense(arms, env, extra, table, o, w, dt):
 
 
 @leaf
-def join(arms, env, w):
+def join(arms, w):
     """End-effector acceleration from the shares of the arms."""
     W = len(arms)
-    return solve2(env[3] + total(M11, w, W), total(M12, w, W), env[3] + total(M22, w, W),
+    mass = w[of(MASS, 0, W, 1)]
+    return solve2(mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W),
                   total(FX, w, W), total(FY, w, W))
 
 
 @leaf
-def acceleration(arms, env, extra, w, x, y, vx, vy):
-    """End-effector acceleration under the torques PUSH."""
+def acceleration(arms, extra, w, x, y, vx, vy):
+    """End-effector acceleration under the torques C."""
     W = len(arms)
+    env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        arm = (w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[L2SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
-               w[MODE * W + i], w[S1 * W + i], w[S2 * W + i], w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i])
-        m11, m12, m22, fx, fy, bx, by, area2 = share(arm, env, extra, x, y, vx, vy)
-        c = w[PUSH * W + i]
+        place = geometry(w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
+                         w[MODE * W + i], x, y)
+        m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
+        if len(extra) > 0:
+            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
+            fx, fy = fx + gx, fy + gy
+        c = w[C * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
-        w[LOW * W + i] = min(w[LOW * W + i], area2)
-    return join(arms, env, w)
+        w[LOW * W + i] = min(w[LOW * W + i], place[6])
+    return join(arms, w)
 
 
 @leaf
-def step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, dt):
+def step(arms, extra, w, x, y, vx, vy, k1x, k1y, dt):
     """A Runge-Kutta step (order 4) after its first stage."""
     h = 0.5 * dt
     ux, uy = vx + h * k1x, vy + h * k1y
-    k2x, k2y = acceleration(arms, env, extra, w, x + h * vx, y + h * vy, ux, uy)
+    k2x, k2y = acceleration(arms, extra, w, x + h * vx, y + h * vy, ux, uy)
     wx, wy = vx + h * k2x, vy + h * k2y
-    k3x, k3y = acceleration(arms, env, extra, w, x + h * ux, y + h * uy, wx, wy)
+    k3x, k3y = acceleration(arms, extra, w, x + h * ux, y + h * uy, wx, wy)
     zx, zy = vx + dt * k3x, vy + dt * k3y
-    k4x, k4y = acceleration(arms, env, extra, w, x + dt * wx, y + dt * wy, zx, zy)
+    k4x, k4y = acceleration(arms, extra, w, x + dt * wx, y + dt * wy, zx, zy)
     s = dt / 6.0
     return (x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy),
             vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y))
 
 
 @outlined
-def count_steps(arms, env, w, kx, ky, dt):
+def count_steps(arms, w, kx, ky, dt):
     """Steps that friction asks of a hold; 0.0 where all drives move so fast that friction is constant in it."""
     W = len(arms)
-    m11, m12, m22 = env[3] + total(M11, w, W), total(M12, w, W), env[3] + total(M22, w, W)
+    mass, sharpness = w[of(MASS, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
+    m11, m12, m22 = mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W)
     stiff, fast, near = 0.0, 0.0, 0.0
     for i in range(W):
-        a, b, c = stiffness(w[FRICTION * W + i], env, m11, m12, m22, w[B1 * W + i], w[B2 * W + i], w[QD * W + i],
+        a, b, c = stiffness(w[FRICTION * W + i], sharpness, m11, m12, m22, w[B1 * W + i], w[B2 * W + i], w[QD * W + i],
                             w[ACC * W + i], kx, ky, dt)
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
     return max(1.0, math.ceil(max(stiff / STIFF, fast / FAST))) if near > 0.0 else 0.0
 
 
 @outlined
-def friction_hold(arms, env, extra, w, k1x, k1y, dt):
+def friction_hold(arms, extra, w, k1x, k1y, dt):
     """The state after as many steps as friction needs; zero where it needs too many."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    n = max(1.0, count_steps(arms, env, w, k1x, k1y, dt))
+    n = max(1.0, count_steps(arms, w, k1x, k1y, dt))
     w[of(STEPS, 0, W, 1)] = n
     h, most = dt / n, int(min(n, MOST_STEPS))
-    x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, h)
+    x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, h)
     for _ in range(1, most):
-        k1x, k1y = acceleration(arms, env, extra, w, x, y, vx, vy)
-        x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, h)
+        k1x, k1y = acceleration(arms, extra, w, x, y, vx, vy)
+        x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, h)
     return x, y, vx, vy
 
 
 @leaf
-def hold(arms, env, extra, w, dt):
+def hold(arms, extra, w, dt):
     """As `plant.hold`, without its judgement."""
     W = len(arms)
     for i in range(W):
         c = w[C * W + i]
-        w[PUSH * W + i] = c
         w[FX * W + i] += w[B1 * W + i] * c
         w[FY * W + i] += w[B2 * W + i] * c
-    k1x, k1y = join(arms, env, w)
+    k1x, k1y = join(arms, w)
     if len(extra) > 0:
-        x, y, vx, vy = friction_hold(arms, env, extra, w, k1x, k1y, dt)
+        x, y, vx, vy = friction_hold(arms, extra, w, k1x, k1y, dt)
     else:
         x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-        x, y, vx, vy = step(arms, env, extra, w, x, y, vx, vy, k1x, k1y, dt)
+        x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, dt)
     w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
 
 
@@ -186,24 +157,24 @@ def put(arms, w, x, y, vx, vy):
 
 
 @kernel
-def observe(arms, machine, table, x, y, vx, vy, w, q, qd):
+def observe(arms, extra, table, x, y, vx, vy, w, q, qd):
     """True base angles and rates (N,) for a controller in Python; `row` is the desired motion."""
     put(arms, w, x, y, vx, vy)
-    if sense(arms, machine.env, machine.extra, table, 0, w, 0.0) > 0:
+    if sense(arms, extra, table, 0, w, 0.0) > 0:
         mend(((),), arms, table, 0, w)
     for i in range(len(q)):
         q[i], qd[i] = w[Q * len(arms) + i], w[QD * len(arms) + i]
 
 
 @kernel
-def advance(arms, machine, table, x, y, vx, vy, w, c, dt):
-    """`hold` for a controller in Python: the state after the torques c (N,), and a number not positive for a lost arm."""
+def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
+    """`hold` for a controller in Python: the state after torques c (N,), and a number not positive for a lost arm."""
     W = len(arms)
     put(arms, w, x, y, vx, vy)
-    sense(arms, machine.env, machine.extra, table, 0, w, dt)
+    sense(arms, extra, table, 0, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
-    hold(arms, machine.env, machine.extra, w, dt)
+    hold(arms, extra, w, dt)
     low = w[LOW * W]
     for i in range(1, W):
         low = min(low, w[LOW * W + i])

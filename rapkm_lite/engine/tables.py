@@ -12,12 +12,11 @@ PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = ran
 NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
 MEASURED, TRUE = range(2)
 
-Machine = namedtuple("Machine", "env extra")
-Motion = namedtuple("Motion", "table dt")
+# Rows per sample of the fault table.
+JUMP, HELD, ALIVE, LIMITED = range(4)
+
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 Law = namedtuple("Law", "form filter pose same switched")
-Faults = namedtuple("Faults", "limit alive held jump")
-History = namedtuple("History", "states q_a qd_a c pairs")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
 (ANGLE, RATE, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, COS, SIN, ELBOW_COS, ELBOW_SIN) = range(9)

@@ -12,7 +12,7 @@ from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..engine import COMPILED, tables
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
 from .patience import patience
-from .setup import Outcome, Setup, blank
+from .setup import Outcome, Setup
 
 __all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Code", "Plant", "encode", "many", "single"]
 
@@ -99,9 +99,11 @@ def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
 
 def single(setup: Setup, code: Code) -> Outcome:
     """One run with its history."""
-    history = blank(len(setup.trajectory), setup.robot.n_arms)
-    w = _run(setup, [code], setup.sensors.offset[None], history)
-    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *history)
+    samples, N = len(setup.trajectory), setup.robot.n_arms
+    log = np.zeros((samples, 6 + 3 * N))
+    w = _run(setup, [code], setup.sensors.offset[None], log)
+    states, q_a, qd_a, c, pairs = np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1)
+    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), states, q_a, qd_a, c, pairs.astype(int))
 
 
 def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -144,8 +146,11 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     L, N, W = len(codes), robot.n_arms, _width(robot.n_arms, history is not None)
     work = np.zeros((rows.BLOCKS * W + rows.SINGLES) * L)
     blocks, runs = work[: rows.BLOCKS * W * L].reshape(-1, W, L), work[rows.BLOCKS * W * L :].reshape(-1, L)
-    for start, arms in ((0, robot), (rows.MODEL, model)):
-        blocks[start : start + rows.MODEL] = _made_for(arms, W, _arms)[..., None]
+    for i, arms in enumerate((robot, model)):
+        table, environment = _made_for(arms, W, _arms)
+        blocks[i * rows.MODEL : (i + 1) * rows.MODEL] = table[..., None]
+        start = rows.GRAVITY_X + i * rows.ENVIRONMENT
+        runs[start : start + rows.ENVIRONMENT] = environment[:, None]
     for name in codes[0].drives:
         blocks[getattr(rows, name), :N] = np.stack([code.drives[name] for code in codes], axis=-1)
     for name in codes[0].run:
@@ -155,19 +160,20 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     for row in (rows.X, rows.PX, rows.PX1, rows.PX2):
         runs[row : row + 2] = trajectory.x[0][:, None]
     runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
-    code, machine, sensors = codes[0], _made_for(robot, 0, _machine), setup.sensors
-    faults = _faults(setup.faults, W)
+    code, sizes = codes[0], tables.sizes
     law = tables.Law(code.form, code.filter, tables.TRUE if code.true_pose else tables.MEASURED,
                      model.same_kinematics(robot), code.switched)
-    w, sizes = _plain(work), tables.sizes
-    with patience("loop", L, N, len(machine.extra), setup.faults is None), np.errstate(all="ignore"):
+    kind = sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), _extra(robot), _extra(model)
+    w, log = _plain(work), _plain(np.empty(0) if history is None else history.reshape(-1))
+    with patience(*map(len, kind)), np.errstate(all="ignore"):
         try:
-            closed_loops(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), machine,
-                         _made_for(model, 0, _machine), _made_for(trajectory, W, _motion),
-                         _sensor(sensors, trajectory.dt), law, faults, w, tables.History(*(history or blank(0, N))))
+            closed_loops(*kind, _sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
+                         _made_for(trajectory, W, _motion), _faults(setup.faults, W), w, log)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
+    if history is not None:
+        history[:] = np.reshape(log, history.shape)
     work[:] = w
 
     def row(name: str) -> np.ndarray:
@@ -195,17 +201,17 @@ def _made_for(value, width: int, make):
     return made[make, width]
 
 
-def _arms(robot, width: int) -> np.ndarray:
-    return tables.arm_table(robot, width)
+def _arms(robot, width: int) -> tuple[np.ndarray, np.ndarray]:
+    return tables.arm_table(robot, width), tables.environment(robot)
 
 
-def _machine(robot, width: int) -> tables.Machine:
-    extra = tables.sizes(int(bool(robot.friction.any() or robot.gravity.any())))
-    return tables.Machine(_plain(tables.environment(robot)), extra)
+def _extra(robot) -> tuple:
+    """Has an entry when the machine has friction or gravity."""
+    return tables.sizes(int(bool(robot.friction.any() or robot.gravity.any())))
 
 
-def _motion(trajectory, width: int) -> tables.Motion:
-    return tables.Motion(_plain(tables.motion_table(trajectory, width).ravel()), trajectory.dt)
+def _motion(trajectory, width: int):
+    return _plain(tables.motion_table(trajectory, width).ravel())
 
 
 def _sensor(sensors, dt: float) -> tables.Sensor:
@@ -213,14 +219,13 @@ def _sensor(sensors, dt: float) -> tables.Sensor:
     return tables.Sensor(count is not None, count or 1.0, tau is not None, dt / ((tau or 0.0) + dt))
 
 
-def _faults(faults, width: int) -> tables.Faults:
-    """The fault table with a column for every arm of the work table."""
+def _faults(faults, width: int):
+    """The fault table with a column for every arm of the work table, flat."""
     if faults is None:
-        empty = np.empty((0, 0))
-        return tables.Faults(empty[0:0].ravel(), empty, empty, empty)
+        return _plain(np.empty(0))
     arms = np.minimum(np.arange(width), len(faults.limit) - 1)
-    return tables.Faults(*(_plain(np.ascontiguousarray(v[..., arms], dtype=float))
-                           for v in (faults.limit, faults.alive, faults.held, faults.jump)))
+    limit = np.broadcast_to(faults.limit, faults.jump.shape)
+    return _plain(np.stack([v[:, arms] for v in (faults.jump, faults.held, faults.alive, limit)], axis=1).ravel())
 
 
 class Plant:
@@ -233,27 +238,29 @@ class Plant:
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
         W = _width(robot.n_arms, True)
         work = np.zeros(rows.BLOCKS * W + rows.SINGLES)
-        work[: rows.MODEL * W] = tables.arm_table(robot, W).ravel()
+        table, environment = _made_for(robot, W, _arms)
+        work[: rows.MODEL * W] = table.ravel()
+        start = rows.BLOCKS * W + rows.GRAVITY_X
+        work[start : start + rows.ENVIRONMENT] = environment
         self._w, self._arms = _plain(work), tables.sizes(W)
-        self._machine, self._motion = _made_for(robot, 0, _machine), _made_for(trajectory, W, _motion)
-        table = self._motion.table
+        self._extra, table = _extra(robot), _made_for(trajectory, W, _motion)
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         start = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
-        with patience("plant", W, len(self._machine.extra)):
+        with patience("plant", W, len(self._extra)):
             self.observe(0, start)
             self.hold(start, np.zeros(robot.n_arms), self._dt)
 
     def observe(self, k: int, state) -> tuple[np.ndarray, np.ndarray]:
         """True base angles and rates (N,) at sample k."""
         q, qd = np.empty(self._N), np.empty(self._N)
-        self._observe(self._arms, self._machine, self._table[k], *state, self._w, q, qd)
+        self._observe(self._arms, self._extra, self._table[k], *state, self._w, q, qd)
         return q, qd
 
     def hold(self, state, c: np.ndarray, dt: float):
         """The state after the torques c (N,) were held for dt; None when the machine has left the workspace."""
         try:
-            *state, low = self._advance(self._arms, self._machine, self._table[0], *state, self._w, c, dt)
+            *state, low = self._advance(self._arms, self._extra, self._table[0], *state, self._w, c, dt)
         except (ArithmeticError, ValueError):
             return None
         x, y, vx, vy = state
