@@ -53,24 +53,21 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
 @leaf
 def proportional(lanes, arms, w):
     """PD (12)."""
-    L, W = len(lanes), len(arms)
-    for i in range(W):
-        for j in range(L):
-            w[at(C, i, j, W, L)] = -(w[at(GAIN_P, i, j, W, L)] * w[at(E, i, j, W, L)]
-                                     + w[at(GAIN_D, i, j, W, L)] * w[at(ED, i, j, W, L)])
+    P = len(arms) * len(lanes)
+    for p in range(P):
+        w[C * P + p] = -(w[GAIN_P * P + p] * w[E * P + p] + w[GAIN_D * P + p] * w[ED * P + p])
 
 
 @outlined
 def integral(lanes, arms, w, dt):
     """PD with an integral that stands still while its drive is at the limit."""
-    L, W = len(lanes), len(arms)
-    for i in range(W):
-        for j in range(L):
-            e, ed, memory = w[at(E, i, j, W, L)], w[at(ED, i, j, W, L)], w[at(MEMORY, i, j, W, L)]
-            grown, limit = memory + w[at(GAIN_I, i, j, W, L)] * dt * e, w[at(LIMIT, i, j, W, L)]
-            c = -(w[at(GAIN_P, i, j, W, L)] * e + w[at(GAIN_D, i, j, W, L)] * ed + grown)
-            held = min(max(c, -limit), limit)
-            w[at(C, i, j, W, L)], w[at(MEMORY, i, j, W, L)] = held, grown if held == c else memory
+    P = len(arms) * len(lanes)
+    for p in range(P):
+        e, ed, limit = w[E * P + p], w[ED * P + p], w[LIMIT * P + p]
+        grown = w[MEMORY * P + p] + w[GAIN_I * P + p] * dt * e
+        c = -(w[GAIN_P * P + p] * e + w[GAIN_D * P + p] * ed + grown)
+        held = min(max(c, -limit), limit)
+        w[C * P + p], w[MEMORY * P + p] = held, grown if held == c else w[MEMORY * P + p]
 
 
 @outlined
@@ -153,14 +150,13 @@ def add_up(lanes, drives, arms, w):
 
 
 @leaf
-def add_work(lanes, drives, arms, w):
+def add_work(lanes, arms, w):
     """Work of the hold that ends at this sample."""
-    L, W = len(lanes), len(arms)
-    for i in range(len(drives)):
-        for j in range(L):
-            angle = w[at(Q, i, j, W, L)]
-            w[at(WORK, i, j, W, L)] += w[at(C, i, j, W, L)] * (angle - w[at(OLD, i, j, W, L)])
-            w[at(OLD, i, j, W, L)] = angle
+    P = len(arms) * len(lanes)
+    for p in range(P):
+        angle = w[Q * P + p]
+        w[WORK * P + p] += w[C * P + p] * (angle - w[OLD * P + p])
+        w[OLD * P + p] = angle
 
 
 @kernel
@@ -179,7 +175,7 @@ def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, d
         # Sense: the machine as it is, and what the hold will start from.
         if L > 1:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
-            add_work(lanes, drives, arms, w)
+            add_work(lanes, arms, w)
         else:
             far = single.sense(arms, extra, table, o, w, dt)
         if far > 0:
@@ -218,7 +214,8 @@ def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, d
             add_up(lanes, drives, arms, w)
         else:
             record(drives, arms, history, w, k)
-        if lost(lanes, drives, arms, w, k) or k + 1 == samples:
+        if k + 1 == samples:
+            last_torque(drives, arms, w, k)
             return
 
         # Hold.
@@ -230,17 +227,13 @@ def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, d
             return
 
 
-@leaf
-def lost(lanes, drives, arms, w, k):
-    """Mark runs whose torques are not finite; true when all have ended."""
-    L, W = len(lanes), len(arms)
-    ended = 0
-    for j in range(L):
-        size = 0.0
-        for i in range(len(drives)):
-            size += abs(w[at(C, i, j, W, L)])
-        running = w[of(STATUS, j, W, L)] == DONE
-        w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
-        w[of(STATUS, j, W, L)] = SINGULAR if running and not size < 1e300 else w[of(STATUS, j, W, L)]
-        ended += w[of(STATUS, j, W, L)] != DONE
-    return ended == L
+@outlined
+def last_torque(drives, arms, w, k):
+    """Mark a single run whose last torques, which nothing follows, are not finite."""
+    W = len(arms)
+    size = 0.0
+    for i in range(len(drives)):
+        size += abs(w[C * W + i])
+    running = w[of(STATUS, 0, W, 1)] == DONE
+    w[of(SAMPLE, 0, W, 1)] = k if running else w[of(SAMPLE, 0, W, 1)]
+    w[of(STATUS, 0, W, 1)] = SINGULAR if running and not size < 1e300 else w[of(STATUS, 0, W, 1)]

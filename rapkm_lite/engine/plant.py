@@ -40,7 +40,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
             ax, ay = place[0], place[1]
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             s, t = (ux * ay - uy * ax) * w[at(SCALE, i, j, W, L)], ux * ax + uy * ay
-            near = min(0.1 - abs(s), t)
+            w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             angle = small_angle(s)
             w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
             w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
@@ -52,7 +52,8 @@ def sense(lanes, arms, extra, table, o, w, dt):
             # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector
             # coordinates a Runge-Kutta step could jump over that instant.
             w[at(LOW, i, j, W, L)] = min(place[6], 1.0 - dt * decay)
-            count += 1 if near < 0.0 else 0
+    for p in range(W * L):
+        count += 1 if w[NEAR * W * L + p] < 0.0 else 0
     return count
 
 
@@ -185,11 +186,10 @@ def step(lanes, arms, extra, w):
 def hold(lanes, arms, extra, w, dt):
     """Hold the torques C for dt."""
     L, W = len(lanes), len(arms)
-    for i in range(W):
-        for j in range(L):
-            c = w[at(C, i, j, W, L)]
-            w[at(FX, i, j, W, L)] += w[at(B1, i, j, W, L)] * c
-            w[at(FY, i, j, W, L)] += w[at(B2, i, j, W, L)] * c
+    P = W * L
+    for p in range(P):
+        w[FX * P + p] += w[B1 * P + p] * w[C * P + p]
+        w[FY * P + p] += w[B2 * P + p] * w[C * P + p]
     join(lanes, arms, w)
     most = 1.0
     for j in range(L):
@@ -210,18 +210,19 @@ def hold(lanes, arms, extra, w, dt):
 
 @leaf
 def judge(lanes, arms, w, k):
-    """Mark the runs that were lost in the hold after sample k; returns how many runs have ended."""
+    """Mark the runs lost in the hold after sample k, or before it by their law; returns how many have ended."""
     L, W = len(lanes), len(arms)
     ended = 0
     for j in range(L):
-        low = 1e300
-        for i in range(W):
-            low = min(low, w[at(LOW, i, j, W, L)])
+        low, torque = w[at(LOW, 0, j, W, L)], abs(w[at(C, 0, j, W, L)])
+        for i in range(1, W):
+            low, torque = min(low, w[at(LOW, i, j, W, L)]), torque + abs(w[at(C, i, j, W, L)])
         size = (abs(w[of(X, j, W, L)]) + abs(w[of(Y, j, W, L)])) + (abs(w[of(VX, j, W, L)]) + abs(w[of(VY, j, W, L)]))
         status = DONE if low > 0.0 and size < 1e300 else LEFT_WORKSPACE
+        status = status if torque < 1e300 else SINGULAR
         status = status if w[of(STEPS, j, W, L)] <= MOST_STEPS else TOO_STIFF
         running = w[of(STATUS, j, W, L)] == DONE
         w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
         w[of(STATUS, j, W, L)] = status if running else w[of(STATUS, j, W, L)]
-        ended += w[of(STATUS, j, W, L)] != DONE
+        ended += 1 if w[of(STATUS, j, W, L)] != DONE else 0
     return ended

@@ -19,7 +19,8 @@ Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 Law = namedtuple("Law", "form filter pose same switched")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
-(ANGLE, RATE, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, COS, SIN, ELBOW_COS, ELBOW_SIN) = range(9)
+# What decentralized laws need comes first.
+ANGLE, RATE, COS, SIN, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN = range(9)
 
 
 def arm_table(robot, width: int) -> np.ndarray:
@@ -55,8 +56,8 @@ def motion_table(trajectory, width: int) -> np.ndarray:
     """Desired motion per sample, (k, 6 + 9 width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
     q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
-    blocks = [q[:, :N], qd[:, :N], qdd[:, :N], qd[:, N:], qdd[:, N:],
-              np.cos(q[:, :N]), np.sin(q[:, :N]), np.cos(q[:, N:]), np.sin(q[:, N:])]
+    blocks = [q[:, :N], qd[:, :N], np.cos(q[:, :N]), np.sin(q[:, :N]),
+              qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(q[:, N:]), np.sin(q[:, N:])]
     arms = _filled(N, width)
     return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks)])
 

@@ -144,7 +144,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 
     robot, model, trajectory = setup.robot, setup.model, setup.trajectory
     L, N, W = len(codes), robot.n_arms, _width(robot.n_arms, history is not None)
-    work = np.zeros((rows.BLOCKS * W + rows.SINGLES) * L)
+    work = _aligned((rows.BLOCKS * W + rows.SINGLES) * L)
     blocks, runs = work[: rows.BLOCKS * W * L].reshape(-1, W, L), work[rows.BLOCKS * W * L :].reshape(-1, L)
     for i, arms in enumerate((robot, model)):
         table, environment = _made_for(arms, W, _arms)
@@ -186,6 +186,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 def _width(N: int, alone: bool) -> int:
     """Arms in a row of the work table: in a single compiled run filled up to vector registers of four."""
     return -(-N // 4) * 4 if alone and COMPILED else N
+
+
+def _aligned(size: int) -> np.ndarray:
+    """Zeros that start at a multiple of 64 bytes: vector registers load them twice as fast."""
+    room = np.zeros(size + 8)
+    start = -room.ctypes.data // 8 % 8
+    return room[start : start + size]
 
 
 def _plain(array: np.ndarray):
@@ -237,7 +244,7 @@ class Plant:
 
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
         W = _width(robot.n_arms, True)
-        work = np.zeros(rows.BLOCKS * W + rows.SINGLES)
+        work = _aligned(rows.BLOCKS * W + rows.SINGLES)
         table, environment = _made_for(robot, W, _arms)
         work[: rows.MODEL * W] = table.ravel()
         start = rows.BLOCKS * W + rows.GRAVITY_X
