@@ -160,11 +160,11 @@ def add_work(lanes, arms, w):
 
 
 @kernel
-def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, dt, table, faults, w, history):
+def closed_loops(lanes, drives, arms, faulty, extra, modelled, sensor, law, dt, table, faults, w, history):
     """Sampled runs side by side, whatever their law: a single run with its history, a study with sums in w.
 
     The sizes of the first tuples tell the compiler what there is: runs, drives, arms of a row, faults, friction or
-    gravity of the machine and of the model.
+    gravity of the machine and of the model; modelled is None for decentralized laws, whose kernel then lacks the rest.
     """
     L, columns = len(lanes), 6 + 9 * len(arms)
     samples = len(table) // columns
@@ -200,8 +200,8 @@ def closed_loops(lanes, drives, arms, faulty, extra, model_extra, sensor, law, d
             proportional(lanes, arms, w)
         elif law.form == PID:
             integral(lanes, arms, w, dt)
-        else:
-            computed_torque(lanes, drives, arms, model_extra, law, table, o, w)
+        elif modelled is not None:
+            computed_torque(lanes, drives, arms, modelled, law, table, o, w)
         if law.filter == FORCE_FILTER:
             force_filter(lanes, drives, arms, w)
         elif law.filter == COMMAND_FILTER:

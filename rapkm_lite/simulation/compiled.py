@@ -163,9 +163,10 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     code, sizes = codes[0], tables.sizes
     law = tables.Law(code.form, code.filter, tables.TRUE if code.true_pose else tables.MEASURED,
                      model.same_kinematics(robot), code.switched)
-    kind = sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), _extra(robot), _extra(model)
+    kind = (sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), _extra(robot),
+            _extra(model) if code.form > tables.PID else None)
     w, log = _plain(work), _plain(np.empty(0) if history is None else history.reshape(-1))
-    with patience(*map(len, kind)), np.errstate(all="ignore"):
+    with patience(*map(str, kind)), np.errstate(all="ignore"):
         try:
             closed_loops(*kind, _sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
                          _made_for(trajectory, W, _motion), _faults(setup.faults, W), w, log)
