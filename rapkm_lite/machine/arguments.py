@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+_FLOAT = np.dtype(float)
+
 
 class ConvergenceError(RuntimeError, ValueError):
     """An iteration found no solution; the message carries the residual and the pose it stopped at."""
@@ -15,6 +17,21 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN or infinity, or
     has other trailing axes.
     """
+    if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last:
+        array = value
+    else:
+        array = _converted(name, value, last)
+    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears most arrays.
+    if not np.vdot(array, array) < 1e200:
+        fine = np.abs(array) < 1e100
+        if not np.all(fine):
+            bad = np.argwhere(~fine)[0]
+            number = array[tuple(bad)]
+            raise ValueError(f"{name}{_at(bad)} = {number}; allowed: finite numbers, below 1e100 in magnitude")
+    return array
+
+
+def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value)
         # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
@@ -26,11 +43,6 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     if last and array.shape[-len(last) :] != last:
         want = "(" + ", ".join(["...", *map(str, last)]) + ")"
         raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
-    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.
-    fine = np.abs(array) < 1e100
-    if not np.all(fine):
-        bad = np.argwhere(~fine)[0]
-        raise ValueError(f"{name}{_at(bad)} = {array[tuple(bad)]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
 
@@ -52,6 +64,8 @@ def joint_vectors(size: int, **vectors) -> list[np.ndarray]:
 
 def check_leading(**leads: tuple[int, ...]) -> tuple[int, ...]:
     """Broadcast leading axes, given by argument name; raises ValueError when they do not fit together."""
+    if len(set(leads.values())) == 1:
+        return next(iter(leads.values()))
     try:
         return np.broadcast_shapes(*leads.values())
     except ValueError:
@@ -148,7 +162,7 @@ def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Product of (..., i, j) and (..., j)."""
-    return np.einsum("...ij,...j->...i", matrix, vector)
+    return matrix.dot(vector) if vector.ndim == 1 else np.einsum("...ij,...j->...i", matrix, vector)
 
 
 def transpose(matrix: np.ndarray) -> np.ndarray:

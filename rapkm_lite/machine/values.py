@@ -46,7 +46,8 @@ def _is_frozen(array: np.ndarray) -> bool:
     root = array
     while isinstance(root, np.ndarray):
         root = root.base
-    return isinstance(root, bytes) and array.flags.c_contiguous
+    # NumPy leaves a large unpickled array writable, in spite of the bytes below it.
+    return isinstance(root, bytes) and array.flags.c_contiguous and not array.flags.writeable
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

@@ -11,7 +11,6 @@ from ..machine.arguments import (
     positive_number,
     real_array,
     solve,
-    transpose,
     whole_number,
 )
 from ..machine.manipulator import Manipulator
@@ -41,19 +40,19 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     scale, tolerance = robot.lengths.max(), positive_number("tolerance", tolerance)
     for _ in range(whole_number("iterations", iterations, 1)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
-        Q, R = np.linalg.qr(transpose(J), mode="complete")
+        Q, R = np.linalg.qr(J.mT, mode="complete")
         if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
             break
         range_, tangent = Q[..., :r], Q[..., r:]
-        back = -matvec(range_, np.linalg.solve(transpose(R[..., :r, :]), h[..., None])[..., 0])
+        back = -matvec(range_, np.linalg.solve(R[..., :r, :].mT, h[..., None])[..., 0])
         gradient = q - q0
-        multiplier = -np.linalg.solve(R[..., :r, :], matvec(transpose(range_), gradient)[..., None])[..., 0]
+        multiplier = -np.linalg.solve(R[..., :r, :], matvec(range_.mT, gradient)[..., None])[..., 0]
         hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
-        reduced = transpose(tangent) @ hessian @ tangent
+        reduced = tangent.mT @ hessian @ tangent
         convex = np.linalg.eigvalsh(reduced)[..., 0] > 0.1
         reduced = np.where(convex[..., None, None], reduced, np.eye(2))
-        remainder = matvec(transpose(tangent), gradient)
-        rhs = remainder + np.where(convex[..., None], matvec(transpose(tangent), matvec(hessian, back)), 0.0)
+        remainder = matvec(tangent.mT, gradient)
+        rhs = remainder + np.where(convex[..., None], matvec(tangent.mT, matvec(hessian, back)), 0.0)
         if max(np.abs(h).max(initial=0.0) / scale, np.abs(remainder).max(initial=0.0)) < tolerance:
             return q
         step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
@@ -100,8 +99,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         q = inverse_kinematics(robot, x)
         A = ee_complement(robot, q)[..., : robot.n_arms, :]
         residual = wrap(q_a - q[..., : robot.n_arms])
-        gradient = matvec(transpose(A), residual)
-        step = solve("A^T A (an input singularity)", transpose(A) @ A, gradient[..., None])[..., 0]
+        gradient = matvec(A.mT, residual)
+        step = solve("A^T A (an input singularity)", A.mT @ A, gradient[..., None])[..., 0]
         if np.abs(step).max(initial=0.0) < limit:
             return q
         x = x + step

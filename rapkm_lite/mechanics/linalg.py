@@ -1,0 +1,57 @@
+"""Linear algebra for one small matrix or many: NumPy's wrappers cost more than the arithmetic of a single one."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+
+def product(first: np.ndarray, *others: np.ndarray) -> np.ndarray:
+    """Matrix product first @ ..., with ``ndarray.dot`` where it means the same, at a third of the cost."""
+    for matrix in others:
+        first = first.dot(matrix) if first.ndim <= 2 and matrix.ndim <= 2 else first @ matrix
+    return first
+
+
+@functools.cache
+def _lapack():
+    from scipy.linalg import lapack  # only when needed: importing the package stays light
+
+    return lapack.dgeqrf, lapack.dorgqr, lapack.dtrtrs
+
+
+def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Q (..., m, k), or (..., m, m) when `complete`, and the upper triangle R (..., k, k) of M = Q[..., :k] R.
+
+    What stands below the diagonal of R has no meaning.
+    """
+    m, k = M.shape[-2:]
+    if M.ndim > 2:
+        Q, R = np.linalg.qr(M, mode="complete" if complete else "reduced")
+        return Q, R[..., :k, :]
+    factor, generate, _ = _lapack()
+    packed, scales, _, _ = factor(M)
+    if complete:
+        start = np.empty((m, m), order="F")
+        start[:, :k] = packed
+        return generate(start, scales, overwrite_a=1)[0], packed[:k]
+    return generate(packed, scales)[0], packed[:k]
+
+
+def triangular(R: np.ndarray, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+    """Solution X of R X = right, or R^T X = right, for the R of `orthogonal`."""
+    if R.ndim == 2 and right.ndim == 2:
+        return _lapack()[2](R, right, trans=int(transposed))[0]
+    R = np.triu(R)
+    return np.linalg.solve(R.mT if transposed else R, right)
+
+
+def pivots(R: np.ndarray) -> tuple[float, float]:
+    """Smallest pivot |R_ii|, and smallest relative to the largest one of its matrix, over all leading axes."""
+    if R.ndim == 2:
+        size = [abs(pivot) for pivot in R.diagonal().tolist()]
+        return min(size), min(size) / max(max(size), 1e-300)
+    size = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
+    relative = size.min(axis=-1) / np.maximum(size.max(axis=-1), 1e-300)
+    return float(size.min(initial=np.inf)), float(relative.min(initial=np.inf))
