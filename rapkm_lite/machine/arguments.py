@@ -21,8 +21,9 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
         array = value
     else:
         array = _converted(name, value, last)
-    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears most arrays.
-    if not np.vdot(array, array) < 1e200:
+    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
+    # for a large one it would wake the threads of the linear algebra library.
+    if array.size > 1000 or not np.vdot(array, array) < 1e200:
         fine = np.abs(array) < 1e100
         if not np.all(fine):
             bad = np.argwhere(~fine)[0]
@@ -162,7 +163,9 @@ def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Product of (..., i, j) and (..., j)."""
-    return matrix.dot(vector) if vector.ndim == 1 else np.einsum("...ij,...j->...i", matrix, vector)
+    if vector.ndim == 1:
+        return matrix.dot(vector) if matrix.ndim == 2 else matrix @ vector
+    return np.einsum("...ij,...j->...i", matrix, vector)
 
 
 def transpose(matrix: np.ndarray) -> np.ndarray:

@@ -12,14 +12,14 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import orthogonal, pivots, product, triangular
+from .linalg import linear, orthogonal, pivots, product, triangular
 
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:
     """v: a_i = l1 (cos, sin)(base angle), d_i = l2 (cos, sin)(base + elbow angle)."""
-    angle = product(q, tree.absolute)
+    angle = linear(q, tree.absolute)
     v = np.empty((*q.shape[:-1], 2 * tree.n))
     np.cos(angle, out=v[..., : tree.n])
     np.sin(angle, out=v[..., tree.n :])
@@ -29,7 +29,7 @@ def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:
 
 def link_rates(tree: Tree, qd: np.ndarray) -> np.ndarray:
     """Rate of turn of every link against the x axis, once for each entry of v, (..., 4N)."""
-    return product(qd, tree.absolute, tree.spread_links)
+    return linear(linear(qd, tree.absolute), tree.spread_links)
 
 
 def _matrix(flat: np.ndarray, *shape: int) -> np.ndarray:
@@ -38,17 +38,17 @@ def _matrix(flat: np.ndarray, *shape: int) -> np.ndarray:
 
 def tip_columns(tree: Tree, v: np.ndarray) -> np.ndarray:
     """d tip_i / d joint, (..., 2, 2N): E (a_i + d_i) for the base joints, E d_i for the elbows."""
-    return _matrix(product(v, tree.tips), 2, tree.n)
+    return _matrix(linear(v, tree.tips), 2, tree.n)
 
 
 def constraint_jacobian(tree: Tree, v: np.ndarray) -> np.ndarray:
     """J, (..., r, 2N): the columns of the cut arms minus those of arm 2."""
-    return _matrix(product(v, tree.jacobian), tree.r, tree.n)
+    return _matrix(linear(v, tree.jacobian), tree.r, tree.n)
 
 
 def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """dJ/dt, (..., r, 2N): a link vector that turns at the rate w changes by w E v, and E E = -1."""
-    return _matrix(product(v * rates, tree.jacobian_dot), tree.r, tree.n)
+    return _matrix(linear(v * rates, tree.jacobian_dot), tree.r, tree.n)
 
 
 def levers(tree: Tree, v: np.ndarray) -> np.ndarray:
@@ -67,7 +67,7 @@ def inner_levers(tree: Tree, v: np.ndarray) -> np.ndarray:
             f"q puts arm {arm + 1} on the boundary of the workspace (sin(elbow angle) < 1e-12), where the end-effector "
             "position is no coordinate; allowed: poses inside, or independent joints instead of the end-effector"
         )
-    return product(lever, tree.spread_arms)
+    return linear(lever, tree.spread_arms)
 
 
 def complement(tree: Tree, over: np.ndarray) -> np.ndarray:
@@ -75,15 +75,15 @@ def complement(tree: Tree, over: np.ndarray) -> np.ndarray:
 
     The base joint of an arm turns at d . xd / (a x d), its distal link at -a . xd / (a x d).
     """
-    return _matrix(product(over, tree.complement), tree.n, 2)
+    return _matrix(linear(over, tree.complement), tree.n, 2)
 
 
 def over_lever_dot(tree: Tree, v, lever, over, rates, qd) -> np.ndarray:
     """d(v / lever)/dt = (E v w - (v / lever) d(lever)/dt) / lever, with d(a x d)/dt = (a . d) times the elbow rate."""
     N, n = tree.N, tree.n
     along = v[..., :N] * v[..., N:n] + v[..., n : n + N] * v[..., n + N :]
-    lever_dot = product(along * qd[..., N:], tree.spread_arms)
-    return (product(v, tree.turn) * rates - over * lever_dot) / lever
+    lever_dot = linear(along * qd[..., N:], tree.spread_arms)
+    return (linear(v, tree.turn) * rates - over * lever_dot) / lever
 
 
 def joint_complement(J: np.ndarray, independent) -> np.ndarray:
@@ -117,25 +117,25 @@ def _others(n: int, indices) -> list[int]:
 
 def mass_matrix(tree: Tree, q: np.ndarray) -> np.ndarray:
     """G of (2), (..., 2N, 2N); the cosine of an elbow angle couples the two joints of its arm."""
-    return _matrix(tree.inertia + product(np.cos(q), tree.coupling), tree.n, tree.n)
+    return _matrix(tree.inertia + linear(np.cos(q), tree.coupling), tree.n, tree.n)
 
 
 def coriolis_matrix(tree: Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """C of (2) from the Christoffel symbols, (..., 2N, 2N)."""
-    return _matrix(product(np.sin(q).take(tree.elbow, axis=-1) * qd, tree.christoffel), tree.n, tree.n)
+    return _matrix(linear(np.sin(q).take(tree.elbow, axis=-1) * qd, tree.christoffel), tree.n, tree.n)
 
 
 def generalized_forces(tree: Tree, v: np.ndarray, qd: np.ndarray, v0: float) -> np.ndarray:
     """Q of (2), (..., 2N): gravity on the links, and friction f_c tanh(qd / v0) in the base joints."""
-    return product(v, tree.weight) + tree.friction * np.tanh(qd / v0)
+    return linear(v, tree.weight) + tree.friction * np.tanh(qd / v0)
 
 
 def row_space(tree: Tree, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Complete Q and R of J^T = Q R; the last two columns of Q are a basis T of the tangent space of V.
+    """Q1 (..., 2N, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
 
     Raises ValueError where J lacks full rank.
     """
-    Q, R = orthogonal(J.mT, complete=True)
+    Q, R = orthogonal(J.mT, complete=J.ndim == 2)
     size = pivots(R)[0] / tree.longest
     if size < 1e-12:
         raise ValueError(
@@ -145,15 +145,23 @@ def row_space(tree: Tree, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return Q, R
 
 
+def tangent(Q: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """Orthonormal basis T of the tangent space of V, (..., 2N, 2), from `row_space`."""
+    if J.ndim > 2:
+        Q, _ = orthogonal(J.mT, complete=True)
+    return Q[..., -2:]
+
+
 def projector(Q: np.ndarray) -> np.ndarray:
-    """N_J = T T^T, from `row_space`, (..., 2N, 2N)."""
-    T = Q[..., -2:]
-    return product(T, T.mT)
+    """N_J = T T^T = I - Q1 Q1^T, from `row_space`, (..., 2N, 2N)."""
+    if Q.ndim == 2:
+        return product(Q[:, -2:], Q[:, -2:].T)
+    return np.eye(Q.shape[-2]) - Q @ Q.mT
 
 
 def projector_dot(Q, R, J_dot, N) -> np.ndarray:
     """-(J^+ Jdot N_J) - (J^+ Jdot N_J)^T with J^+ = Q1 R^-T, (..., 2N, 2N)."""
-    half = product(Q[..., :-2], triangular(R, product(J_dot, N), transposed=True))
+    half = product(Q[..., : R.shape[-1]], triangular(R, product(J_dot, N), transposed=True))
     return -half - half.mT
 
 
@@ -200,8 +208,8 @@ def _pairs(m: int) -> tuple[np.ndarray, np.ndarray]:
 def singular_values(A: np.ndarray) -> np.ndarray:
     """Both singular values of (..., m, 2), largest first; by Lagrange the minors give their product."""
     u, v = A[..., 0], A[..., 1]
-    uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
-    area = np.sqrt((minors(A) ** 2).sum(-1))
+    X = minors(A)
+    uu, vv, uv, area = np.vecdot(u, u), np.vecdot(v, v), np.vecdot(u, v), np.sqrt(np.vecdot(X, X))
     sigma = np.empty((*area.shape, 2))
     sigma[..., 0] = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
     sigma[..., 1] = area / np.maximum(sigma[..., 0], 1e-300)
@@ -223,13 +231,12 @@ def prestress_shares(A: np.ndarray) -> np.ndarray:
     return np.sqrt(np.divide(part, whole, out=np.full_like(part, np.inf), where=regular))
 
 
-def redundant_right_inverse(Q: np.ndarray, m: int) -> np.ndarray:
-    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of T: A~^T = T T_a^T, (..., m, 2N).
+def redundant_right_inverse(T: np.ndarray, m: int) -> np.ndarray:
+    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of `tangent`: A~^T = T T_a^T, (..., m, 2N).
 
     T_a has two columns, so its minors X_ij = t_i x t_j say it all: det(T_a^T T_a) is the sum of their squares over
     i < j, without cancellation, and (T_a^T)^+ = X E T_a over it.
     """
-    T = Q[..., -2:]
     driven = T[..., :m, :]
     turned = product(driven, _QUARTER)
     X = product(driven, turned.mT)

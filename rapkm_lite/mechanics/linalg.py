@@ -14,6 +14,20 @@ def product(first: np.ndarray, *others: np.ndarray) -> np.ndarray:
     return first
 
 
+def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """vector (..., i) times a constant table (i, j).
+
+    Many vectors go in blocks, each too small for OpenBLAS to wake its threads, which would cost more than they save.
+    """
+    if vector.ndim == 1:
+        return vector.dot(table)
+    rows = vector.reshape(-1, len(table))
+    result, block = np.empty((len(rows), table.shape[1])), 512
+    for k in range(0, len(rows), block):
+        np.dot(rows[k : k + block], table, out=result[k : k + block])
+    return result.reshape(*vector.shape[:-1], table.shape[1])
+
+
 @functools.cache
 def _lapack():
     from scipy.linalg import lapack  # only when needed: importing the package stays light
@@ -43,7 +57,8 @@ def triangular(R: np.ndarray, right: np.ndarray, transposed: bool = False) -> np
     """Solution X of R X = right, or R^T X = right, for the R of `orthogonal`."""
     if R.ndim == 2 and right.ndim == 2:
         return _lapack()[2](R, right, trans=int(transposed))[0]
-    R = np.triu(R)
+    if R.ndim == 2:
+        R = np.triu(R)
     return np.linalg.solve(R.mT if transposed else R, right)
 
 

@@ -23,37 +23,44 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     Raises ValueError where A~_1 has lost rank.
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
-    order = _order(rows, A_tilde)
-    A1, A2 = _rows(A_tilde, order[..., :2]), _rows(A_tilde, order[..., 2:])
+    first, others, back = _partition(rows, A_tilde)
+    A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
     A1T_pinv = cores.right_inverse("A~_1 of this partition", A1.mT).mT
     B = product(A1T_pinv, A2.mT)
     bottom = _solve_small(B, product(B.mT, A1T_pinv))
-    top = product(A1T_pinv, np.eye(A_tilde.shape[-1]) - product(A2.mT, bottom))
-    return _rows(np.concatenate([top, bottom], axis=-2), np.argsort(order, axis=-1))
+    top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
+    return _rows(np.concatenate([top, bottom], axis=-2), back)
 
 
 def _solve_small(B: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(I + B^T B)^-1 right."""
     if B.shape[-1] == 1:
-        return right / (1.0 + (B * B).sum(axis=-2)[..., None])
+        return right / (1.0 + np.vecdot(B, B, axis=-2)[..., None])
     return np.linalg.solve(np.eye(B.shape[-1]) + product(B.mT, B), right)
 
 
 def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
     if index.ndim == 1:
-        return matrix[..., index, :]
+        return matrix.take(index, axis=-2)
     return np.take_along_axis(matrix, index[..., None], axis=-2)
 
 
-def _order(rows, A_tilde: np.ndarray) -> np.ndarray:
-    """The row indices of A~_1, then those of A~_2, (m,) or (..., m)."""
+def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row indices of A~_1, (2,) or (..., 2), of A~_2, and where each row of A~ stands in these."""
     m = A_tilde.shape[-2]
     if np.ndim(rows) < 2:
-        first = joint_indices("rows", rows, m)
-        return np.array([*first, *(i for i in range(m) if i not in first)])
+        rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+        return _fixed_partition(joint_indices("rows", rows, m), m)
     rows = _row_choice(rows, A_tilde)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
-    return np.concatenate([rows, np.argsort(taken, axis=-1, kind="stable")[..., : m - 2]], axis=-1)
+    others = np.argsort(taken, axis=-1, kind="stable")[..., : m - 2]
+    return rows, others, np.argsort(np.concatenate([rows, others], axis=-1), axis=-1)
+
+
+@functools.cache
+def _fixed_partition(first: tuple[int, int], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    others = [i for i in range(m) if i not in first]
+    return np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
 
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
