@@ -125,7 +125,7 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
         raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:
         return np.diag(bounded(name, array, 0.0, strict=True))
-    skew = np.abs(array - transpose(array)).max(initial=0.0)
+    skew = np.abs(array - array.mT).max(initial=0.0)
     if skew > 1e-12 * np.abs(array).max(initial=0.0):
         raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
     smallest = np.linalg.eigvalsh(array).min(initial=np.inf)
@@ -170,7 +170,7 @@ def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def transpose(matrix: np.ndarray) -> np.ndarray:
     """Transpose of the last two axes."""
-    return np.swapaxes(matrix, -1, -2)
+    return matrix.mT
 
 
 def _at(index) -> str:
