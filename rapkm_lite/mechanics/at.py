@@ -25,10 +25,12 @@ class quantity:
             return self
         if self.needs_rates and pose.qd is None:
             raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
-        value = self.function(pose)
-        for array in value if type(value) is tuple else (value,):
-            array.setflags(write=False)
-        pose.__dict__[self.name] = value
+        value = pose.__dict__[self.name] = self.function(pose)
+        if type(value) is tuple:
+            for array in value:
+                array.setflags(False)
+        else:
+            value.setflags(False)
         return value
 
 
@@ -232,7 +234,8 @@ def at(robot: Manipulator, q, qd=None) -> At:
         if qd.shape != q.shape:
             check_leading(q=q.shape[:-1], qd=qd.shape[:-1])
     pose = object.__new__(At)
-    pose.__dict__.update(robot=robot, q=q, qd=qd, independent=None)
+    fields = pose.__dict__
+    fields["robot"], fields["q"], fields["qd"], fields["independent"] = robot, q, qd, None
     return pose
 
 
@@ -243,5 +246,5 @@ def given(qd):
 
 def _copy(name: str, value, n: int) -> np.ndarray:
     array = real_array(name, value, n).copy()
-    array.setflags(write=False)
+    array.setflags(False)
     return array
