@@ -14,15 +14,10 @@ from ..machine.arguments import (
     whole_number,
 )
 from ..machine.manipulator import Manipulator
-from .kinematics import (
-    arm_vectors,
-    constraint_jacobian,
-    ee_complement,
-    inverse_kinematics,
-    loop_constraints,
-    reachable,
-    wrap,
-)
+from . import cores
+from .at import at
+from .cores import wrap
+from .kinematics import arm_vectors, constraint_jacobian, loop_constraints, reachable
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
@@ -94,10 +89,10 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     step, limit = np.full(x.shape, np.inf), positive_number("tolerance", tolerance) * robot.lengths.max()
     for _ in range(whole_number("iterations", iterations, 1)):
-        if not np.all(reachable(robot, x)):
+        q, cosine = cores.joint_angles(robot, x, robot.mode)
+        if np.abs(cosine).max(initial=0.0) > 1.0:
             break
-        q = inverse_kinematics(robot, x)
-        A = ee_complement(robot, q)[..., : robot.n_arms, :]
+        A = at(robot, q).A
         residual = wrap(q_a - q[..., : robot.n_arms])
         gradient = matvec(A.mT, residual)
         step = solve("A^T A (an input singularity)", A.mT @ A, gradient[..., None])[..., 0]

@@ -17,6 +17,22 @@ from .linalg import linear, orthogonal, pivots, product, triangular
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
+def wrap(angle: np.ndarray) -> np.ndarray:
+    """The same angle in (-pi, pi], rad."""
+    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+
+
+def joint_angles(robot, x: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """q (..., 2N) of the end-effector at x, and the cosines of the elbow angles, beyond 1 where x is out of reach."""
+    l1, l2 = robot.lengths.T
+    D = x[..., None, :] - robot.base
+    dx, dy = D[..., 0], D[..., 1]
+    cosine = (np.sqrt(dx * dx + dy * dy) ** 2 - l1**2 - l2**2) / (2 * l1 * l2)
+    elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
+    base = np.arctan2(dy, dx) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
+    return np.concatenate([wrap(base), elbow], axis=-1), cosine
+
+
 def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:
     """v: a_i = l1 (cos, sin)(base angle), d_i = l2 (cos, sin)(base + elbow angle)."""
     angle = linear(q, tree.absolute)

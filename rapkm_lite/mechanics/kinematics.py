@@ -12,7 +12,9 @@ import numpy as np
 
 from ..machine.arguments import check_leading, real_array
 from ..machine.manipulator import Manipulator
+from . import cores
 from .at import at, given
+from .cores import wrap as wrap
 
 
 def turn(v: np.ndarray) -> np.ndarray:
@@ -114,27 +116,18 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
     if not np.all(np.abs(mode) == 1.0):
         raise ValueError(f"mode = {mode}; allowed: +1 or -1 for each of the {robot.n_arms} arms")
     check_leading(x=x.shape[:-1], mode=mode.shape[:-1])
-    l1, l2 = robot.lengths.T
-    D = x[..., None, :] - robot.base
-    reach = np.linalg.norm(D, axis=-1)
-    cosine = (reach**2 - l1**2 - l2**2) / (2 * l1 * l2)
+    q, cosine = cores.joint_angles(robot, x, mode)
     outside = np.abs(cosine) > 1.0 + 1e-12
     if np.any(outside):
         *where, arm = np.argwhere(outside)[0]
-        at = f"x[{', '.join(map(str, where))}]" if where else "x"
-        point, low, high = x[tuple(where)], abs(l1[arm] - l2[arm]), l1[arm] + l2[arm]
+        name = f"x[{', '.join(map(str, where))}]" if where else "x"
+        (l1, l2), point = robot.lengths[arm], x[tuple(where)]
         raise ValueError(
-            f"{at} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is {reach[(*where, arm)]:.6g} m "
-            f"from base point {arm + 1}; allowed: {low:g} to {high:g} m"
+            f"{name} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is "
+            f"{np.hypot(*(point - robot.base[arm])):.6g} m from base point {arm + 1}; "
+            f"allowed: {abs(l1 - l2):g} to {l1 + l2:g} m"
         )
-    elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
-    base = np.arctan2(D[..., 1], D[..., 0]) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
-    return np.concatenate([wrap(base), elbow], axis=-1)
-
-
-def wrap(angle: np.ndarray) -> np.ndarray:
-    """The same angle in (-pi, pi], rad."""
-    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    return q
 
 
 def ee_complement(robot: Manipulator, q) -> np.ndarray:
