@@ -12,7 +12,7 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import linear, orthogonal, pivots, product, triangular
+from .linalg import linear, orthogonal, pivots, product, solve
 
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
@@ -177,7 +177,7 @@ def projector(Q: np.ndarray) -> np.ndarray:
 
 def projector_dot(Q, R, J_dot, N) -> np.ndarray:
     """-(J^+ Jdot N_J) - (J^+ Jdot N_J)^T with J^+ = Q1 R^-T, (..., 2N, 2N)."""
-    half = product(Q[..., : R.shape[-1]], triangular(R, product(J_dot, N), transposed=True))
+    half = product(Q[..., : R.shape[-1]], solve(R.mT, product(J_dot, N)))
     return -half - half.mT
 
 
@@ -206,7 +206,7 @@ def full_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def right_inverse(name: str, A: np.ndarray) -> np.ndarray:
     """(A^T)^+ = A (A^T A)^-1 = Q R^-T, (..., m, k), of a tall A with full rank."""
     Q, R = full_rank(name, A)
-    return triangular(R, Q.mT).mT
+    return solve(R, Q.mT).mT
 
 
 def minors(A: np.ndarray) -> np.ndarray:

@@ -32,34 +32,38 @@ def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 def _lapack():
     from scipy.linalg import lapack  # only when needed: importing the package stays light
 
-    return lapack.dgeqrf, lapack.dorgqr, lapack.dtrtrs
+    return lapack.dgeqrf, lapack.dorgqr, lapack.dgesv
+
+
+@functools.cache
+def _upper(k: int) -> np.ndarray:
+    return np.asfortranarray(np.triu(np.ones((k, k))))
 
 
 def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Q (..., m, k), or (..., m, m) when `complete`, and the upper triangle R (..., k, k) of M = Q[..., :k] R.
-
-    What stands below the diagonal of R has no meaning.
-    """
+    """Q (..., m, k), or (..., m, m) when `complete`, and the upper triangle R (..., k, k) of M = Q[..., :k] R."""
     m, k = M.shape[-2:]
     if M.ndim > 2:
         Q, R = np.linalg.qr(M, mode="complete" if complete else "reduced")
         return Q, R[..., :k, :]
     factor, generate, _ = _lapack()
     packed, scales, _, _ = factor(M)
+    R = packed[:k] * _upper(k)
     if complete:
         start = np.empty((m, m), order="F")
         start[:, :k] = packed
-        return generate(start, scales, overwrite_a=1)[0], packed[:k]
-    return generate(packed, scales)[0], packed[:k]
+        return generate(start, scales, overwrite_a=1)[0], R
+    return generate(packed, scales, overwrite_a=1)[0], R
 
 
-def triangular(R: np.ndarray, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-    """Solution X of R X = right, or R^T X = right, for the R of `orthogonal`."""
-    if R.ndim == 2 and right.ndim == 2:
-        return _lapack()[2](R, right, trans=int(transposed))[0]
-    if R.ndim == 2:
-        R = np.triu(R)
-    return np.linalg.solve(R.mT if transposed else R, right)
+def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solution of matrix @ X = right for a regular matrix, such as R or R^T of `orthogonal`.
+
+    For one matrix by LAPACK's general solver: its triangular one wakes the threads of OpenBLAS for any size.
+    """
+    if matrix.ndim == 2 and right.ndim == 2:
+        return _lapack()[2](matrix, right)[2]
+    return np.linalg.solve(matrix, right)
 
 
 def pivots(R: np.ndarray) -> tuple[float, float]:
