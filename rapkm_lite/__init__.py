@@ -1,5 +1,7 @@
 """Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel."""
 
+from types import ModuleType as _Module
+
 from .control.computed_torque import (
     APD,
     CTC,
@@ -33,11 +35,14 @@ from .mechanics.actuation import (
 from .mechanics.antagonism import (
     antagonism_filter,
     command_filter,
+    common_sign,
+    null_basis,
     null_vector,
     rest_exists,
     steady_state_error,
     steady_state_torque,
 )
+from .mechanics.at import At, at
 from .mechanics.closure import close_loops, estimate_pose
 from .mechanics.dynamics import (
     constraint_rank,
@@ -84,3 +89,9 @@ from .simulation.sensors import Sensors
 from .simulation.sweeps import Sweep, sweep
 
 __version__ = "0.1.0"
+
+__all__ = [name for name, thing in globals().items() if not name.startswith("_") and not isinstance(thing, _Module)]
+
+
+def __dir__():
+    return [*__all__, "__version__"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, MODES, TESTBED, machines, modes, norm, random_motion, random_points
-from scipy.optimize import brentq, minimize, root
+from scipy.optimize import brentq, linprog, minimize, root
 
 import rapkm_lite as rk
 
@@ -94,6 +94,91 @@ def test_null_vector_in_closed_form_spans_the_kernel(mode):
         projector = rk.prestress_projector(A)
         good = np.linalg.svd(rk.redundant_control_matrix(robot, q), compute_uv=False)[:, 1] > 1e-2
         assert norm(projector - n[:, :, None] * n[:, None, :])[good].max() < 1e-11
+
+
+@modes
+def test_null_basis_is_the_null_vector_for_three_arms(mode):
+    for robot in (TESTBED, MACHINES["asymmetric"]):
+        q = random_motion(robot, 500, mode)[0]
+        A = rk.control_matrix(robot, q)
+        good = np.linalg.svd(rk.redundant_control_matrix(robot, q), compute_uv=False)[:, 1] > 1e-2
+        n = rk.null_basis(A)[good]
+        assert n.shape[1:] == (3, 1)
+        assert_allclose(n[..., 0], rk.null_vector(robot, q)[good], atol=1e-12)
+        # Its sign: that of the cross product of the columns of A.
+        assert np.all(np.sum(np.cross(A[good, :, 0], A[good, :, 1]) * n[..., 0], axis=-1) > 0)
+
+
+@pytest.mark.parametrize(("m", "delta"), [(2, 1), (2, 2), (3, 1), (4, 2), (4, 3), (5, 2), (6, 2), (7, 3), (8, 2)])
+def test_null_basis_of_any_matrix(m, delta):
+    A = np.random.default_rng(m).normal(size=(2, 50, m, delta)) * [1e4, 1.0, 1e-3][:delta]
+    n = rk.null_basis(A)
+    assert n.shape == (2, 50, m, m - delta)
+    assert_allclose(T(n) @ n, np.broadcast_to(np.eye(m - delta), (2, 50, m - delta, m - delta)), atol=1e-14)
+    size = np.linalg.norm(A, axis=-2)[..., None]
+    assert np.abs((T(A) @ n) / size).max(initial=0.0) < 1e-14
+    assert np.array_equal(n[1, 7], rk.null_basis(A[1, 7]))  # a function of A alone
+    if m > delta:
+        assert np.all(np.linalg.det(np.concatenate([A / size.swapaxes(-1, -2), n], axis=-1)) > 0)
+        # Another choice of the independent coordinates spans the same space and keeps the basis: A M for det M > 0.
+        M = np.eye(delta) + 0.3 * np.triu(np.ones((delta, delta)), 1)
+        assert_allclose(rk.null_basis(A @ M), n, atol=1e-8)
+
+
+def test_null_basis_is_continuous_along_paths_and_around_loops():
+    # Twice as many samples, half the step; and a closed path ends with the basis it began with.
+    robot = MACHINES["four_arms"]
+    for path in (lambda k: rk.circle(robot, 0.08, dt=5.0 / k), lambda k: rk.triangle(robot, side=0.12, dt=5.0 / k)):
+        steps = []
+        for k in (500, 1000, 2000):
+            n = rk.null_basis(rk.control_matrix(robot, path(k).q))
+            steps.append(np.linalg.norm(np.diff(n, axis=0), axis=(-2, -1)).max())
+        assert_allclose(np.array(steps[:-1]) / steps[1:], 2.0, rtol=0.05)
+        assert_allclose(n[-1], n[0], atol=1e-12)
+
+
+def test_null_basis_refuses_what_has_no_basis_to_face():
+    with pytest.raises(ValueError, match="A has lost rank"):
+        rk.null_basis(np.ones((4, 2)))
+    # The drives (1, 1, 1, 1) move nothing but the end-effector: the reference lies in the range of A.
+    with pytest.raises(ValueError, match="no reference left in its null space; allowed: any other pose"):
+        rk.null_basis([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]])
+
+
+def positive_prestress(A):
+    """The largest t with A^T n = 0, n_i >= t, n_i <= 1, by linear programming."""
+    m = len(A)
+    rows = np.concatenate([A.T / np.abs(A).max(), np.zeros((2, 1))], axis=1)
+    below = np.concatenate([-np.eye(m), np.ones((m, 1))], axis=1)
+    found = linprog(np.append(np.zeros(m), -1.0), below, np.zeros(m), rows, np.zeros(2), [(-1, 1)] * m + [(-1, 1)])
+    return -found.fun
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms", "asymmetric"])
+def test_common_sign_against_linear_programming(name):
+    robot = MACHINES[name]
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, random_points(robot, 60, seed=8)))
+    margin = np.array([positive_prestress(M) for M in A])
+    clear = np.abs(margin) > 1e-6
+    possible = rk.common_sign(A)
+    assert clear.mean() > 0.3 and 0 < possible.sum() < len(A)
+    assert np.array_equal(possible[clear], margin[clear] > 0) and not possible[margin < 1e-9].any()
+    assert rk.common_sign(A[0]).shape == ()
+    if robot.n_arms == 3:
+        n = rk.null_vector(robot, rk.inverse_kinematics(robot, random_points(robot, 60, seed=8)))
+        assert np.array_equal(possible, np.abs(np.sign(n).sum(axis=-1)) == 3)
+
+
+def test_share_of_the_workspace_without_backlash():
+    # The reference page: 56.5 % of the workspace, 65 % of the testbed triangle (samples in time).
+    x, y, inside = rk.workspace_grid(TESTBED, 500)
+    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    share = rk.common_sign(rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, points))).mean()
+    assert_allclose(share, 0.565, atol=0.005)
+    assert_allclose(rk.common_sign(rk.control_matrix(TESTBED, rk.triangle(TESTBED).q)).mean(), 0.65, atol=0.005)
+    # Two drives cannot prestress each other.
+    A = rk.control_matrix(MACHINES["five_bar"], rk.inverse_kinematics(MACHINES["five_bar"], [0.0, 0.0]))
+    assert not rk.common_sign(A)
 
 
 def test_drive_opposite_to_a_singular_pair_carries_no_prestress():
@@ -243,6 +328,31 @@ def test_explicit_pseudoinverse_for_every_valid_partition(mode):
         assert (norm(best - peer)[ok] / norm(peer)[ok]).max() < 1e-10
 
 
+def printed_27(A_tilde, rows):
+    """(27) letter by letter, with the inverse of A~_1 A~_1^T of the text after it."""
+    rest = [i for i in range(len(A_tilde)) if i not in rows]
+    A1, A2 = A_tilde[list(rows)], A_tilde[rest]
+    pinv1 = np.linalg.inv(A1 @ A1.T) @ A1
+    B = pinv1 @ A2.T
+    small = np.linalg.inv(np.eye(len(rest)) + B.T @ B)
+    top = pinv1 @ (np.eye(A_tilde.shape[1]) - A2.T @ small @ B.T @ pinv1)
+    whole = np.empty_like(A_tilde)
+    whole[list(rows)], whole[rest] = top, small @ B.T @ pinv1
+    return whole, small
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms", "five_bar"])
+def test_explicit_pseudoinverse_is_27_as_printed(name):
+    robot = MACHINES[name]
+    A_tilde = rk.redundant_control_matrix(robot, rk.inverse_kinematics(robot, random_points(robot, 20, bend=0.3)))
+    rows = rk.select_independent(A_tilde)
+    for M, pair, found in zip(A_tilde, rows, rk.explicit_pseudoinverse(A_tilde, rows), strict=True):
+        printed, new_inverse = printed_27(M, pair.tolist())
+        assert_allclose(found, printed, rtol=0, atol=1e-12 * np.abs(printed).max())
+        assert_allclose(rk.explicit_pseudoinverse(M, pair), found, rtol=0, atol=1e-14 * np.abs(printed).max())
+        assert new_inverse.shape == (robot.n_arms - 2,) * 2  # a number on the testbed
+
+
 def test_partition_rules_choose_what_they_say():
     A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, random_points(TESTBED, 300)))
     parts = np.stack([A_tilde[:, pair, :] for pair in PAIRS], axis=1)
@@ -351,6 +461,20 @@ def test_map_masks_the_input_singularity_of_a_mixed_mode():
     assert n.mask[:, 1, 1].all() and np.all(np.isfinite(n.data))
     _, _, kappa = rk.actuation_map(TESTBED, "condition", mode, n=3, box=(px - 0.01, px + 0.01, py - 0.01, py + 0.01))
     assert kappa.mask[1, 1]
+
+
+@machines
+def test_prestress_map_shows_the_rows_of_the_null_basis(robot):
+    if robot.n_arms == 2:
+        with pytest.raises(ValueError, match="robot has 2 arms, which cannot prestress each other; allowed: 3 or more"):
+            rk.actuation_map(robot, "prestress", n=20)
+        return
+    x, y, share = rk.actuation_map(robot, "prestress", n=25)
+    points = np.stack(np.meshgrid(x, y), axis=-1)[~share.mask[0]]
+    n = rk.null_basis(rk.control_matrix(robot, rk.inverse_kinematics(robot, points)))
+    assert share.shape == (robot.n_arms, 25, 25)
+    assert_allclose(share[:, ~share.mask[0]].data.T, np.linalg.norm(n, axis=-1), atol=1e-10)
+    assert_allclose((share.data[:, ~share.mask[0]] ** 2).sum(axis=0), robot.n_arms - 2, rtol=1e-12)
 
 
 def test_zero_prestress_curves_are_the_switching_curves():

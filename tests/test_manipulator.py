@@ -186,3 +186,10 @@ def test_importing_the_package_stays_light():
     code = "import sys, rapkm_lite; print([m for m in ('matplotlib', 'ipywidgets', 'sympy') if m in sys.modules])"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]" and out.stderr == ""
+
+
+def test_the_package_lists_what_people_call_and_no_modules():
+    from types import ModuleType
+    assert "at" in dir(rk) and "null_basis" in dir(rk) and "triangle" in dir(rk)
+    assert set(dir(rk)) == {*rk.__all__, "__version__"}
+    assert not [name for name in rk.__all__ if isinstance(getattr(rk, name), ModuleType)]

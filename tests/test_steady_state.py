@@ -1,10 +1,12 @@
 """Rest under PD control with offsets and stepped angles, and the logs made for the exercises."""
 
 import importlib.util
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import K_P, hidden
@@ -28,6 +30,49 @@ def test_rest_always_exists_below_the_threshold():
     robot = rk.load()
     for x, offset in random_rests(1, 40):
         q = rk.inverse_kinematics(robot, x)
+        assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, offset, QUANTUM, 4.2e-3)
+        assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
+
+
+def rest_by_linear_programming(robot, q, K_P, offset, quantum, friction, reach=2):
+    """Some counts near the ideal ones, read by a displacement x, whose torques are a prestress up to friction?"""
+    N = robot.n_arms
+    A, Z = (f(rk.control_matrix(robot, q)) for f in (lambda A: A, rk.null_basis))
+    ideal = q[:N] + rk.steady_state_error(A, K_P, offset) + offset
+    middle, scale = np.rint(ideal / quantum), np.abs(A).max()
+    for step in itertools.product(range(-reach, reach + 1), repeat=N):
+        counts = quantum * (middle + step)
+        c = -K_P * (counts - q[:N])
+        slabs = ((A / scale, (counts - q[:N] - offset) / quantum, 0.5), (Z, c / friction, 1.0))
+        if all(linprog(np.zeros(M.shape[1]), np.vstack([M, -M]), np.concatenate([b + h, h - b]),
+                       bounds=(None, None)).status == 0 for M, b, h in slabs):
+            return True
+    return False
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_places_of_rest_against_linear_programming(name):
+    """Counts by brute force, strips and friction by linear programming: below the threshold, near it, far above."""
+    robot, rng = rk.load(name), np.random.default_rng(6)
+    seen = set()
+    for _ in range(4):
+        q = rk.inverse_kinematics(robot, rng.uniform(-0.05, 0.05, 2))
+        offset = rng.uniform(-5e-3, 5e-3, robot.n_arms)
+        for factor in (1.0, 1.8, 5.0):
+            gain = factor * 2 * 4.2e-3 / QUANTUM
+            ours = rk.rest_exists(robot, q, gain, offset, QUANTUM, 4.2e-3)
+            # Counts further off than two would ask for torques beyond all friction here.
+            assert ours == rest_by_linear_programming(robot, q, gain, offset, QUANTUM, 4.2e-3)
+            seen.add(ours)
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize("name", ["five_bar", "four_arms"])
+def test_rest_exists_below_the_threshold_for_other_numbers_of_arms(name):
+    robot = rk.load(name)
+    for x, offset in random_rests(7, 10):
+        q = rk.inverse_kinematics(robot, x)
+        offset = np.resize(offset, robot.n_arms)
         assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, offset, QUANTUM, 4.2e-3)
         assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import rapkm_lite as rk
 from rapkm_lite.machine.values import Value, frozen
 
 
@@ -65,3 +66,58 @@ def test_frozen_keeps_shape_type_and_numbers(array):
     assert kept.shape == np.shape(array) and kept.dtype == np.asarray(array).dtype and np.array_equal(kept, array)
     assert kept.flags.c_contiguous and not kept.flags.writeable
     assert frozen(kept) is kept or kept.size == 0
+
+
+# The values of machine and mechanics.
+def arrays(value):
+    return {name: v for name, v in vars(value).items() if isinstance(v, np.ndarray)}
+
+
+PATH = rk.triangle(rk.load(), dt=0.05)
+VALUES = {"machine": rk.load("asymmetric"), "path": PATH, "sample": PATH[17], "part": PATH[3:7],
+          "log": rk.mystery_run("offset_a"), "long path": rk.triangle(rk.load("four_arms"))}
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES.keys())
+def test_values_of_the_package_stay_as_they_are(value):
+    assert len(arrays(value)) >= 4
+    for v in (value, *copies(value)):
+        assert v == value and hash(v) == hash(value) and repr(v) == repr(value)
+        for name, array in arrays(v).items():
+            assert not array.flags.writeable and array.flags.c_contiguous, name
+            with pytest.raises(ValueError, match="read-only"):
+                array[(0,) * array.ndim] = 9.0
+            with pytest.raises(ValueError, match="WRITEABLE"):
+                array.setflags(write=True)
+
+
+def test_no_law_can_shift_the_path_through_its_sample():
+    sample = PATH[17]
+    for name in ("x", "xd", "xdd", "q", "qd", "qdd", "q_a", "qd_a", "qdd_a"):
+        array = getattr(sample, name)
+        assert array.flags.c_contiguous
+        with pytest.raises(ValueError, match="read-only"):
+            array += 0.01
+        assert np.array_equal(array, getattr(PATH, name)[17])
+    assert PATH[17] is sample and PATH[np.int64(17)] == sample and PATH[-1] == PATH[100]
+    assert [d.q_a[0] for d in PATH] == PATH.q_a[:, 0].tolist()
+    with pytest.raises(IndexError):
+        PATH[101]
+
+
+def test_desired_motions_copy_what_they_are_given():
+    q = np.ones((4, 6))
+    mine = rk.Desired(3, q[:, :2], q[:, :2], q[:, :2], q, q, q)
+    q[...] = 7.0
+    assert np.all(mine.q == 1.0) and q.flags.writeable and mine.q_a.shape == (4, 3)
+    assert mine == rk.Desired(3, np.ones((4, 2)), np.ones((4, 2)), np.ones((4, 2)), *[np.ones((4, 6))] * 3)
+    assert mine != rk.Desired(3, mine.x, mine.xd, mine.xdd, mine.q, mine.qd, 2 * mine.qdd)
+
+
+def test_equal_machines_and_paths_are_one_key():
+    again = rk.load()
+    assert again == rk.load() and again != again.replace(friction=0.0) and again != rk.load("five_bar")
+    assert len({again, rk.load(), again.replace()}) == 1
+    assert rk.triangle(again, dt=0.05) == PATH and {PATH: 1}[rk.triangle(again, dt=0.05)] == 1
+    assert rk.triangle(again, dt=0.05, side=0.2) != PATH
+    assert repr(PATH[1:3]).startswith("Desired(3, [[")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+_FLOAT = np.dtype(float)
+
 
 class ConvergenceError(RuntimeError, ValueError):
     """An iteration found no solution; the message carries the residual and the pose it stopped at."""
@@ -15,6 +17,22 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN or infinity, or
     has other trailing axes.
     """
+    if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last:
+        array = value
+    else:
+        array = _converted(name, value, last)
+    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
+    # for a large one it would wake the threads of the linear algebra library.
+    if array.size > 1000 or not np.vdot(array, array) < 1e200:
+        fine = np.abs(array) < 1e100
+        if not np.all(fine):
+            bad = np.argwhere(~fine)[0]
+            number = array[tuple(bad)]
+            raise ValueError(f"{name}{_at(bad)} = {number}; allowed: finite numbers, below 1e100 in magnitude")
+    return array
+
+
+def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value)
         # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
@@ -26,11 +44,6 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     if last and array.shape[-len(last) :] != last:
         want = "(" + ", ".join(["...", *map(str, last)]) + ")"
         raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
-    # Beyond 1e100 products would overflow and leave a function as infinity or NaN.
-    fine = np.abs(array) < 1e100
-    if not np.all(fine):
-        bad = np.argwhere(~fine)[0]
-        raise ValueError(f"{name}{_at(bad)} = {array[tuple(bad)]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
 
@@ -52,6 +65,8 @@ def joint_vectors(size: int, **vectors) -> list[np.ndarray]:
 
 def check_leading(**leads: tuple[int, ...]) -> tuple[int, ...]:
     """Broadcast leading axes, given by argument name; raises ValueError when they do not fit together."""
+    if len(set(leads.values())) == 1:
+        return next(iter(leads.values()))
     try:
         return np.broadcast_shapes(*leads.values())
     except ValueError:
@@ -110,7 +125,7 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
         raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:
         return np.diag(bounded(name, array, 0.0, strict=True))
-    skew = np.abs(array - transpose(array)).max(initial=0.0)
+    skew = np.abs(array - array.mT).max(initial=0.0)
     if skew > 1e-12 * np.abs(array).max(initial=0.0):
         raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
     smallest = np.linalg.eigvalsh(array).min(initial=np.inf)
@@ -148,12 +163,14 @@ def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Product of (..., i, j) and (..., j)."""
+    if vector.ndim == 1:
+        return matrix.dot(vector) if matrix.ndim == 2 else matrix @ vector
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 
 def transpose(matrix: np.ndarray) -> np.ndarray:
     """Transpose of the last two axes."""
-    return np.swapaxes(matrix, -1, -2)
+    return matrix.mT
 
 
 def _at(index) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .arguments import bounded, real_array
 from .datafiles import UNITS, known, read_toml
+from .tree import Tree
 from .values import Value, frozen
 
 
@@ -136,6 +137,11 @@ class Manipulator(Value):
         (l1, l2), (m1, m2), (c1, c2) = (v.T for v in (self.lengths, self.masses, self.centers))
         load = self._load_per_arm
         return frozen(np.stack([m1 * c1 + (m2 + load) * l1, m2 * c2 + load * l2], axis=-1))
+
+    @cached_property
+    def tree(self) -> Tree:
+        """Constants of the cut tree, for the functions of `mechanics`."""
+        return Tree(self)
 
     @property
     def _load_per_arm(self) -> np.ndarray:

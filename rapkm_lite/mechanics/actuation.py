@@ -1,6 +1,6 @@
-"""Actuation: control matrix, degree of actuation, inverse dynamics, prestress, antagonism filter, steady state.
+"""Actuation: control matrix, degree of actuation (8)-(10), inverse dynamics and prestress (11).
 
-Equations (8)-(11), (13)-(15), (17), (25)-(27).  m = N drives act on delta = 2 degrees of freedom.
+m = N drives act on delta = 2 degrees of freedom.  What needs only a matrix takes any A (..., m, delta) of full rank.
 """
 
 from __future__ import annotations
@@ -17,40 +17,48 @@ from ..machine.arguments import (
     positive_number,
     real_array,
     tall_matrix,
-    transpose,
 )
 from ..machine.manipulator import Manipulator
-from .dynamics import minimal_dynamics, nullspace_projector, orthogonal_complement
-from .kinematics import arm_vectors, cross, ee_complement_dot
+from . import cores
+from .at import at
+from .kinematics import cross
+from .linalg import product
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
-    """A(q) of (6), qd_a = A q2d, so that A^T c are the generalized control forces, (..., m, 2).
+    """A(q) of the text before (6), qd_a = A q2d, so that A^T c are the control forces in (6), (..., m, 2).
 
     independent : two 0-based joint indices, or None for the end-effector position (then A is in rad/m).
     Raises ValueError where the choice is singular.
     """
-    return orthogonal_complement(robot, q, independent)[..., : robot.n_arms, :]
+    return at(robot, q).using(independent).A.copy()
 
 
 def redundant_control_matrix(robot: Manipulator, q) -> np.ndarray:
-    """A~(q) of (23), the rows of N_J of the driven joints, (..., m, 2N): the control forces are A~^T c."""
-    return nullspace_projector(robot, q)[..., : robot.n_arms, :]
+    """A~(q) of (21), the rows of N_J of the driven joints, (..., m, 2N): the control forces in (22), (23) are A~^T c.
+
+    Raises ValueError at c-space singularities.
+    """
+    return at(robot, q).A_tilde.copy()
 
 
 def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.ndarray:
-    """alpha(q) of (10), (...,): the rank of the control vector fields, which is rank A for regular Gbar.
+    """alpha(q) of (10), (...,): how many control vector fields of (8) are independent; rank A for regular Gbar.
 
-    Counted as the rank of A~, whose entries need no scaling; alpha < 2 marks input singularities.
+    Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
+    chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
     """
     tolerance = positive_number("tolerance", tolerance)
-    sigma = np.linalg.svd(redundant_control_matrix(robot, q), compute_uv=False)
+    sigma = np.linalg.svd(at(robot, q).A_tilde, compute_uv=False)
     return np.sum(sigma > tolerance, axis=-1)
 
 
 def actuation_type(robot: Manipulator, q):
-    """'underactuated' (alpha < delta = 2), 'fully actuated' or 'redundantly actuated' (m > alpha = delta), from (10).
+    """'underactuated' (alpha < 2), 'fully actuated' (alpha = m = 2) or 'redundantly actuated' (m > alpha = 2), by (10).
 
+    The text after it asks two questions: underactuated (alpha < delta) or full-actuated (alpha = delta), and
+    redundantly (m > alpha) or non-redundantly actuated (m = alpha).  A pose with alpha < 2 is both underactuated and
+    redundantly actuated, since m >= 2: redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
     """
     full = "redundantly actuated" if robot.n_arms > 2 else "fully actuated"
@@ -59,13 +67,13 @@ def actuation_type(robot: Manipulator, q):
 
 
 def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray:
-    """Columns Gbar^-1 A^T of (8)-(9), (..., 2, m): the acceleration of q2 per unit torque of each drive.
+    """Lower half Gbar^-1 A^T of the control vector fields g in (9), (..., 2, m): q2dd per unit torque of each drive.
 
-    The state (q2, q2d) moves along the drift field and the sum of these vector fields times the torques.
+    The state (q2, q2d) of (8) moves along the drift field f of (9) and the sum of these fields times the torques.
     Raises ValueError where the choice of independent coordinates is singular.
     """
-    Gbar, _, _ = minimal_dynamics(robot, q, np.zeros(robot.n_joints), independent)
-    return np.linalg.solve(Gbar, transpose(control_matrix(robot, q, independent)))
+    pose = at(robot, q).using(independent)
+    return np.linalg.solve(product(pose.F.mT, pose.G, pose.F), pose.A.mT)
 
 
 def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
@@ -78,9 +86,9 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 
     Zero where the angles of the pair (j, k) are no coordinates (parameterization singularity).
     """
-    _, d = arm_vectors(robot, q)
-    d = d / robot.lengths[:, 1:]
-    return np.stack([cross(d[..., j, :], d[..., k, :]) for j, k in drive_pairs(robot)], axis=-1)
+    d = at(robot, q).d / robot.lengths[:, 1:]
+    j, k = np.triu_indices(robot.n_arms, 1)
+    return cross(d[..., j, :], d[..., k, :])
 
 
 def singular_values(A) -> np.ndarray:
@@ -88,80 +96,63 @@ def singular_values(A) -> np.ndarray:
     A = tall_matrix("A", A)
     if A.shape[-1] != 2:
         raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
-    u, v = A[..., 0], A[..., 1]
-    uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
-    largest = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
-    # Lagrange's identity: the product of the singular values without cancellation.
-    minors = [u[..., i] * v[..., j] - u[..., j] * v[..., i] for i, j in itertools.combinations(range(u.shape[-1]), 2)]
-    area = np.sqrt(sum(x * x for x in minors))
-    smallest = np.divide(area, largest, out=np.zeros_like(area), where=largest > 0)
-    return np.stack([largest, smallest], axis=-1)
-
-
-def full_rank_qr(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    Q, R = np.linalg.qr(A)
-    pivots = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
-    measure = pivots.min(axis=-1) / np.maximum(pivots.max(axis=-1), 1e-300)
-    if np.any(measure < 1e-12):
-        raise ValueError(
-            f"{name} has lost rank (relative pivot {measure.min():.3g}): an input singularity, where the drives cannot "
-            "produce every control force; allowed: poses with the full degree of actuation"
-        )
-    return Q, R
+    return cores.singular_values(A)
 
 
 def weighted_pseudoinverse(A, W=None) -> np.ndarray:
-    """(A^T)_W^+ = W^-1 A (A^T W^-1 A)^-1 of (11), (..., m, 2): of all c with A^T c = f the one with smallest c^T W c.
+    """(A^T)_W^+ = W^-1 A (A^T W^-1 A)^-1 of (11), (..., m, delta): of all c with A^T c = f the one of least c^T W c.
 
     W : symmetric positive definite, one number, (m,) or (..., m, m); default the identity.
     Raises ValueError when W is not, or at input singularities.
     """
     A = tall_matrix("A", A)
     if W is None:
-        Q, R = full_rank_qr("A", A)
-        return Q @ np.linalg.inv(transpose(R))
+        return cores.right_inverse("A", A)
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    Q, R = full_rank_qr("A", np.linalg.solve(L, A))
-    return np.linalg.solve(transpose(L), Q) @ np.linalg.inv(transpose(R))
+    return np.linalg.solve(L.mT, cores.right_inverse("A", np.linalg.solve(L, A)))
 
 
 def prestress_projector(A, W=None) -> np.ndarray:
     """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing."""
     A = tall_matrix("A", A)
-    return np.eye(A.shape[-2]) - weighted_pseudoinverse(A, W) @ transpose(A)
+    return np.eye(A.shape[-2]) - product(weighted_pseudoinverse(A, W), A.mT)
 
 
 def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> np.ndarray:
-    """Drive torques c (..., m) in N m of (11): c = (A^T)_W^+ (Gbar q2dd + Cbar q2d + Qbar) + N_{A^T,W} c0.
+    """Drive torques c (..., m) in N m of (11): c = (A^T)_W^+ F^T (G qdd + C qd + Q) + N_{A^T,W} c0.
 
+    Of all torques for the motion, those of least (c - c0)^T W (c - c0).
     q, qd, qdd : a motion on V, (..., 2N).  W : see `weighted_pseudoinverse`.
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
     also the inverse dynamics (25) in redundant coordinates.
     """
-    A, wrench = control_matrix(robot, q), required_wrench(robot, q, qd, qdd)
-    pinv = weighted_pseudoinverse(A, W)
+    pose, wrench = _driven(robot, q, qd, qdd)
+    pinv = weighted_pseudoinverse(pose.A, W)
     check_leading(motion=wrench.shape[:-1], W=pinv.shape[:-2])
     c = matvec(pinv, wrench)
     if prestress is not None:
         c0 = real_array("prestress", prestress, robot.n_arms)
         check_leading(motion=c.shape[:-1], prestress=c0.shape[:-1])
-        c = c + matvec(prestress_projector(A, W), c0)
+        c = c + matvec(prestress_projector(pose.A, W), c0)
     return c
 
 
 def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
-    """Force (..., 2) in N at the end-effector that the drives must produce for the motion q, qd, qdd on V.
+    """Force F^T (G qdd + C qd + Q), (..., 2) in N, that the drives must produce at the end-effector for a motion on V.
 
-    The left-hand side Gbar q2dd + Cbar q2d + Qbar of (5) with the end-effector position as q2.
+    As in the first line of (11); on V it is the left-hand side Gbar q2dd + Cbar q2d + Qbar of (6), with the
+    end-effector position as q2.
     """
+    return _driven(robot, q, qd, qdd)[1]
+
+
+def _driven(robot: Manipulator, q, qd, qdd):
+    """The pose, and the wrench of a motion."""
     q, qd, qdd = joint_vectors(robot.n_joints, q=q, qd=qd, qdd=qdd)
-    Gbar, Cbar, Qbar = minimal_dynamics(robot, q, qd)
-    F, F_dot = orthogonal_complement(robot, q), ee_complement_dot(robot, q, qd)
-    xd = matvec(np.linalg.pinv(F), qd)
-    xdd = matvec(np.linalg.pinv(F), qdd - matvec(F_dot, xd))
-    return matvec(Gbar, xdd) + matvec(Cbar, xd) + Qbar
+    pose = at(robot, q, qd)
+    return pose, matvec(pose.F.mT, matvec(pose.G, qdd) + matvec(pose.C, qd) + pose.Q)
 
 
 def force_polygon(A, torque: float) -> np.ndarray:

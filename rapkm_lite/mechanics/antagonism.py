@@ -1,4 +1,4 @@
-"""Torques that move nothing: null vector, antagonism filter (15), (17), and the state of rest (13)-(14)."""
+"""Torques that move nothing: null space of A^T, antagonism filter (15), (17), and the state of rest (13)-(14)."""
 
 from __future__ import annotations
 
@@ -15,20 +15,23 @@ from ..machine.arguments import (
     positive_number,
     real_array,
     tall_matrix,
-    transpose,
 )
 from ..machine.manipulator import Manipulator
-from .actuation import control_matrix, full_rank_qr
-from .kinematics import arm_vectors, cross
+from . import cores
+from .actuation import control_matrix
+from .at import at
+from .kinematics import cross
+from .linalg import product
 
 
 def antagonism_filter(A) -> np.ndarray:
     """R = (A^T)^+ A^T of (15), (..., m, m): removes the part of the torques that only prestresses; A^T R = A^T.
 
+    The orthogonal projector onto the range of A, in the space of drive torques.
     Raises ValueError at input singularities.
     """
-    Q, _ = full_rank_qr("A", tall_matrix("A", A))
-    return Q @ transpose(Q)
+    Q, _ = cores.full_rank("A", tall_matrix("A", A))
+    return product(Q, Q.mT)
 
 
 def command_filter(A, K) -> np.ndarray:
@@ -42,47 +45,102 @@ def command_filter(A, K) -> np.ndarray:
     return antagonism_filter(K @ A)
 
 
+def null_basis(A) -> np.ndarray:
+    """Orthonormal basis of the torques that move nothing, A^T n = 0, (..., m, m - delta), for any A (..., m, delta).
+
+    A smooth function of A, so continuous along any path, and the same for one pose as inside a path.  With m - delta
+    = 1 it is the unit vector with det[A | n] > 0; for three arms `null_vector`.  With more, all but the last vector
+    face fixed references as nearly as the null space allows (the projections of (1, ..., 1) and of the cosines and
+    sines of twice, three times ... the drive's share of a turn, made orthonormal in this order), and the last one
+    completes them to det[A | basis] > 0.  No basis can be smooth everywhere: this one turns fast near the isolated
+    poses where a reference drops out of the null space.
+    Raises ValueError at input singularities, and where a reference drops out exactly.
+
+    >>> null_basis([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])[:, 0]
+    array([0., 0., 1.])
+    """
+    A = tall_matrix("A", A)
+    m, delta = A.shape[-2:]
+    cores.full_rank("A", A)
+    anywhere = np.linalg.qr(A, mode="complete")[0][..., delta:]
+    if m > delta:
+        # Any orthonormal basis, turned by U: the columns of U but the last from its components along the references.
+        U, R = np.linalg.qr(product(anywhere.mT, _references(m)[:, : m - delta - 1]), mode="complete")
+        size = np.diagonal(R, axis1=-2, axis2=-1)
+        if np.any(np.abs(size) < 1e-12):
+            raise ValueError("A has no reference left in its null space; allowed: any other pose, also one close by")
+        U[..., :-1] *= np.sign(size)[..., None, :]
+        anywhere = product(anywhere, U)
+        unit = A / np.linalg.norm(A, axis=-2, keepdims=True)
+        anywhere[..., -1] *= np.sign(np.linalg.det(np.concatenate([unit, anywhere], axis=-1)))[..., None]
+    return anywhere
+
+
+def _references(m: int) -> np.ndarray:
+    """Harmonics of the drive number without the first one, which is the range of A of a symmetric machine."""
+    turn = 2 * np.pi * np.arange(m) / m
+    waves = [wave(k * turn) for k in range(2, m // 2 + 1) for wave in (np.cos, np.sin)]
+    return np.stack([np.ones(m), *waves], axis=-1)
+
+
 def null_vector(robot: Manipulator, q) -> np.ndarray:
     """Unit null vector of A^T for three arms in closed form, (..., 3): n_i ~ (a_i x d_i) (d_j x d_k), i, j, k cyclic.
 
+    Its sign is that of the cross product of the two columns of A, as in `null_basis`, which takes any number of drives.
     Raises ValueError for another number of arms, and at input singularities, where the null space has two dimensions.
     """
-    n = null_direction(robot, q)
+    n, levers = null_direction(robot, q), cores.levers(robot.tree, at(robot, q)._v)
     size = np.linalg.norm(n, axis=-1, keepdims=True)
     if np.any(size < 1e-12 * robot.lengths[:, 0].max()):
         raise ValueError(
             "q is an input singularity (all distal links parallel), where the null space of A^T is a plane; allowed: "
             "poses with degree of actuation 2"
         )
-    return n / size
+    return n / (size * np.where(levers < 0.0, -1.0, 1.0).prod(axis=-1, keepdims=True))
 
 
 def null_direction(robot: Manipulator, q) -> np.ndarray:
     """The numerators (a_i x d_i) (d_j x d_k) of `null_vector`, (..., 3) in m, d of unit length; zero where it fails."""
     if robot.n_arms != 3:
-        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (prestress_projector takes any number)")
-    a, d = arm_vectors(robot, q)
-    d = d / robot.lengths[:, 1:]
-    return cross(a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
+        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (null_basis takes any number)")
+    pose = at(robot, q)
+    d = pose.d / robot.lengths[:, 1:]
+    return cross(pose.a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
+
+
+def common_sign(A) -> np.ndarray:
+    """Can a prestress load all drives with one sign, so that no gear has backlash?  Boolean (...,) for A (..., m, 2).
+
+    A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half plane (Stiemke): where the
+    largest gap between their directions is below a half turn.  For three arms: where all n_i have the same sign.
+    Raises ValueError at input singularities.
+    """
+    A = tall_matrix("A", A)
+    if A.shape[-1] != 2:
+        raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
+    cores.full_rank("A", A)
+    angle = np.sort(np.arctan2(A[..., 1], A[..., 0]), axis=-1)
+    gaps = np.diff(np.concatenate([angle, angle[..., :1] + 2 * np.pi], axis=-1), axis=-1)
+    return gaps.max(axis=-1) < np.pi
 
 
 def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     """Error e_a = q_a - q_a^d (..., m) in rad at rest under PD with offsets, (14) corrected:
 
-    e_a = -A (A^T K_P A)^-1 (A^T K_P offset + wrench).  The chapter's formula has shapes that do not fit.  It solves the
+    e_a = -A (A^T K_P A)^-1 (A^T K_P offset + wrench).  The printed formula has shapes that do not fit.  It solves the
     equilibrium (13), A^T K_P (e_a + offset) + wrench = 0, for small errors e_a = A e_x.
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
     wrench : static control force A^T c (..., 2) that gravity and load demand (Qbar at rest); default none.
     """
     A = tall_matrix("A", A)
-    full_rank_qr("A", A)
+    cores.full_rank("A", A)
     offset = real_array("offset", offset, A.shape[-2])
     K = positive_definite("K_P", K_P, A.shape[-2])
     wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
     check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
-    force = matvec(transpose(A) @ K, offset) + wrench
-    return -matvec(A, np.linalg.solve(transpose(A) @ K @ A, force[..., None])[..., 0])
+    force = matvec(A.mT @ K, offset) + wrench
+    return -matvec(A, np.linalg.solve(A.mT @ K @ A, force[..., None])[..., 0])
 
 
 def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
@@ -95,20 +153,40 @@ def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
 
 
 def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: float) -> bool:
-    """Can PD drives with stepped angles rest near the desired pose q (2N,) of three arms, held by Coulomb friction?
+    """Is there a place of rest near the desired pose q (2N,) for PD drives with stepped angles and Coulomb friction?
 
     True when counts exist that a pose of the closed loops reads, and whose torques differ from a prestress by no more
-    than the friction of each drive; certain for K_P quantum <= 2 friction.  First order about q.
-    K_P : number or (3,), N m/rad.  offset : (3,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
-    Raises ValueError for another number of arms, at input singularities, and for values out of range.
+    than the friction of each drive: a place of rest exists, to first order about q and with exact rates.  It does for
+    K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is another question.
+    K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
+    Raises ValueError at input singularities, and for values out of range.
     """
-    n, desired = null_vector(robot, q), exact_array("q", q, robot.n_joints)[:3]
-    offset, quantum = exact_array("offset", offset, 3), positive_number("quantum", quantum)
+    N = robot.n_arms
+    desired = exact_array("q", q, robot.n_joints)[:N]
+    offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
     friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
-    ideal = desired + steady_state_error(control_matrix(robot, q), K_P, offset) + offset
-    counts = np.rint(ideal / quantum) + np.array(list(itertools.product(range(-4, 5), repeat=3)))
-    read = np.abs((quantum * counts - desired - offset) @ n) <= quantum / 2 * np.abs(n).sum()
-    c = -real_array("K_P", K_P) * (quantum * counts[read] - desired)
-    with np.errstate(divide="ignore"):
-        ends = np.sort([(c - friction) / n, (c + friction) / n], axis=0)  # levels of prestress that each drive can hold
-    return bool(np.any(ends[0].max(axis=-1) <= ends[1].min(axis=-1)))
+    A = control_matrix(robot, q)
+    ideal = desired + steady_state_error(A, K_P, offset) + offset
+    counts = _readable(A, np.rint(ideal / quantum), (desired + offset) / quantum)
+    c = -matvec(positive_definite("K_P", K_P, N), quantum * counts - desired)
+    # Slabs |c_i - n_i| <= friction in the null space meet if they do without any one drive (Helly): the virtual work
+    # of the end-effector's motions that keep one drive still.
+    still = cross(A[:, None], A)
+    return bool(np.any(np.all(np.abs(c @ still.T) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
+
+
+def _readable(A: np.ndarray, near: np.ndarray, zero: np.ndarray, reach: int = 4) -> np.ndarray:
+    """Counts (k, N) within `reach` of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
+
+    Strips of the plane share a point if every three of them do (Helly).
+    """
+    steps = np.arange(-reach, reach + 1)
+    counts = np.zeros((1, 0))
+    for k in range(len(A)):
+        column = np.tile(near[k] + steps, len(counts))[:, None]
+        counts = np.concatenate([np.repeat(counts, len(steps), axis=0), column], axis=-1)
+        for i, j in itertools.combinations(range(k), 2):
+            n = np.array([cross(A[j], A[k]), cross(A[k], A[i]), cross(A[i], A[j])])
+            off = (counts[:, [i, j, k]] - zero[[i, j, k]]) @ n
+            counts = counts[np.abs(off) <= np.abs(n).sum() / 2]
+    return counts

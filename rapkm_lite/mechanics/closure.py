@@ -11,23 +11,17 @@ from ..machine.arguments import (
     positive_number,
     real_array,
     solve,
-    transpose,
     whole_number,
 )
 from ..machine.manipulator import Manipulator
-from .kinematics import (
-    arm_vectors,
-    constraint_jacobian,
-    ee_complement,
-    inverse_kinematics,
-    loop_constraints,
-    reachable,
-    wrap,
-)
+from . import cores
+from .at import at
+from .cores import wrap
+from .kinematics import arm_vectors, constraint_jacobian, loop_constraints, reachable
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
-    """The configuration in V nearest to a rough q, (..., 2N) in rad.
+    """The configuration in the c-space V of (3), h(q) = 0, nearest to a rough q, (..., 2N) in rad.
 
     Minimizes ||q' - q||^2 / 2 subject to h(q') = 0 by sequential quadratic programming with the exact Hessian of the
     Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
@@ -41,19 +35,19 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     scale, tolerance = robot.lengths.max(), positive_number("tolerance", tolerance)
     for _ in range(whole_number("iterations", iterations, 1)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
-        Q, R = np.linalg.qr(transpose(J), mode="complete")
+        Q, R = np.linalg.qr(J.mT, mode="complete")
         if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
             break
         range_, tangent = Q[..., :r], Q[..., r:]
-        back = -matvec(range_, np.linalg.solve(transpose(R[..., :r, :]), h[..., None])[..., 0])
+        back = -matvec(range_, np.linalg.solve(R[..., :r, :].mT, h[..., None])[..., 0])
         gradient = q - q0
-        multiplier = -np.linalg.solve(R[..., :r, :], matvec(transpose(range_), gradient)[..., None])[..., 0]
+        multiplier = -np.linalg.solve(R[..., :r, :], matvec(range_.mT, gradient)[..., None])[..., 0]
         hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
-        reduced = transpose(tangent) @ hessian @ tangent
+        reduced = tangent.mT @ hessian @ tangent
         convex = np.linalg.eigvalsh(reduced)[..., 0] > 0.1
         reduced = np.where(convex[..., None, None], reduced, np.eye(2))
-        remainder = matvec(transpose(tangent), gradient)
-        rhs = remainder + np.where(convex[..., None], matvec(transpose(tangent), matvec(hessian, back)), 0.0)
+        remainder = matvec(tangent.mT, gradient)
+        rhs = remainder + np.where(convex[..., None], matvec(tangent.mT, matvec(hessian, back)), 0.0)
         if max(np.abs(h).max(initial=0.0) / scale, np.abs(remainder).max(initial=0.0)) < tolerance:
             return q
         step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
@@ -95,13 +89,13 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     step, limit = np.full(x.shape, np.inf), positive_number("tolerance", tolerance) * robot.lengths.max()
     for _ in range(whole_number("iterations", iterations, 1)):
-        if not np.all(reachable(robot, x)):
+        q, cosine = cores.joint_angles(robot, x, robot.mode)
+        if np.abs(cosine).max(initial=0.0) > 1.0:
             break
-        q = inverse_kinematics(robot, x)
-        A = ee_complement(robot, q)[..., : robot.n_arms, :]
+        A = at(robot, q).A
         residual = wrap(q_a - q[..., : robot.n_arms])
-        gradient = matvec(transpose(A), residual)
-        step = solve("A^T A (an input singularity)", transpose(A) @ A, gradient[..., None])[..., 0]
+        gradient = matvec(A.mT, residual)
+        step = solve("A^T A (an input singularity)", A.mT @ A, gradient[..., None])[..., 0]
         if np.abs(step).max(initial=0.0) < limit:
             return q
         x = x + step

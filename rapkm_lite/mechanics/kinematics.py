@@ -1,4 +1,4 @@
-"""Loop constraints, Jacobians, inverse and forward kinematics, working modes: eqs. (1) and (3).
+"""Loop constraints and their Jacobian (1) on the c-space V (3), inverse and forward kinematics, working modes.
 
 Joint vector q = (base angles of arms 1..N, elbow angles of arms 1..N), rad; elbow angles are relative.
 Every function takes one pose or any leading axes; the last axis is the component.
@@ -10,12 +10,11 @@ import itertools
 
 import numpy as np
 
-from ..machine.arguments import (
-    check_leading,
-    joint_vectors,
-    real_array,
-)
+from ..machine.arguments import check_leading, real_array
 from ..machine.manipulator import Manipulator
+from . import cores
+from .at import at, given
+from .cores import wrap as wrap
 
 
 def turn(v: np.ndarray) -> np.ndarray:
@@ -35,16 +34,14 @@ def unit_vector(angle: np.ndarray) -> np.ndarray:
 
 def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
     """Proximal vectors a_i and distal vectors d_i of all arms, each (..., N, 2) in m."""
-    q = real_array("q", q, robot.n_joints)
-    base, elbow = q[..., : robot.n_arms], q[..., robot.n_arms :]
-    l1, l2 = robot.lengths.T
-    return l1[:, None] * unit_vector(base), l2[:, None] * unit_vector(base + elbow)
+    pose = at(robot, q)
+    return pose.a.copy(), pose.d.copy()
 
 
 def tips(robot: Manipulator, q) -> np.ndarray:
     """Tips of the N arms of the cut tree, (..., N, 2) in m."""
-    a, d = arm_vectors(robot, q)
-    return robot.base + a + d
+    pose = at(robot, q)
+    return robot.base + pose.a + pose.d
 
 
 def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
@@ -52,11 +49,11 @@ def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
 
     On the configuration space V all tips agree; `close_loops` brings a rough q there.
     """
-    return tips(robot, q)[..., 1, :]
+    return at(robot, q).x.copy()
 
 
 def loop_constraints(robot: Manipulator, q) -> np.ndarray:
-    """h(q) of (1), (..., 2(N-1)) in m: (tip_1 - tip_2, tip_3 - tip_2, ..., tip_N - tip_2).
+    """h(q) of the first line of (1), (..., 2(N-1)) in m: (tip_1 - tip_2, tip_3 - tip_2, ..., tip_N - tip_2).
 
     >>> from rapkm_lite import load, inverse_kinematics
     >>> robot = load()
@@ -70,32 +67,18 @@ def loop_constraints(robot: Manipulator, q) -> np.ndarray:
 
 def tip_jacobians(robot: Manipulator, q) -> np.ndarray:
     """d tip_i / d (base angle i, elbow angle i), (..., N, 2, 2) in m/rad."""
-    a, d = arm_vectors(robot, q)
-    return np.stack([turn(a + d), turn(d)], axis=-1)
-
-
-def _cut(robot: Manipulator, blocks: np.ndarray) -> np.ndarray:
-    """Rows tip_i - tip_2 of the constraint Jacobian from the blocks of the single arms."""
-    N = robot.n_arms
-    J = np.zeros((*blocks.shape[:-3], N - 1, 2, 2 * N))
-    for row, arm in enumerate(i for i in range(N) if i != 1):
-        J[..., row, :, [arm, N + arm]] += np.moveaxis(blocks[..., arm, :, :], -1, 0)
-        J[..., row, :, [1, N + 1]] -= np.moveaxis(blocks[..., 1, :, :], -1, 0)
-    return J.reshape(*J.shape[:-3], 2 * (N - 1), 2 * N)
+    columns = at(robot, q).tip_columns
+    return np.stack([columns[..., : robot.n_arms], columns[..., robot.n_arms :]], axis=-1).swapaxes(-3, -2)
 
 
 def constraint_jacobian(robot: Manipulator, q) -> np.ndarray:
-    """J(q) of (3), dh/dt = J qd, (..., 2(N-1), 2N) in m/rad."""
-    return _cut(robot, tip_jacobians(robot, q))
+    """J(q) of the second line of (1), dh/dt = J qd = 0, (..., 2(N-1), 2N) in m/rad."""
+    return at(robot, q).J.copy()
 
 
 def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dJ/dt along qd, (..., 2(N-1), 2N) in m/(rad s), so that d2h/dt2 = J qdd + Jdot qd."""
-    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
-    a, d = arm_vectors(robot, q)
-    base_rate = qd[..., : robot.n_arms, None]
-    link_rate = base_rate + qd[..., robot.n_arms :, None]
-    return _cut(robot, -np.stack([base_rate * a + link_rate * d, link_rate * d], axis=-1))
+    return at(robot, q, given(qd)).J_dot.copy()
 
 
 def reachable(robot: Manipulator, x) -> np.ndarray:
@@ -133,64 +116,29 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
     if not np.all(np.abs(mode) == 1.0):
         raise ValueError(f"mode = {mode}; allowed: +1 or -1 for each of the {robot.n_arms} arms")
     check_leading(x=x.shape[:-1], mode=mode.shape[:-1])
-    l1, l2 = robot.lengths.T
-    D = x[..., None, :] - robot.base
-    reach = np.linalg.norm(D, axis=-1)
-    cosine = (reach**2 - l1**2 - l2**2) / (2 * l1 * l2)
+    q, cosine = cores.joint_angles(robot, x, mode)
     outside = np.abs(cosine) > 1.0 + 1e-12
     if np.any(outside):
         *where, arm = np.argwhere(outside)[0]
-        at = f"x[{', '.join(map(str, where))}]" if where else "x"
-        point, low, high = x[tuple(where)], abs(l1[arm] - l2[arm]), l1[arm] + l2[arm]
+        name = f"x[{', '.join(map(str, where))}]" if where else "x"
+        (l1, l2), point = robot.lengths[arm], x[tuple(where)]
         raise ValueError(
-            f"{at} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is {reach[(*where, arm)]:.6g} m "
-            f"from base point {arm + 1}; allowed: {low:g} to {high:g} m"
+            f"{name} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is "
+            f"{np.hypot(*(point - robot.base[arm])):.6g} m from base point {arm + 1}; "
+            f"allowed: {abs(l1 - l2):g} to {l1 + l2:g} m"
         )
-    elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
-    base = np.arctan2(D[..., 1], D[..., 0]) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
-    return np.concatenate([wrap(base), elbow], axis=-1)
-
-
-def wrap(angle: np.ndarray) -> np.ndarray:
-    """The same angle in (-pi, pi], rad."""
-    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    return q
 
 
 def ee_complement(robot: Manipulator, q) -> np.ndarray:
-    """F for the end-effector position as independent coordinates: qd = F xd, (..., 2N, 2) in rad/m.
+    """F of (5) for the end-effector position as independent coordinates: qd = F xd, (..., 2N, 2) in rad/m.
 
     Regular everywhere inside the workspace, in every working mode.
     Raises ValueError where an arm is stretched or folded (boundary of the workspace).
     """
-    a, d = arm_vectors(robot, q)
-    den = _driving_lever(robot, a, d)
-    base = d / den
-    link = -a / den
-    return np.concatenate([base, link - base], axis=-2)
+    return at(robot, q).F.copy()
 
 
 def ee_complement_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dF/dt of `ee_complement` along qd, (..., 2N, 2) in rad/(m s)."""
-    q, qd = joint_vectors(robot.n_joints, q=q, qd=qd)
-    a, d = arm_vectors(robot, q)
-    den = _driving_lever(robot, a, d)
-    base_rate = qd[..., : robot.n_arms, None]
-    link_rate = base_rate + qd[..., robot.n_arms :, None]
-    a_dot, d_dot = base_rate * turn(a), link_rate * turn(d)
-    den_dot = (cross(a_dot, d) + cross(a, d_dot))[..., None]
-    base = d_dot / den - d * den_dot / den**2
-    link = -a_dot / den + a * den_dot / den**2
-    return np.concatenate([base, link - base], axis=-2)
-
-
-def _driving_lever(robot: Manipulator, a: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """a_i x d_i = l1 l2 sin(elbow angle), (..., N, 1); zero at the boundary of the workspace."""
-    den = cross(a, d)[..., None]
-    small = np.abs(den[..., 0]) < 1e-12 * robot.lengths.prod(axis=1)
-    if np.any(small):
-        arm = np.argwhere(small)[0][-1]
-        raise ValueError(
-            f"q puts arm {arm + 1} on the boundary of the workspace (sin(elbow angle) < 1e-12), where the end-effector "
-            "position is no coordinate; allowed: poses inside, or independent joints instead of the end-effector"
-        )
-    return den
+    return at(robot, q, given(qd)).F_dot.copy()

@@ -1,4 +1,4 @@
-"""Maps over the workspace: actuation measures, and the pair of drives that is best where (sections 2.3 and 4.5).
+"""Maps over the workspace: actuation measures, and the pair of drives that is best where (sections 2.2 and 4.2).
 
 Every map samples the end-effector position on a rectangular grid; points that not all arms reach are masked.
 """
@@ -9,8 +9,8 @@ import numpy as np
 
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
 from ..machine.manipulator import Manipulator
-from .actuation import distal_cross_products, drive_pairs, singular_values
-from .antagonism import null_direction
+from .actuation import distal_cross_products, drive_pairs
+from .cores import prestress_shares, singular_values
 from .kinematics import ee_complement, inverse_kinematics
 from .partition import PARTITION_RULES
 
@@ -46,8 +46,9 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
 
     measure : "sigma_min", the smallest singular value of A~ (10), between 0 and 1, zero at input singularities;
         "condition", the condition number of A in end-effector coordinates, 1 where the drives act alike in all
-        directions, masked where it exceeds 1e12; "cross", the largest |d_j x d_k| of all pairs; "prestress", for three
-        arms, the components |n_i| of the null vector of A^T on a leading axis of length 3.
+        directions, masked where it exceeds 1e12; "cross", the largest |d_j x d_k| of all pairs; "prestress", the
+        largest share |n_i| of each drive in a unit prestress, A^T n = 0, on a leading axis of length N >= 3: for three
+        arms the components of `null_vector`, else the lengths of the rows of `null_basis`.
     mode : working mode (..., N), e.g. ``working_modes(robot)`` for all at once; default ``robot.mode``.
     pair : two 0-based drives that alone are to act, for the first three measures; default all drives.  The zeros are
         then the parameterization singularities of the pair.
@@ -105,7 +106,7 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
 def _redundant_rows(robot: Manipulator, q: np.ndarray) -> np.ndarray:
     """A~ = A (F^T F)^-1 F^T without a decomposition of J, (..., m, 2N)."""
     F = ee_complement(robot, q)
-    return F[..., : robot.n_arms, :] @ np.linalg.inv(np.swapaxes(F, -1, -2) @ F) @ np.swapaxes(F, -1, -2)
+    return F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
 
 
 def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
@@ -132,11 +133,10 @@ def _cross(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
 
 
 def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    n = np.abs(null_direction(robot, q))
-    size = np.linalg.norm(n, axis=-1, keepdims=True)
+    if robot.n_arms < 3:
+        raise ValueError(f"robot has {robot.n_arms} arms, which cannot prestress each other; allowed: 3 or more")
     # At an input singularity every prestress is free: no direction, so the point is masked.
-    n = np.divide(n, size, out=np.full_like(n, np.inf), where=size > 1e-12 * robot.lengths[:, 0].max())
-    return np.moveaxis(n, -1, 0)
+    return np.moveaxis(prestress_shares(ee_complement(robot, q)[..., : robot.n_arms, :]), -1, 0)
 
 
 _MEASURES = {"sigma_min": _sigma_min, "condition": _condition, "cross": _cross, "prestress": _prestress}

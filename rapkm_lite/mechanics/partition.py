@@ -1,40 +1,70 @@
-"""The explicit pseudoinverse (27) from a partition of the redundant control matrix, and the rules that choose it."""
+"""The explicit pseudoinverse (27) from a partition (26) of the redundant control matrix, and rules that choose it."""
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
 
-from ..machine.arguments import (
-    joint_indices,
-    one_of,
-    transpose,
-    wide_matrix,
-)
-from .actuation import full_rank_qr, singular_values
+from ..machine.arguments import joint_indices, one_of, wide_matrix
+from . import cores
+from .linalg import product
 
 
 def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
-    """(A~^T)^+ of (27), (..., m, n), from the partition (26) of A~ into the rows A~_1 and the others, A~_2 = B A~_1:
+    """(A~^T)^+ of (27), (..., m, n), from the partition (26) of A~ into the delta rows A~_1 and the others, A~_2:
 
-    (A~^T)^+ = [I; B] (I + B^T B)^-1 (A~_1^T)^+, the same for every partition with regular A~_1.
+    top    = (A~_1^T)^+ (I_n - A~_2^T (I_{m-delta} + B^T B)^-1 B^T (A~_1^T)^+)
+    bottom = (I_{m-delta} + B^T B)^-1 B^T (A~_1^T)^+,   B = (A~_1^T)^+ A~_2^T, (delta, m - delta), so A~_2 = B^T A~_1.
+    Its point: the only new inverse is (m - delta) x (m - delta), a number for three drives.  Every partition with
+    regular A~_1 gives the same result.
     A_tilde : (..., m, n).  rows : the delta = 2 row indices of A~_1, a pair or (..., 2).
     Raises ValueError where A~_1 has lost rank.
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
+    first, others, back = _partition(rows, A_tilde)
+    A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
+    A1T_pinv = cores.right_inverse("A~_1 of this partition", A1.mT).mT
+    B = product(A1T_pinv, A2.mT)
+    bottom = _solve_small(B, product(B.mT, A1T_pinv))
+    top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
+    return _rows(np.concatenate([top, bottom], axis=-2), back)
+
+
+def _solve_small(B: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """(I + B^T B)^-1 right."""
+    if B.shape[-1] == 1:
+        return right / (1.0 + np.vecdot(B, B, axis=-2)[..., None])
+    return np.linalg.solve(np.eye(B.shape[-1]) + product(B.mT, B), right)
+
+
+def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
+    if index.ndim == 1:
+        return matrix.take(index, axis=-2)
+    return np.take_along_axis(matrix, index[..., None], axis=-2)
+
+
+def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row indices of A~_1, (2,) or (..., 2), of A~_2, and where each row of A~ stands in these."""
+    m = A_tilde.shape[-2]
+    if np.ndim(rows) < 2:
+        rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+        return _fixed_partition(joint_indices("rows", rows, m), m)
     rows = _row_choice(rows, A_tilde)
-    A1 = np.take_along_axis(A_tilde, rows[..., None], axis=-2)
-    Q, R = full_rank_qr("A~_1 of this partition", transpose(A1))
-    A1T_pinv = np.linalg.solve(R, transpose(Q))
-    B_all = A_tilde @ transpose(A1T_pinv)  # the identity in `rows`, B in the others
-    return B_all @ np.linalg.solve(transpose(B_all) @ B_all, A1T_pinv)
+    taken = (np.arange(m) == rows[..., None]).any(axis=-2)
+    others = np.argsort(taken, axis=-1, kind="stable")[..., : m - 2]
+    return rows, others, np.argsort(np.concatenate([rows, others], axis=-1), axis=-1)
+
+
+@functools.cache
+def _fixed_partition(first: tuple[int, int], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    others = [i for i in range(m) if i not in first]
+    return np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
 
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
-    if np.ndim(rows) < 2:
-        return np.broadcast_to(joint_indices("rows", rows, m), (*lead, 2))
     rows = np.asarray(rows)
     if rows.dtype.kind not in "iu" or rows.shape != (*lead, 2):
         raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: a pair of indices or {(*lead, 2)}")
@@ -45,25 +75,29 @@ def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
 
 
 def _inverse_condition(A: np.ndarray) -> np.ndarray:
-    sigma = singular_values(A)
+    sigma = cores.singular_values(A)
     return sigma[..., 1] / np.maximum(sigma[..., 0], 1e-300)
 
 
 PARTITION_RULES = {
-    "sigma_min": lambda A1: singular_values(transpose(A1))[..., 1],
-    "condition": lambda A1: _inverse_condition(transpose(A1)),
+    "sigma_min": lambda A1: cores.singular_values(A1.mT)[..., 1],
+    "condition": lambda A1: _inverse_condition(A1.mT),
     "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
 }
 
 
+@functools.cache
+def _pairs(m: int) -> np.ndarray:
+    return np.array(list(itertools.combinations(range(m), 2)))
+
+
 def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
-    """Rows (..., 2) of A~ (..., m, n) that make the best A~_1 for (27).
+    """Rows (..., 2) of A~ (..., m, n) that make the best A~_1 in the partition (26), for (27).
 
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
-    is the chapter's smallest row-sum norm, for study only: it is the wrong way round.
+    is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
     one_of("rule", rule, PARTITION_RULES)
-    pairs = np.array(list(itertools.combinations(range(A_tilde.shape[-2]), 2)))
-    merit = np.stack([PARTITION_RULES[rule](A_tilde[..., pair, :]) for pair in pairs], axis=-1)
-    return pairs[np.argmax(merit, axis=-1)]
+    pairs = _pairs(A_tilde.shape[-2])
+    return pairs[np.argmax(PARTITION_RULES[rule](A_tilde.take(pairs, axis=-2)), axis=-1)]

@@ -1,0 +1,250 @@
+"""`at`: everything the chapter writes with one letter, at one pose or many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..machine.arguments import check_leading, joint_indices, real_array
+from ..machine.manipulator import Manipulator
+from ..machine.values import Value
+from . import cores
+
+
+class quantity:
+    """A property that is computed when asked for, then kept, with its arrays read-only."""
+
+    needs_rates = False
+
+    def __init__(self, function):
+        self.function, self.name, self.__doc__ = function, function.__name__, function.__doc__
+
+    def __get__(self, pose, cls):
+        if pose is None:
+            return self
+        if self.needs_rates and pose.qd is None:
+            raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
+        value = pose.__dict__[self.name] = self.function(pose)
+        if type(value) is tuple:
+            for array in value:
+                array.setflags(False)
+        else:
+            value.setflags(False)
+        return value
+
+
+class rate(quantity):
+    """A `quantity` that needs qd."""
+
+    needs_rates = True
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class At(Value):
+    """The machine at the pose q, moving at the rate qd; made by `at`.  The last axes are those of the symbol.
+
+    A quantity is computed when it is asked for the first time, and kept; all arrays are read-only (copy one to change
+    it: ``at.G.copy()``).  Those that need qd raise ValueError when it was not given, those that do not exist at a
+    singular pose raise there.  F, A and what follows from them belong to the end-effector position as independent
+    coordinates, or to the two joints chosen by `using`.
+    """
+
+    robot: Manipulator
+    q: np.ndarray
+    qd: np.ndarray | None = None
+    independent: tuple[int, int] | None = None
+
+    def using(self, independent) -> At:
+        """The same pose with two 0-based joint indices (or None: the end-effector) as independent coordinates q2."""
+        if independent is not None:
+            independent = joint_indices("independent", independent, self.robot.n_joints)
+        if independent == self.independent:
+            return self
+        shared = {name: value for name, value in self.__dict__.items() if name not in _OF_COORDINATES}
+        other = object.__new__(At)
+        other.__dict__.update(shared, independent=independent)
+        return other
+
+    def __repr__(self):
+        lead = self.q.shape[:-1]
+        count = f"{int(np.prod(lead))} poses" if lead else "1 pose"
+        coordinates = "" if self.independent is None else f", independent joints {self.independent}"
+        return f"At({self.robot.name!r}, {count}{', with rates' if self.qd is not None else ''}{coordinates})"
+
+    # Geometry.
+    @quantity
+    def _v(self):
+        return cores.link_vectors(self.robot.tree, self.q)
+
+    @rate
+    def _rates(self):
+        return cores.link_rates(self.robot.tree, self.qd)
+
+    @quantity
+    def tip_columns(self) -> np.ndarray:
+        """d tip_i / d joint, the column of every joint, (..., 2, 2N), m/rad."""
+        return cores.tip_columns(self.robot.tree, self._v)
+
+    @quantity
+    def a(self) -> np.ndarray:
+        """Proximal vectors (..., N, 2), m."""
+        return self._links(0)
+
+    @quantity
+    def d(self) -> np.ndarray:
+        """Distal vectors (..., N, 2), m."""
+        return self._links(1)
+
+    def _links(self, k):
+        N = self.robot.n_arms
+        return self._v.reshape(*self.q.shape[:-1], 2, 2, N)[..., k, :].mT
+
+    @quantity
+    def x(self) -> np.ndarray:
+        """End-effector position (..., 2), m: the tip of arm 2, from which the others are cut."""
+        return self.robot.base[1] + self.a[..., 1, :] + self.d[..., 1, :]
+
+    @rate
+    def xd(self) -> np.ndarray:
+        """End-effector velocity (..., 2), m/s: that of the tip of arm 2."""
+        elbow = self.robot.n_arms + 1
+        columns, qd = self.tip_columns, self.qd[..., None, :]
+        return columns[..., 1] * qd[..., 1] + columns[..., elbow] * qd[..., elbow]
+
+    @quantity
+    def J(self) -> np.ndarray:
+        """Constraint Jacobian (..., r, 2N) of (1), m/rad."""
+        return cores.constraint_jacobian(self.robot.tree, self._v)
+
+    @rate
+    def J_dot(self) -> np.ndarray:
+        """dJ/dt (..., r, 2N), m/(rad s)."""
+        return cores.constraint_jacobian_dot(self.robot.tree, self._v, self._rates)
+
+    # Minimal coordinates.
+    @quantity
+    def _levers(self):
+        return cores.inner_levers(self.robot.tree, self._v)
+
+    @quantity
+    def _over(self):
+        return self._v / self._levers
+
+    @quantity
+    def F(self) -> np.ndarray:
+        """Orthogonal complement (5), qd = F q2d, J F = 0, (..., 2N, 2)."""
+        if self.independent is not None:
+            return cores.joint_complement(self.J, self.independent)
+        return cores.complement(self.robot.tree, self._over)
+
+    @rate
+    def F_dot(self) -> np.ndarray:
+        """dF/dt, (..., 2N, 2)."""
+        if self.independent is not None:
+            return cores.joint_complement_dot(self.J, self.J_dot, self.F, self.independent)
+        tree = self.robot.tree
+        return cores.complement(tree, cores.over_lever_dot(
+            tree, self._v, self._levers, self._over, self._rates, self.qd))
+
+    @quantity
+    def A(self) -> np.ndarray:
+        """Control matrix of (6), qd_a = A q2d, (..., m, 2)."""
+        return self.F[..., : self.robot.n_arms, :]
+
+    @quantity
+    def A_T_pinv(self) -> np.ndarray:
+        """(A^T)^+ = A (A^T A)^-1 of (11) and (14), (..., m, 2)."""
+        return cores.right_inverse("A", self.A)
+
+    @rate
+    def minimal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gbar, Cbar, Qbar of (7): (..., 2, 2), (..., 2, 2), (..., 2)."""
+        return cores.minimal(self.F, self.F_dot, self.G, self.C, self.Q)
+
+    # The cut tree (2).
+    @quantity
+    def G(self) -> np.ndarray:
+        """Mass matrix of (2), (..., 2N, 2N), kg m^2."""
+        return cores.mass_matrix(self.robot.tree, self.q)
+
+    @rate
+    def C(self) -> np.ndarray:
+        """Coriolis matrix of (2), (..., 2N, 2N), N m s."""
+        return cores.coriolis_matrix(self.robot.tree, self.q, self.qd)
+
+    @rate
+    def Q(self) -> np.ndarray:
+        """Remaining forces of (2), (..., 2N), N m, on the left-hand side."""
+        return cores.generalized_forces(self.robot.tree, self._v, self.qd, self.robot.friction_velocity)
+
+    # Redundant coordinates.
+    @quantity
+    def _row_space(self):
+        return cores.row_space(self.robot.tree, self.J)
+
+    @quantity
+    def N(self) -> np.ndarray:
+        """N_J = I - J^+ J of section 4.3, the orthogonal projector onto the tangent space of V, (..., 2N, 2N)."""
+        return cores.projector(self._row_space[0])
+
+    @rate
+    def N_dot(self) -> np.ndarray:
+        """dN_J/dt of the text after (24), (..., 2N, 2N), 1/s."""
+        return cores.projector_dot(*self._row_space, self.J_dot, self.N)
+
+    @quantity
+    def A_tilde(self) -> np.ndarray:
+        """A~ of (21), qd_a = A~ qd, the rows of N_J of the driven joints, (..., m, 2N)."""
+        return self.N[..., : self.robot.n_arms, :]
+
+    @quantity
+    def A_tilde_T_pinv(self) -> np.ndarray:
+        """(A~^T)^+ of (25), (..., m, 2N); by (27) it comes from A~ alone, here from the tangent space of V."""
+        return cores.redundant_right_inverse(cores.tangent(self._row_space[0], self.J), self.robot.n_arms)
+
+    @rate
+    def redundant(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """G~, C~, Q~ of (24): (..., 2N, 2N), (..., 2N, 2N), (..., 2N)."""
+        return cores.redundant(self.N, self.N_dot, self.G, self.C, self.Q)
+
+
+_OF_COORDINATES = ("independent", "F", "F_dot", "A", "A_T_pinv", "minimal", "_hash")
+
+
+def at(robot: Manipulator, q, qd=None) -> At:
+    """Everything at one pose q (2N,), or many (..., 2N), rad, moving at qd (..., 2N), rad/s: an `At`.
+
+    Checked once, each quantity computed when asked for and kept.  Its attributes are the symbols of the notation table:
+    J, J_dot, F, F_dot, A, A_T_pinv, minimal (Gbar, Cbar, Qbar), G, C, Q, N, N_dot, A_tilde, A_tilde_T_pinv, redundant
+    (G~, C~, Q~), and x, xd, a, d.  ``.using((0, 1))`` takes the joints 0 and 1 as independent coordinates instead of
+    the end-effector position.
+    Raises ValueError when q or qd is not finite, has another last axis, or leading axes do not fit together.
+
+    >>> from rapkm_lite import load, inverse_kinematics
+    >>> robot = load()
+    >>> pose = at(robot, inverse_kinematics(robot, [0.02, 0.05]))
+    >>> bool(abs(pose.J @ pose.F).max() < 1e-15), pose.A_tilde.shape
+    (True, (3, 6))
+    """
+    n = robot.n_joints
+    q = _copy("q", q, n)
+    if qd is not None:
+        qd = _copy("qd", qd, n)
+        if qd.shape != q.shape:
+            check_leading(q=q.shape[:-1], qd=qd.shape[:-1])
+    pose = object.__new__(At)
+    fields = pose.__dict__
+    fields["robot"], fields["q"], fields["qd"], fields["independent"] = robot, q, qd, None
+    return pose
+
+
+def given(qd):
+    """The rates of a function that needs them: None is refused like anything else that is no array."""
+    return real_array("qd", qd) if qd is None else qd
+
+
+def _copy(name: str, value, n: int) -> np.ndarray:
+    array = real_array(name, value, n).copy()
+    array.setflags(False)
+    return array

@@ -1,0 +1,269 @@
+"""The formulas, one function per quantity, on arrays that were checked before; leading axes are free.
+
+`at` evaluates them once per pose and keeps the results; the public functions are checked shells around it.
+Link vectors are flat, v (..., 4N) in m, as `machine.tree` says; `tree` holds the constant tables.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..machine.arguments import matvec
+from ..machine.tree import Tree
+from .linalg import linear, orthogonal, pivots, product, solve
+
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+def wrap(angle: np.ndarray) -> np.ndarray:
+    """The same angle in (-pi, pi], rad."""
+    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+
+
+def joint_angles(robot, x: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """q (..., 2N) of the end-effector at x, and the cosines of the elbow angles, beyond 1 where x is out of reach."""
+    l1, l2 = robot.lengths.T
+    D = x[..., None, :] - robot.base
+    dx, dy = D[..., 0], D[..., 1]
+    cosine = (np.sqrt(dx * dx + dy * dy) ** 2 - l1**2 - l2**2) / (2 * l1 * l2)
+    elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
+    base = np.arctan2(dy, dx) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
+    return np.concatenate([wrap(base), elbow], axis=-1), cosine
+
+
+def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """v: a_i = l1 (cos, sin)(base angle), d_i = l2 (cos, sin)(base + elbow angle)."""
+    angle = linear(q, tree.absolute)
+    v = np.empty((*q.shape[:-1], 2 * tree.n))
+    np.cos(angle, out=v[..., : tree.n])
+    np.sin(angle, out=v[..., tree.n :])
+    v *= tree.lengths
+    return v
+
+
+def link_rates(tree: Tree, qd: np.ndarray) -> np.ndarray:
+    """Rate of turn of every link against the x axis, once for each entry of v, (..., 4N)."""
+    return linear(linear(qd, tree.absolute), tree.spread_links)
+
+
+def _matrix(flat: np.ndarray, *shape: int) -> np.ndarray:
+    return flat.reshape(shape) if flat.ndim == 1 else flat.reshape(*flat.shape[:-1], *shape)
+
+
+def tip_columns(tree: Tree, v: np.ndarray) -> np.ndarray:
+    """d tip_i / d joint, (..., 2, 2N): E (a_i + d_i) for the base joints, E d_i for the elbows."""
+    return _matrix(linear(v, tree.tips), 2, tree.n)
+
+
+def constraint_jacobian(tree: Tree, v: np.ndarray) -> np.ndarray:
+    """J, (..., r, 2N): the columns of the cut arms minus those of arm 2."""
+    return _matrix(linear(v, tree.jacobian), tree.r, tree.n)
+
+
+def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """dJ/dt, (..., r, 2N): a link vector that turns at the rate w changes by w E v, and E E = -1."""
+    return _matrix(linear(v * rates, tree.jacobian_dot), tree.r, tree.n)
+
+
+def levers(tree: Tree, v: np.ndarray) -> np.ndarray:
+    """a_i x d_i = l1 l2 sin(elbow angle), (..., N)."""
+    N, n = tree.N, tree.n
+    return v[..., :N] * v[..., n + N :] - v[..., n : n + N] * v[..., N:n]
+
+
+def inner_levers(tree: Tree, v: np.ndarray) -> np.ndarray:
+    """`levers`, after a check that no arm is stretched or folded; one for each entry of v, (..., 4N)."""
+    lever = levers(tree, v)
+    small = np.abs(lever) < tree.edge
+    if small.any():
+        arm = np.argwhere(small)[0][-1]
+        raise ValueError(
+            f"q puts arm {arm + 1} on the boundary of the workspace (sin(elbow angle) < 1e-12), where the end-effector "
+            "position is no coordinate; allowed: poses inside, or independent joints instead of the end-effector"
+        )
+    return linear(lever, tree.spread_arms)
+
+
+def complement(tree: Tree, over: np.ndarray) -> np.ndarray:
+    """F for the end-effector position, qd = F xd, (..., 2N, 2) in rad/m, from v over the levers.
+
+    The base joint of an arm turns at d . xd / (a x d), its distal link at -a . xd / (a x d).
+    """
+    return _matrix(linear(over, tree.complement), tree.n, 2)
+
+
+def over_lever_dot(tree: Tree, v, lever, over, rates, qd) -> np.ndarray:
+    """d(v / lever)/dt = (E v w - (v / lever) d(lever)/dt) / lever, with d(a x d)/dt = (a . d) times the elbow rate."""
+    N, n = tree.N, tree.n
+    along = v[..., :N] * v[..., N:n] + v[..., n : n + N] * v[..., n + N :]
+    lever_dot = linear(along * qd[..., N:], tree.spread_arms)
+    return (linear(v, tree.turn) * rates - over * lever_dot) / lever
+
+
+def joint_complement(J: np.ndarray, independent) -> np.ndarray:
+    """F of (5) for two joints as q2: the identity in their rows, -J1^-1 J2 in the others, (..., 2N, 2)."""
+    dependent = _others(J.shape[-1], independent)
+    J1 = J[..., dependent]
+    measure = np.linalg.svd(J1, compute_uv=False)[..., -1] / np.linalg.svd(J, compute_uv=False)[..., 0]
+    if np.any(measure < 1e-12):
+        raise ValueError(
+            f"independent = {tuple(independent)} is singular here: its measure sigma_min(J1)/sigma_max(J) is "
+            f"{np.min(measure):.3g}, needed: >= 1e-12; choose another pair, or None for the end-effector position"
+        )
+    F = np.zeros((*J.shape[:-2], J.shape[-1], 2))
+    F[..., independent, [0, 1]] = 1.0
+    F[..., dependent, :] = -np.linalg.solve(J1, J[..., independent])
+    return F
+
+
+def joint_complement_dot(J, J_dot, F, independent) -> np.ndarray:
+    """dF/dt of `joint_complement`: from J F = 0 the dependent rows are -J1^-1 Jdot F."""
+    dependent = _others(J.shape[-1], independent)
+    rows = -np.linalg.solve(J[..., dependent], J_dot @ F)
+    F_dot = np.zeros((*rows.shape[:-2], J.shape[-1], 2))
+    F_dot[..., dependent, :] = rows
+    return F_dot
+
+
+def _others(n: int, indices) -> list[int]:
+    return [j for j in range(n) if j not in indices]
+
+
+def mass_matrix(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """G of (2), (..., 2N, 2N); the cosine of an elbow angle couples the two joints of its arm."""
+    return _matrix(tree.inertia + linear(np.cos(q), tree.coupling), tree.n, tree.n)
+
+
+def coriolis_matrix(tree: Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """C of (2) from the Christoffel symbols, (..., 2N, 2N)."""
+    return _matrix(linear(np.sin(q).take(tree.elbow, axis=-1) * qd, tree.christoffel), tree.n, tree.n)
+
+
+def generalized_forces(tree: Tree, v: np.ndarray, qd: np.ndarray, v0: float) -> np.ndarray:
+    """Q of (2), (..., 2N): gravity on the links, and friction f_c tanh(qd / v0) in the base joints."""
+    return linear(v, tree.weight) + tree.friction * np.tanh(qd / v0)
+
+
+def row_space(tree: Tree, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Q1 (..., 2N, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
+
+    Raises ValueError where J lacks full rank.
+    """
+    Q, R = orthogonal(J.mT, complete=J.ndim == 2)
+    size = pivots(R)[0] / tree.longest
+    if size < 1e-12:
+        raise ValueError(
+            f"q is a c-space singularity: J has lost rank (relative pivot {size:.3g}); allowed: configurations with "
+            f"rank J = r = {tree.r}"
+        )
+    return Q, R
+
+
+def tangent(Q: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """Orthonormal basis T of the tangent space of V, (..., 2N, 2), from `row_space`."""
+    if J.ndim > 2:
+        Q, _ = orthogonal(J.mT, complete=True)
+    return Q[..., -2:]
+
+
+def projector(Q: np.ndarray) -> np.ndarray:
+    """N_J = T T^T = I - Q1 Q1^T, from `row_space`, (..., 2N, 2N)."""
+    if Q.ndim == 2:
+        return product(Q[:, -2:], Q[:, -2:].T)
+    return np.eye(Q.shape[-2]) - Q @ Q.mT
+
+
+def projector_dot(Q, R, J_dot, N) -> np.ndarray:
+    """-(J^+ Jdot N_J) - (J^+ Jdot N_J)^T with J^+ = Q1 R^-T, (..., 2N, 2N)."""
+    half = product(Q[..., : R.shape[-1]], solve(R.mT, product(J_dot, N)))
+    return -half - half.mT
+
+
+def minimal(F, F_dot, G, C, Q):
+    """(7): Gbar = F^T G F, Cbar = F^T (C F + G Fdot), Qbar = F^T Q."""
+    return product(F.mT, G, F), product(F.mT, product(C, F) + product(G, F_dot)), matvec(F.mT, Q)
+
+
+def redundant(N, N_dot, G, C, Q):
+    """(24): G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), Q~ = N_J Q."""
+    return product(N, G, N), product(N, product(C, N) + product(G, N_dot)), matvec(N, Q)
+
+
+def full_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Q and R of A (..., m, k); raises ValueError where A has lost rank."""
+    Q, R = orthogonal(A)
+    measure = pivots(R)[1]
+    if measure < 1e-12:
+        raise ValueError(
+            f"{name} has lost rank (relative pivot {measure:.3g}): an input singularity, where the drives cannot "
+            "produce every control force; allowed: poses with the full degree of actuation"
+        )
+    return Q, R
+
+
+def right_inverse(name: str, A: np.ndarray) -> np.ndarray:
+    """(A^T)^+ = A (A^T A)^-1 = Q R^-T, (..., m, k), of a tall A with full rank."""
+    Q, R = full_rank(name, A)
+    return solve(R, Q.mT).mT
+
+
+def minors(A: np.ndarray) -> np.ndarray:
+    """A_j x A_k of the rows of (..., m, 2), for all pairs j < k, (..., m(m - 1)/2)."""
+    j, k = _pairs(A.shape[-2])
+    u, v = A[..., 0], A[..., 1]
+    return u.take(j, axis=-1) * v.take(k, axis=-1) - u.take(k, axis=-1) * v.take(j, axis=-1)
+
+
+@functools.cache
+def _pairs(m: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.triu_indices(m, 1)
+
+
+def singular_values(A: np.ndarray) -> np.ndarray:
+    """Both singular values of (..., m, 2), largest first; by Lagrange the minors give their product."""
+    u, v = A[..., 0], A[..., 1]
+    X = minors(A)
+    uu, vv, uv, area = np.vecdot(u, u), np.vecdot(v, v), np.vecdot(u, v), np.sqrt(np.vecdot(X, X))
+    sigma = np.empty((*area.shape, 2))
+    sigma[..., 0] = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
+    sigma[..., 1] = area / np.maximum(sigma[..., 0], 1e-300)
+    return sigma
+
+
+def prestress_shares(A: np.ndarray) -> np.ndarray:
+    """Length of the rows of a null basis of A^T, (..., m) for A (..., m, 2); infinite at input singularities.
+
+    By Cauchy-Binet the square is det(A_-i^T A_-i) / det(A^T A) with A_-i the other rows, both sums of squared minors.
+    """
+    j, k = _pairs(A.shape[-2])
+    drives = np.arange(A.shape[-2])
+    without = ((drives != j[:, None]) & (drives != k[:, None])).astype(float)
+    squares = minors(A) ** 2
+    whole = squares.sum(axis=-1, keepdims=True)
+    regular = whole > 1e-24 * (A * A).sum(axis=(-2, -1))[..., None] ** 2
+    part = squares @ without
+    return np.sqrt(np.divide(part, whole, out=np.full_like(part, np.inf), where=regular))
+
+
+def redundant_right_inverse(T: np.ndarray, m: int) -> np.ndarray:
+    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of `tangent`: A~^T = T T_a^T, (..., m, 2N).
+
+    T_a has two columns, so its minors X_ij = t_i x t_j say it all: det(T_a^T T_a) is the sum of their squares over
+    i < j, without cancellation, and (T_a^T)^+ = X E T_a over it.
+    """
+    driven = T[..., :m, :]
+    turned = product(driven, _QUARTER)
+    X = product(driven, turned.mT)
+    if X.ndim == 2:
+        square = smallest = float(np.vdot(X, X)) / 2
+    else:
+        square = (X * X).sum((-2, -1), keepdims=True) / 2
+        smallest = square.min(initial=np.inf)
+    if smallest < 1e-24:
+        raise ValueError(
+            f"A~ has lost rank (product of its singular values {smallest**0.5:.3g}): an input singularity, "
+            "where the drives cannot produce every control force; allowed: poses with the full degree of actuation"
+        )
+    return product(X, turned, T.mT) / square

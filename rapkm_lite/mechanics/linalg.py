@@ -1,0 +1,76 @@
+"""Linear algebra for one small matrix or many: NumPy's wrappers cost more than the arithmetic of a single one."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+
+def product(first: np.ndarray, *others: np.ndarray) -> np.ndarray:
+    """Matrix product first @ ..., with ``ndarray.dot`` where it means the same, at a third of the cost."""
+    for matrix in others:
+        first = first.dot(matrix) if first.ndim <= 2 and matrix.ndim <= 2 else first @ matrix
+    return first
+
+
+def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """vector (..., i) times a constant table (i, j).
+
+    Many vectors go in blocks, each too small for OpenBLAS to wake its threads, which would cost more than they save.
+    """
+    if vector.ndim == 1:
+        return vector.dot(table)
+    rows = vector.reshape(-1, len(table))
+    result, block = np.empty((len(rows), table.shape[1])), 512
+    for k in range(0, len(rows), block):
+        np.dot(rows[k : k + block], table, out=result[k : k + block])
+    return result.reshape(*vector.shape[:-1], table.shape[1])
+
+
+@functools.cache
+def _lapack():
+    from scipy.linalg import lapack  # only when needed: importing the package stays light
+
+    return lapack.dgeqrf, lapack.dorgqr, lapack.dgesv
+
+
+@functools.cache
+def _upper(k: int) -> np.ndarray:
+    return np.asfortranarray(np.triu(np.ones((k, k))))
+
+
+def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Q (..., m, k), or (..., m, m) when `complete`, and the upper triangle R (..., k, k) of M = Q[..., :k] R."""
+    m, k = M.shape[-2:]
+    if M.ndim > 2:
+        Q, R = np.linalg.qr(M, mode="complete" if complete else "reduced")
+        return Q, R[..., :k, :]
+    factor, generate, _ = _lapack()
+    packed, scales, _, _ = factor(M)
+    R = packed[:k] * _upper(k)
+    if complete:
+        start = np.empty((m, m), order="F")
+        start[:, :k] = packed
+        return generate(start, scales, overwrite_a=1)[0], R
+    return generate(packed, scales, overwrite_a=1)[0], R
+
+
+def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solution of matrix @ X = right for a regular matrix, such as R or R^T of `orthogonal`.
+
+    For one matrix by LAPACK's general solver: its triangular one wakes the threads of OpenBLAS for any size.
+    """
+    if matrix.ndim == 2 and right.ndim == 2:
+        return _lapack()[2](matrix, right)[2]
+    return np.linalg.solve(matrix, right)
+
+
+def pivots(R: np.ndarray) -> tuple[float, float]:
+    """Smallest pivot |R_ii|, and smallest relative to the largest one of its matrix, over all leading axes."""
+    if R.ndim == 2:
+        size = [abs(pivot) for pivot in R.diagonal().tolist()]
+        return min(size), min(size) / max(max(size), 1e-300)
+    size = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
+    relative = size.min(axis=-1) / np.maximum(size.max(axis=-1), 1e-300)
+    return float(size.min(initial=np.inf)), float(relative.min(initial=np.inf))
