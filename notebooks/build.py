@@ -3,14 +3,17 @@
     python notebooks/build.py                # everything
     python notebooks/build.py 03 04          # the notebooks whose names begin so
     python notebooks/build.py overview       # the picture of the README
+    python notebooks/build.py figures        # nothing but the list of all figures
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
-``NN_name.ipynb``.  Notebooks without a solution are executed as they are.
+``NN_name.ipynb``.  Notebooks without a solution are executed as they are.  ``rapkm_lite/plotting.py``, the list of
+all figures, is written anew each time.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import sys
@@ -20,6 +23,7 @@ import nbformat
 
 HERE = Path(__file__).resolve().parent
 SOLUTIONS = HERE / "solutions"
+PACKAGE = HERE.parent / "rapkm_lite"
 WIDGET = "application/vnd.jupyter.widget-view+json"
 _SOLUTION = re.compile(r"^([ \t]*)### BEGIN SOLUTION *\n(.*?)^[ \t]*### END SOLUTION *\n?", re.M | re.S)
 
@@ -108,12 +112,47 @@ def overview() -> None:
     fig.savefig(HERE / "overview.png")
 
 
+def defined(path: Path) -> list[str]:
+    """Public functions and constants that a module defines, without what it imports."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    names = [node.name for node in body if isinstance(node, ast.FunctionDef)]
+    for node in body:
+        if isinstance(node, ast.Assign):
+            targets = node.targets[0].elts if isinstance(node.targets[0], ast.Tuple) else node.targets
+            names += [target.id for target in targets]
+    # Constants before functions, as the import sorter has them.
+    return sorted((n for n in names if not n.startswith("_")), key=lambda n: (not n.isupper(), n))
+
+
+def figure_list() -> str:
+    """The text of ``rapkm_lite/plotting.py``: every figure of the shared room and of every lesson, by name."""
+    rooms = sorted(PACKAGE.glob("figures/[!_]*.py")) + sorted(PACKAGE.glob("lessons/lesson*/figures.py"))
+    owner, text = {}, [
+        '"""Every figure under one name: ``plotting.plot_x(..., ax=None) -> ax``; one colour per arm everywhere.',
+        "",
+        "Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.",
+        '"""',
+        "",
+    ]
+    for path in rooms:
+        module = "." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        names = [n for n in defined(path) if module.startswith(".figures") or n.startswith("plot_")]
+        for name in names:
+            if name in owner:
+                raise ValueError(f"{name} stands in {owner[name]} and in {module}; allowed: one figure of that name")
+            owner[name] = module
+        if names:
+            text += [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+    return "\n".join([*text, "", "__all__ = [", *(f'    "{name}",' for name in sorted(owner)), "]", ""])
+
+
 def main(wanted: list[str]) -> None:
     """Build the notebooks whose names begin with one of `wanted`, or all."""
 
     def chosen(path: Path) -> bool:
         return not wanted or any(path.name.startswith(w) for w in wanted)
 
+    (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
     solved = {path.name for path in SOLUTIONS.glob("*.ipynb")}
     for path in sorted(filter(chosen, SOLUTIONS.glob("*.ipynb"))):
         print(f"solutions/{path.name}", flush=True)

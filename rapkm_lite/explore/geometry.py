@@ -8,15 +8,15 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from ..figures.actuation import pair_line, pair_name
+from ..figures.machine import plane_grid, plot_workspace
+from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
 from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import circle, triangle
-from ..plotting.actuation import pair_line, pair_name
-from ..plotting.machine import plane_grid, plot_workspace
-from ..plotting.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from .builder import Explorer, choice, explorer, slider
 from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive, plane_limits
 

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrow, Polygon, Rectangle
 from PIL import Image
 
-from ..plotting.style import ALARM, STYLE
+from ..figures.style import ALARM, STYLE
 
 _RC = mpl.rc_params_from_file(STYLE, use_default_template=False)
 

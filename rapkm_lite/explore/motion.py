@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from ..control.laws import PD
+from ..figures.machine import plot_path, plot_workspace
+from ..figures.style import AFTER, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.trajectory import triangle
-from ..plotting.machine import plot_path, plot_workspace
-from ..plotting.style import AFTER, NEUTRAL, arm_colour, arm_line
 from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider, switch
 from .parts import TIME, draw_machine, drive_legend, frictionless, plane_limits

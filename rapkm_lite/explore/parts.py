@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.lines import Line2D
 
+from ..figures.style import NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator, load
 from ..mechanics.kinematics import arm_vectors
-from ..plotting.style import NEUTRAL, arm_colour, arm_line
 from .builder import slider
 
 TIME = "time in s"

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
+from ..figures.actuation import pair_line, pair_name
+from ..figures.machine import plane_grid, plot_workspace
+from ..figures.style import AFTER, NEUTRAL, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.kinematics import inverse_kinematics, reachable
 from ..mechanics.trajectory import triangle
-from ..plotting.actuation import pair_line, pair_name
-from ..plotting.machine import plane_grid, plot_workspace
-from ..plotting.style import AFTER, NEUTRAL, arm_line
 from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider
 from .geometry import pair_legend

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-
-LESSONS = ("lesson01", "lesson02", "lesson03", "lesson04", "lesson05", "lesson06")
 
 
 @dataclass(frozen=True)
@@ -31,17 +30,17 @@ class Exercise:
     tolerance: float = 1e-9
 
 
+def lessons() -> list[str]:
+    """Names of the lessons that have a folder here, in their order: "lesson00", "lesson01", ..."""
+    return sorted(room.name for room in Path(__file__).parent.glob("lesson[0-9][0-9]"))
+
+
 def exercises() -> dict[str, Exercise]:
-    """All exercises by name, e.g. "01.loop_constraints"."""
+    """All exercises by name, e.g. "01.loop_constraints": the EXERCISES of every lesson that has some."""
     found = {}
-    for lesson in LESSONS:
-        try:
-            module = importlib.import_module(f"{__package__}.{lesson}")
-        except ModuleNotFoundError as error:
-            if error.name != f"{__package__}.{lesson}":
-                raise
-            continue
-        found |= module.EXERCISES
+    for lesson in lessons():
+        if importlib.util.find_spec(f"{__package__}.{lesson}.exercises"):
+            found |= importlib.import_module(f"{__package__}.{lesson}.exercises").EXERCISES
     return found
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..control.stability import effective_gain, feedback_norm
-from ..machine.arguments import transpose
-from ..mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
-from ..mechanics.dynamics import orthogonal_complement
-from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.maps import workspace_grid
-from ..mechanics.partition import select_independent
-from .actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
-from .machine import plot_path, plot_workspace
-from .runs import plot_errors, plot_torques
-from .style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...control.stability import effective_gain, feedback_norm
+from ...figures.actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
+from ...figures.machine import plot_path, plot_workspace
+from ...figures.runs import plot_errors, plot_torques
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...machine.arguments import transpose
+from ...mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
+from ...mechanics.dynamics import orthogonal_complement
+from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.maps import workspace_grid
+from ...mechanics.partition import select_independent
 
 # Wrong, makeshift, right: the same look in every figure of the lesson.
 _LAW_LINES = {

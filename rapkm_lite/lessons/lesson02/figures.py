@@ -1,75 +1,22 @@
-"""Actuation over the workspace: control fields, mode maps, parameterization singularities (fig. 8), prestress."""
+"""Figures of lesson 02: control fields, mode maps, parameterization singularities (fig. 8), prestress."""
 
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib import patheffects
 
-from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import (
+from ...figures.actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
+from ...figures.machine import plot_machine, plot_path, plot_workspace
+from ...figures.style import ALARM, NEUTRAL, arm_line, axes_or_new
+from ...mechanics.actuation import (
     control_matrix,
     control_vector_fields,
-    distal_cross_products,
     drive_pairs,
     force_polygon,
     singular_values,
 )
-from ..mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
-from ..mechanics.maps import workspace_grid
-from .machine import plot_machine, plot_path, plot_workspace
-from .style import ALARM, NEUTRAL, arm_line, axes_or_new
-
-_OUTLINED = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
-
-
-def pair_name(pair: tuple[int, int]) -> str:
-    """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
-    return f"({pair[0] + 1},{pair[1] + 1})"
-
-
-def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
-    """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
-    left_out = [i for i in range(robot.n_arms) if i not in pair]
-    return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
-
-
-def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
-    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y."""
-    ax = axes_or_new(ax, figsize=(4.6, 3.9))
-    # What lies under the mask may be anything; colour maps look at it.
-    values = np.ma.array(np.ma.filled(values, 0.0), mask=np.ma.getmaskarray(values))
-    mesh = ax.pcolormesh(x, y, values, cmap="cividis", vmin=vmin, vmax=vmax, shading="nearest", rasterized=True)
-    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
-    ax.grid(False)
-    if bar:
-        extend = "max" if vmax is not None and values.max() > vmax else "neither"
-        ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85, extend=extend)
-    return ax
-
-
-def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = False, n: int = 300, **line):
-    """Curves where the two distal links of a pair are parallel: its parameterization singularities.
-
-    on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
-    """
-    ax = axes_or_new(ax, figsize=(4.2, 4.2))
-    x, y, inside = workspace_grid(robot, n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)
-    cross = np.zeros((*inside.shape, len(drive_pairs(robot))))
-    cross[inside] = distal_cross_products(robot, inverse_kinematics(robot, points[inside], mode))
-    for k, pair in enumerate(drive_pairs(robot)):
-        if pairs is not None and pair not in pairs:
-            continue
-        look = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
-        value = np.ma.array(cross[..., k], mask=~inside)
-        drawn = ax.contour(x, y, value, levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
-                           linewidths=look.get("linewidth", 1.6), zorder=3)
-        if on_map:
-            drawn.set_path_effects(_OUTLINED)
-        else:
-            ax.plot([], [], **look, label=f"links {pair[0] + 1} and {pair[1] + 1} parallel")
-    return ax
+from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
+from ...mechanics.maps import workspace_grid
 
 
 def plot_control_fields(robot, axes=None, n: int = 15):
@@ -150,12 +97,6 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     axes[1].set(xlim=(-0.24, 0.24), ylim=(-0.2, 0.26))
     axes[1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return axes
-
-
-def curve_crossings(trajectory) -> list[np.ndarray]:
-    """For each pair of drives the samples just before the path crosses the curve of this pair."""
-    cross = distal_cross_products(trajectory.robot, trajectory.q)
-    return [np.flatnonzero(np.diff(np.sign(c)) != 0) for c in cross.T]
 
 
 def plot_prestress_maps(robot, axes=None, n: int = 161):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..mechanics.actuation import control_matrix
-from ..mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
-from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.maps import workspace_grid
-from .machine import plane_axes, plot_path
-from .runs import plot_torques
-from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+from ...figures.machine import plane_axes, plot_path
+from ...figures.runs import plot_torques
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+from ...mechanics.actuation import control_matrix
+from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
+from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.maps import workspace_grid
 
 
 def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):

@@ -6,10 +6,10 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..mechanics.dynamics import orthogonal_complement
-from ..mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
-from .machine import plot_machine
-from .style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
+from ...figures.machine import plot_machine
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
+from ...mechanics.dynamics import orthogonal_complement
+from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
 
 
 def plot_joint_angles(robot, q, ax=None):
