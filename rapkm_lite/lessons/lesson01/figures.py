@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plot_machine
+from ...figures.maps import mode_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
@@ -111,8 +112,8 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     shades = mpl.colormaps["cividis"](np.linspace(0.9, 0.3, len(modes)))
     for shade, mode in zip(shades, modes, strict=True):
         sheet = np.rad2deg(configuration_sheet(robot, mode))
-        name = "".join("+" if s > 0 else "−" for s in mode)
-        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.8, lw=0, rstride=1, cstride=1, label=f"mode {name}")
+        label = f"mode {mode_name(mode)}"
+        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.8, lw=0, rstride=1, cstride=1, label=label)
         ax.plot(*sheet[-1, :, :3].T, color=NEUTRAL, lw=0.8)
         rims.append(sheet[-1])
     if len(rims) == 2:

@@ -6,12 +6,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plane_axes, plot_path
+from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
 from ...mechanics.kinematics import inverse_kinematics
-from ...mechanics.maps import workspace_grid
 
 
 def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
@@ -77,19 +77,16 @@ def _plain_ticks(ax, values) -> None:
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
     """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all."""
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
-    x, y, inside = workspace_grid(robot, n)
-    q = inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
-    torque, signed = np.full((2, n, n), np.nan)
-    torque[inside] = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
-    signed[inside] = null_vector(robot, q) @ np.asarray(offset, dtype=float)
-    image = ax.pcolormesh(x, y, np.ma.masked_invalid(torque), shading="nearest", rasterized=True, vmin=0.0)
+    x, y, inside, points = grid_points(robot, n)
+    q = inverse_kinematics(robot, points)
+    torque = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
+    plot_map(x, y, on_grid(inside, torque), ax, vmin=0.0, label="norm of the rest torques in mN m")
+    signed = on_grid(inside, null_vector(robot, q) @ np.asarray(offset, dtype=float))
     ax.contour(x, y, signed, levels=[0.0], colors="white", linewidths=1.6)
-    ax.figure.colorbar(image, ax=ax, label="norm of the rest torques in mN m", shrink=0.9)
     if trajectory is not None:
         plot_path(trajectory, ax, color="white", ls="--")
     plane_axes(robot, ax)
     ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], title=title)
-    ax.grid(visible=False)
     return ax
 
 
