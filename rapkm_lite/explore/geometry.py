@@ -90,8 +90,8 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
-        size = 1e-3 * size
-        t = triangle(robot, size, dt=0.01) if path == "triangle" else circle(robot, size / 2, dt=0.01)
+        side = 1e-3 * size
+        t = triangle(robot, side, dt=0.01) if path == "triangle" else circle(robot, side / 2, dt=0.01)
         A = act.control_matrix(robot, t.q)
         if robot.n_arms == 3:
             null = null_vector(robot, t.q)

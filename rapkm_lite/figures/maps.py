@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib import patheffects
 
@@ -11,10 +13,10 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.maps import workspace_grid
 from .style import arm_line, axes_or_new
 
-_OUTLINED = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
+_OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
 
 
-def pair_name(pair: tuple[int, int]) -> str:
+def pair_name(pair) -> str:
     """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
     return f"({pair[0] + 1},{pair[1] + 1})"
 
@@ -24,7 +26,7 @@ def mode_name(mode) -> str:
     return "(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")"
 
 
-def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
+def pair_line(robot: Manipulator, pair) -> dict:
     """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
     left_out = [i for i in range(robot.n_arms) if i not in pair]
     return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
@@ -45,7 +47,7 @@ def grid_points(robot: Manipulator, n: int, box=None):
 def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
     """Values (k, ...) at the points of `grid_points` back on the grid, (n, n, ...); masked outside."""
     values = np.asarray(values)
-    grid = np.ma.masked_all((*inside.shape, *values.shape[1:]), dtype=values.dtype)
+    grid = np.ma.masked_all((*inside.shape, *values.shape[1:]))
     grid[inside] = values
     return grid
 
@@ -75,7 +77,7 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
     for k, pair in enumerate(drive_pairs(robot)):
         if pairs is not None and pair not in pairs:
             continue
-        look = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
+        look: dict[str, Any] = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
         drawn = ax.contour(x, y, cross[..., k], levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
                            linewidths=look.get("linewidth", 1.6), zorder=3)
         if on_map:

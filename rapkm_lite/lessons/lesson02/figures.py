@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import Circle
 
 from ...figures.machine import plot_machine, plot_path, plot_workspace
 from ...figures.maps import (
@@ -31,7 +32,7 @@ from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_mod
 def plot_control_fields(robot, axes=None, n: int = 15):
     """Control vector fields (8)-(9), one panel per drive: end-effector acceleration per torque, m/s^2 per N m."""
     if axes is None:
-        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True)[1]
+        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True, squeeze=False)[1][0]
     # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
     *_, points = grid_points(robot.replace(lengths=0.985 * robot.lengths), n)
     field = control_vector_fields(robot, inverse_kinematics(robot, points))
@@ -116,7 +117,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
     share = on_grid(inside, np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]))
     for i, ax in enumerate(axes):
         plot_map(x, y, share[..., i], ax, vmin=0.0, vmax=1.0, bar=False)
-        pair = tuple(j for j in range(3) if j != i)
+        pair = drive_pairs(robot)[2 - i]
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
@@ -137,7 +138,7 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     for i in range(robot.n_arms) if drives else ():
         ax.plot(*np.outer([-torque, torque], A[i]).T, **arm_line(i), zorder=3, label=f"drive {i + 1}")
     if guaranteed is not None:
-        ax.add_patch(plt.Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
+        ax.add_patch(Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
     room = 1.12 * np.abs(corners).max()
     ax.set(aspect="equal", xlabel="force in x in N", ylabel="force in y in N", xlim=(-room, room), ylim=(-room, room))
     return ax

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -47,8 +49,8 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
     """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots."""
     ax = plot_torques(run, ax, title)
-    dots = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
-    look = dots if np.ndim(theory) == 2 else {"lw": 0.9}
+    dots: dict[str, Any] = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
+    look: dict[str, Any] = dots if np.ndim(theory) == 2 else {"lw": 0.9}
     for values in 1e3 * np.broadcast_to(theory, run.c.shape).T:
         ax.plot(run.t, values, color=AFTER, zorder=4, **look)
     return ax
@@ -57,7 +59,7 @@ def plot_rest_torques(run, theory, ax=None, title: str = ""):
 def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m)."""
     ax = axes_or_new(ax)
-    looks = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
+    looks: list[dict[str, Any]] = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
     for look, (label, values) in zip(looks, theories.items(), strict=True):
         ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
@@ -101,10 +103,9 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     held = np.abs(torque) <= 1e3 * friction
     ax.axhspan(-1e3 * friction, 1e3 * friction, color="#DDE3EA", label="friction holds")
     ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
-    for mask, look in ((~held, {"color": ALARM}), (held, {"color": AFTER, "lw": 3.5})):
-        label = "measured, rests here" if look["color"] == AFTER else "measured, is driven on"
-        steps = np.where(mask & (np.abs(np.gradient(torque)) == 0.0), torque, np.nan)
-        ax.plot(angle, steps, label=label, **look)
+    flat = np.abs(np.gradient(torque)) == 0.0
+    ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
+    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, rests here")
     ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
     ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
     return ax
@@ -119,7 +120,8 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
     ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
     ax.axvline(1.0, color=NEUTRAL, lw=1.0)
-    dots, crosses = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}, {"color": ALARM, "mew": 1.8, "ms": 7}
+    dots: dict[str, Any] = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}
+    crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
     ax.set(xscale="log", title=title,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -75,7 +77,7 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
 
 
 # Colour and dashes of runs that are compared on one axis: they belong to no arm.
-_RUN_LINES = (
+_RUN_LINES: tuple[dict[str, Any], ...] = (
     {"color": BEFORE, "linestyle": "-"},
     {"color": ALARM, "linestyle": (0, (5, 1.2))},
     {"color": "#66AACC", "linestyle": (0, (4, 1.2, 1, 1.2))},
