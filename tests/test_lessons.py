@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rapkm_lite.checks import Exercise, check, examine, exercises
+from rapkm_lite.lessons import checker
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -111,6 +112,18 @@ def test_blank_answers_are_not_yet(name, capsys):
     assert capsys.readouterr().out.startswith(f"TODO {name}: not yet")
 
 
+def test_list_of_all_figures_is_generated_from_the_rooms():
+    kept = (build.PACKAGE / "plotting.py").read_text(encoding="utf-8")
+    assert kept == build.figure_list(), "run: python notebooks/build.py figures"
+
+
+def test_every_lesson_has_its_room_and_its_exercises_bear_its_number():
+    numbers = {path.stem[:2] for path in LESSONS if path.stem[:2].isdigit()}
+    assert {f"lesson{n}" for n in numbers} == set(checker.lessons())
+    for name, exercise in exercises().items():
+        assert name.partition(".")[0] in numbers and exercise.hint
+
+
 def test_blanking_keeps_the_signature_and_names():
     source = 'def f(x):\n    """Double."""\n    ### BEGIN SOLUTION\n    return 2 * x\n    ### END SOLUTION\n'
     assert build.blank(source) == 'def f(x):\n    """Double."""\n    raise NotImplementedError'
@@ -124,3 +137,14 @@ def test_readme_asks_the_question_of_the_lesson(path):
     assert number == path.stem[:2]
     readme = (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8")
     assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
+
+
+@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+def test_tables_agree_with_the_lesson(path):
+    text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
+    minutes = re.search(r"\*\*(?:Minutes|Time):?\W*(\d+)", text)
+    row = next(line for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines()
+               if path.name in line).split("|")
+    assert minutes and row[3].strip() == minutes[1]
+    for name in re.findall(r"`([\w.]+)`", row[5]):
+        assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"
