@@ -111,6 +111,7 @@ def test_docstrings_of_the_functions_name_the_number(row):
 # Numbers that a docstring may name beside those of its rows: looked up in the print, with what they are there for.
 ALSO = {
     "CommandFilter": {16},  # the force form it is compared with
+    "actuation_map": {10},  # what its first measure decides
     "RedundantAPD": {27, 30},  # the pseudoinverse it takes; its closed loop
     "RedundantCTC": {35},  # its error dynamics
     "antagonism_form": {14},  # the torques at rest
@@ -126,7 +127,8 @@ def test_docstrings_name_no_other_number(name):
     """A number in a docstring without its row is how a wrong number comes in: add the row, or say above what for."""
     listed = {int(number_of(row).strip("()")) for row in NUMBERED
               if name in {function.split(".")[0] for function in functions_of(row)}}
-    assert numbers(getattr(rk, name).__doc__ or "") <= listed | ALSO.get(name, set())
+    docstring = (getattr(rk, name).__doc__ or "").split(">>>")[0]  # an example may print (8, 20)
+    assert numbers(docstring) <= listed | ALSO.get(name, set())
 
 
 @by_row
@@ -138,6 +140,30 @@ def test_lesson_says_the_number_and_runs_a_function(row):
     else:
         assert "Table 1" in text
     assert any(name.split(".")[-1] in used for name in functions_of(row)), f"{row[4]} runs none of {functions_of(row)}"
+
+
+ACCENT = r"\\(?:bar|overline|tilde|widetilde|dot|ddot|mathcal)\s*\{?\s*"
+LETTER = rf"((?:{ACCENT})*)(\\(?:alpha|Delta|delta|lambda|varepsilon)|[A-Za-z])(?![A-Za-z])"
+
+
+def letters(formula):
+    """The letters of a formula with their accents, without words, fonts and layout."""
+    formula = re.sub(r"\\(?:begin|end)\{\w+\}|\\(?:mathbf|mathrm|text|quad|cr|left|right)\b", " ", formula)
+    formula = formula.replace(r"\overline", r"\bar").replace(r"\widetilde", r"\tilde")
+    return {"".join(sorted(re.findall("bar|tilde|ddot|dot|mathcal", accent))) + letter
+            for accent, letter in re.findall(LETTER, formula)}
+
+
+PRINTED = {int(number_of(row).strip("()")): letters(row[1]) for row in NUMBERED}
+
+
+@pytest.mark.parametrize("name", sorted(LESSONS))
+def test_displayed_formulas_carry_the_number_that_is_theirs(name):
+    """Right pairs share at least half of the printed letters, another equation's at most a third."""
+    for formula in re.findall(r"\$\$(.*?)\$\$", lesson(name)[0], re.S):
+        for number in numbers(formula) & set(PRINTED):
+            share = len(letters(formula) & PRINTED[number]) / len(PRINTED[number])
+            assert share > 0.4, f"{name} gives the number ({number}) to {formula.strip()}"
 
 
 @by_row
