@@ -368,11 +368,11 @@ def test_eq_32_sign_of_the_desired_acceleration_and_the_two_lines():
     assert skew(first) < 1e-7 < 1e-2 < skew(second)
 
 
-def test_eq_33_the_rows_of_the_dependent_coordinates_carry_control_forces():
+def test_eq_33_holds_for_a_projector_along_the_tangent_space_only():
     r"""(33): $P_1(\tilde{G}\ddot{q} + \tilde{C}\dot{q} + \tilde{Q}) = 0$, P_1 onto the dependent velocities.
 
-    The bracket is A~^T c, by (23), and A~ has columns for the dependent joints too.  It vanishes under P_1 = I - N_J
-    alone, whatever the law, and then says nothing of it.
+    The bracket is A~^T c, by (23), and A~ has columns for the dependent joints too: taking the rows of the dependent
+    coordinates is not enough.  A projector along the tangent space makes it vanish, for any torques: then it is 0 = 0.
     """
     q, qd, desired = off_path()
     law = rk.RedundantCTC([400.0] * 3, [40.0] * 3)
@@ -386,8 +386,12 @@ def test_eq_33_the_rows_of_the_dependent_coordinates_carry_control_forces():
         dependent = [j for j in range(6) if j not in pair]
         share = np.linalg.norm(bracket[:, dependent], axis=-1) / np.linalg.norm(bracket, axis=-1)
         assert_allclose(np.median(share), 0.87, atol=0.02)
-    away = np.eye(6) - rk.nullspace_projector(FRICTIONLESS, q)
-    assert (norm(mv(away, bracket)) / norm(bracket)).max() < 1e-9
+        F = rk.orthogonal_complement(FRICTIONLESS, q, pair)
+        oblique = np.eye(6) - F @ np.eye(6)[list(pair)]  # onto the dependent velocities, along the tangent space
+        assert np.abs(oblique[:, pair, :]).max() == 0
+        size = norm(oblique)
+        assert (norm(mv(oblique, bracket)) / norm(bracket) / size).max() < 1e-9
+        assert (norm(mv(oblique @ rk.nullspace_projector(FRICTIONLESS, q), 0 * q + 1)) / size).max() < 1e-12  # 0 = 0
     # What the dependent rows do obey is what the independent ones obey (34): G~ (edd + K_D ed + K_P e) = 0.
     gain = np.array([1.0, 1, 1, 0, 0, 0])
     terms = [mv(Gt, v) for v in (qdd - desired.qdd, 40 * gain * (qd - desired.qd), 400 * gain * (q - desired.q))]

@@ -159,7 +159,7 @@ PRINTED = {int(number_of(row).strip("()")): letters(row[1]) for row in NUMBERED}
 
 @pytest.mark.parametrize("name", sorted(LESSONS))
 def test_displayed_formulas_carry_the_number_that_is_theirs(name):
-    """Right pairs share at least half of the printed letters, another equation's at most a third."""
+    """A formula that shares fewer than two in five of the printed letters is another one, whatever it is called."""
     for formula in re.findall(r"\$\$(.*?)\$\$", lesson(name)[0], re.S):
         for number in numbers(formula) & set(PRINTED):
             share = len(letters(formula) & PRINTED[number]) / len(PRINTED[number])
