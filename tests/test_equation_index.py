@@ -110,15 +110,21 @@ def test_docstrings_of_the_functions_name_the_number(row):
 
 # Numbers that a docstring may name beside those of its rows: looked up in the print, with what they are there for.
 ALSO = {
+    "AntagonismFilter": {15},  # the matrix it takes
     "CommandFilter": {16},  # the force form it is compared with
+    "PID": {12},  # the law it extends
     "actuation_map": {10},  # what its first measure decides
     "RedundantAPD": {27, 30},  # the pseudoinverse it takes; its closed loop
     "RedundantCTC": {35},  # its error dynamics
     "antagonism_form": {14},  # the torques at rest
+    "constraint_rank": {1},  # whose matrix
+    "degree_of_actuation": {8},  # whose fields it counts
     "degree_of_freedom": {7},  # the text after it
+    "lyapunov_function": {29},  # the gains with which it is definite on tangent errors only
+    "orthogonal_complement_dot": {5},  # the text after it
     "select_independent": {27},  # what the rows are for
     "steady_state_torque": {12},  # the sign
-    "required_wrench": {6},  # its left-hand side
+    "required_wrench": {6, 11},  # the left-hand side; the bracket
 }
 
 

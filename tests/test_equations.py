@@ -89,6 +89,8 @@ def test_eq_04():
     J = rk.constraint_jacobian(ROBOT, q)
     J1, J2 = J[..., q1], J[..., q2]
     assert zero(mv(J1, qd[:, q1]), mv(J2, qd[:, q2])) < 1e-13
+    F = rk.orthogonal_complement(ROBOT, q, q2)  # its dependent rows solve it for every q2d
+    assert norm(J1 @ F[:, q1] + J2).max() < 1e-12
 
 
 def test_eq_05():
@@ -256,6 +258,10 @@ def test_eq_22():
     assert_allclose(N_J, np.eye(N_JOINTS) - np.linalg.pinv(J) @ J, atol=1e-12)  # text before (21)
     left = [mv(N_J, v) for v in (mv(G, accelerated), mv(C, qd), Q)]
     assert zero(*left, -mv(T(rk.redundant_control_matrix(ROBOT, q)), c)) < 1e-11
+    # After it, corrected: motions are projected by N_J qd and N_J qdd + Ndot_J qd; that makes (23) of it.
+    Gt, Ct, Qt = rk.redundant_dynamics(ROBOT, q, qd)
+    projected = mv(N_J, accelerated) + mv(rk.nullspace_projector_dot(ROBOT, q, qd), qd)
+    assert zero(*(mv(N_J, v) for v in (mv(G, projected), mv(C, qd), Q)), -mv(Gt, accelerated), -mv(Ct, qd), -Qt) < 1e-11
 
 
 def test_eq_23():
