@@ -213,6 +213,14 @@ def test_marks_of_the_index_lead_to_rows_of_the_errata():
     assert {a for a in anchors if a.startswith("eq-")} == {a for _, a in marks if a.startswith("eq-")}
 
 
+@pytest.mark.parametrize("name", sorted(LESSONS))
+def test_links_of_a_lesson_into_both_pages_resolve(name):
+    for page, anchor in re.findall(r"\((?:\.\./)?(equations|errata)\.md#([\w-]+)\)", lesson(name)[0]):
+        assert f'<a id="{anchor}"></a>' in (NOTEBOOKS / f"{page}.md").read_text(encoding="utf-8"), f"{page}.md#{anchor}"
+    boxes = lesson(name)[0].count("**In the print.**")
+    assert boxes <= 6, f"{name} has {boxes} boxes on the print; at most six belong into a lesson"
+
+
 @pytest.mark.parametrize("row", rows("equations.md", "Figures"), ids=lambda row: f"fig. {row[0]}")
 def test_lesson_names_its_figure(row):
     text, _ = lesson(row[2])
