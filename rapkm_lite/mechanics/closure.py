@@ -27,7 +27,7 @@ from .kinematics import (
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
-    """The configuration in V nearest to a rough q, (..., 2N) in rad.
+    """The configuration in V of (3) nearest to a rough q, (..., 2N) in rad.
 
     Minimizes ||q' - q||^2 / 2 subject to h(q') = 0 by sequential quadratic programming with the exact Hessian of the
     Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
