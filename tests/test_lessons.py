@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rapkm_lite.checks import Exercise, check, examine, exercises
+from rapkm_lite.lessons import checker
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -109,6 +110,18 @@ def test_blank_answers_are_not_yet(name, capsys):
     os.environ.pop("RAPKM_LITE_STRICT", None)
     assert check(name, stub) is exercises()[name].reference
     assert capsys.readouterr().out.startswith(f"TODO {name}: not yet")
+
+
+def test_list_of_all_figures_is_generated_from_the_rooms():
+    kept = (build.PACKAGE / "plotting.py").read_text(encoding="utf-8")
+    assert kept == build.figure_list(), "run: python notebooks/build.py figures"
+
+
+def test_every_lesson_has_its_room_and_its_exercises_bear_its_number():
+    numbers = {path.stem[:2] for path in LESSONS if path.stem[:2].isdigit()}
+    assert {f"lesson{n}" for n in numbers} == set(checker.lessons())
+    for name, exercise in exercises().items():
+        assert name.partition(".")[0] in numbers and exercise.hint
 
 
 def test_blanking_keeps_the_signature_and_names():

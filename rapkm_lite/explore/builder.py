@@ -197,7 +197,7 @@ class Explorer:
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         """One output: the widget where a kernel runs, the picture and its numbers elsewhere."""
-        view = self.widget._repr_mimebundle_()
+        view = self.widget._repr_mimebundle_() or {}
         said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
         picture = base64.b64encode(self.png).decode()
         return {**view, "image/png": picture, "text/plain": "\n".join([repr(self), *said])}

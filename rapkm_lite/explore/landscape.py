@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..figures.style import ALARM, NEUTRAL, arm_colour
 from ..machine.manipulator import Manipulator
 from ..mechanics.trajectory import triangle
-from ..plotting.style import ALARM, NEUTRAL, arm_colour
 from ..simulation.energy import antagonism_form
 from .builder import Explorer, explorer, log_slider, slider
 from .parts import frictionless, offset_sliders

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..control.laws import PD, AntagonismFilter, CommandFilter
+from ..figures.style import NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
-from ..plotting.style import NEUTRAL, arm_colour, arm_line
 from ..simulation.energy import measured_energies
 from ..simulation.runs import experiment, simulate
 from .builder import Explorer, choice, explorer, log_slider, switch

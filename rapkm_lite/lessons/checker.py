@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-
-LESSONS = ("lesson01", "lesson02", "lesson03", "lesson04", "lesson05", "lesson06")
 
 
 @dataclass(frozen=True)
@@ -31,18 +30,66 @@ class Exercise:
     tolerance: float = 1e-9
 
 
+def lessons() -> list[str]:
+    """Names of the lessons that have a folder here, in their order: "lesson00", "lesson01", ..."""
+    return sorted(room.name for room in Path(__file__).parent.glob("lesson[0-9][0-9]"))
+
+
 def exercises() -> dict[str, Exercise]:
-    """All exercises by name, e.g. "01.loop_constraints"."""
+    """All exercises by name, e.g. "01.loop_constraints": the EXERCISES of every lesson that has some."""
     found = {}
-    for lesson in LESSONS:
-        try:
-            module = importlib.import_module(f"{__package__}.{lesson}")
-        except ModuleNotFoundError as error:
-            if error.name != f"{__package__}.{lesson}":
-                raise
-            continue
-        found |= module.EXERCISES
+    for lesson in lessons():
+        if importlib.util.find_spec(f"{__package__}.{lesson}.exercises"):
+            found |= importlib.import_module(f"{__package__}.{lesson}.exercises").EXERCISES
     return found
+
+
+class _Verdict(Exception):
+    """What ends an examination before its last case: the verdict and its sentence."""
+
+
+def _answer(answer, case: tuple, shape: tuple[int, ...]) -> np.ndarray:
+    """What an answer gives for one case, as an array of the expected shape; raises `_Verdict` where it gives none."""
+    try:
+        got = answer(*case) if callable(answer) else answer
+    except NotImplementedError:
+        raise _Verdict("todo", "not yet") from None
+    except Exception as error:
+        raise _Verdict("wrong", f"your code stops with {type(error).__name__}: {error}") from error
+    if got is Ellipsis or got is None:
+        raise _Verdict("todo", "not yet: no value is returned")
+    try:
+        got = np.asarray(got, dtype=float)
+    except (TypeError, ValueError):
+        raise _Verdict("wrong", "the answer is not numeric") from None
+    if got.shape != shape:
+        raise _Verdict("wrong", f"the answer has shape {got.shape}, expected {shape}")
+    if not np.all(np.isfinite(got)):
+        raise _Verdict("wrong", "the answer holds NaN or infinity")
+    return got
+
+
+def _measure(exercise: Exercise, answer) -> str:
+    """The sentence for a right answer; raises `_Verdict` with the measured number for any other."""
+    if answer is Ellipsis or answer is None:
+        raise _Verdict("todo", "not yet")
+    cases, limit = exercise.cases(np.random.default_rng(20_111_130)), exercise.tolerance
+    worst = lawful = 0.0
+    sentence = ""
+    for case in cases:
+        want = np.asarray(exercise.reference(*case), dtype=float)
+        got = _answer(answer, case, want.shape)
+        worst = max(worst, float(np.max(np.abs(got - want), initial=0.0)))
+        if exercise.invariant:
+            number, text = exercise.invariant(got, *case)
+            if number >= lawful:
+                lawful, sentence = float(number), text
+    if worst > limit:
+        raise _Verdict("wrong", f"it is off by up to {worst:.3g} {exercise.unit} (allowed {limit:.0e})")
+    if lawful > limit:
+        raise _Verdict("wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e})")
+    law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
+    return f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
 
 
 def examine(name: str, answer) -> tuple[str, str]:
@@ -53,42 +100,11 @@ def examine(name: str, answer) -> tuple[str, str]:
     known = exercises()
     if name not in known:
         raise ValueError(f"name = {name!r}; allowed: {', '.join(sorted(known))}")
-    exercise = known[name]
-    if answer is Ellipsis or answer is None:
-        return "todo", f"not yet. Hint: {exercise.hint}"
-    cases = exercise.cases(np.random.default_rng(20_111_130))
-    worst = lawful = 0.0
-    sentence = ""
-    for case in cases:
-        try:
-            got = answer(*case) if callable(answer) else answer
-        except NotImplementedError:
-            return "todo", f"not yet. Hint: {exercise.hint}"
-        except Exception as error:
-            return "wrong", f"your code stops with {type(error).__name__}: {error}. Hint: {exercise.hint}"
-        if got is Ellipsis or got is None:
-            return "todo", f"not yet: no value is returned. Hint: {exercise.hint}"
-        want = np.asarray(exercise.reference(*case), dtype=float)
-        try:
-            got = np.asarray(got, dtype=float)
-        except (TypeError, ValueError):
-            return "wrong", f"the answer is not numeric. Hint: {exercise.hint}"
-        if got.shape != want.shape:
-            return "wrong", f"the answer has shape {got.shape}, expected {want.shape}. Hint: {exercise.hint}"
-        if not np.all(np.isfinite(got)):
-            return "wrong", f"the answer holds NaN or infinity. Hint: {exercise.hint}"
-        worst = max(worst, float(np.max(np.abs(got - want), initial=0.0)))
-        if exercise.invariant:
-            number, text = exercise.invariant(got, *case)
-            if number >= lawful:
-                lawful, sentence = float(number), text
-    limit = exercise.tolerance
-    if worst > limit:
-        return "wrong", f"it is off by up to {worst:.3g} {exercise.unit} (allowed {limit:.0e}). Hint: {exercise.hint}"
-    if exercise.invariant and lawful > limit:
-        return "wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e}). Hint: {exercise.hint}"
-    law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
-    return "ok", f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
+    try:
+        return "ok", _measure(known[name], answer)
+    except _Verdict as verdict:
+        word, sentence = verdict.args
+        return word, f"{sentence}. Hint: {known[name].hint}"
 
 
 def check(name: str, answer):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.manipulator import Manipulator, load
-from ..mechanics.antagonism import null_vector
-from ..mechanics.dynamics import (
+from ...machine.manipulator import Manipulator, load
+from ...mechanics.antagonism import null_vector
+from ...mechanics.dynamics import (
     coriolis_matrix,
     forward_dynamics,
     generalized_forces,
     mass_matrix,
     orthogonal_complement,
 )
-from ..mechanics.kinematics import (
+from ...mechanics.kinematics import (
     constraint_jacobian,
     constraint_jacobian_dot,
     forward_kinematics,
@@ -22,7 +22,7 @@ from ..mechanics.kinematics import (
     tip_jacobians,
     working_modes,
 )
-from .checker import Exercise
+from ..checker import Exercise
 
 
 def _four_arms() -> Manipulator:

@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 
-from ..machine.manipulator import load
-from ..mechanics.actuation import control_matrix, distal_cross_products, prestress_projector, weighted_pseudoinverse
-from ..mechanics.kinematics import arm_vectors, cross, inverse_kinematics, reachable, turn, working_modes
-from .checker import Exercise
+from ...machine.manipulator import load
+from ...mechanics.actuation import control_matrix, distal_cross_products, prestress_projector, weighted_pseudoinverse
+from ...mechanics.kinematics import arm_vectors, cross, inverse_kinematics, reachable, turn, working_modes
+from ..checker import Exercise
 
 
 def _arms(rng) -> list[tuple[np.ndarray, np.ndarray]]:

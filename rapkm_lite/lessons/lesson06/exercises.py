@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.manipulator import load
-from ..mechanics.trajectory import circle, polygon, triangle
-from ..simulation.energy import antagonism_form
-from .checker import Exercise
+from ...machine.manipulator import load
+from ...mechanics.trajectory import circle, polygon, triangle
+from ...simulation.energy import antagonism_form
+from ..checker import Exercise
 
 
 def _paths(rng) -> list[tuple]:

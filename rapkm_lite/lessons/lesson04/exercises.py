@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import matvec
-from ..machine.manipulator import Manipulator, load
-from ..mechanics import actuation, antagonism
-from ..mechanics.kinematics import inverse_kinematics
-from ..simulation import energy
-from .checker import Exercise
+from ...machine.arguments import matvec
+from ...machine.manipulator import Manipulator, load
+from ...mechanics import actuation, antagonism
+from ...mechanics.kinematics import inverse_kinematics
+from ...simulation import energy
+from ..checker import Exercise
 
 
 def _control_matrices(rng, count: int) -> np.ndarray:

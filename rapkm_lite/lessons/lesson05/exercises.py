@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..control.stability import effective_gain
-from ..machine.manipulator import load
-from ..mechanics.actuation import control_matrix, drive_pairs, redundant_control_matrix, weighted_pseudoinverse
-from ..mechanics.dynamics import forward_dynamics, minimal_dynamics, nullspace_projector, orthogonal_complement
-from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.partition import explicit_pseudoinverse, select_independent
-from .checker import Exercise
+from ...control.stability import effective_gain
+from ...machine.manipulator import load
+from ...mechanics.actuation import control_matrix, drive_pairs, redundant_control_matrix, weighted_pseudoinverse
+from ...mechanics.dynamics import forward_dynamics, minimal_dynamics, nullspace_projector, orthogonal_complement
+from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.partition import explicit_pseudoinverse, select_independent
+from ..checker import Exercise
 
 
 def _poses(rng, count: int) -> tuple:

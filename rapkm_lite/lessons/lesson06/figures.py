@@ -5,8 +5,8 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .machine import plot_machine, plot_workspace
-from .style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
+from ...figures.machine import plot_machine, plot_workspace
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 
 
 def plot_landscape(values, cube, theory, axes=None):

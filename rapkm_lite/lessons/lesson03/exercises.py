@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.logs import mystery_run
-from ..machine.manipulator import load
-from ..mechanics.actuation import control_matrix
-from ..mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
-from ..mechanics.closure import estimate_pose
-from ..mechanics.kinematics import inverse_kinematics
-from .checker import Exercise
-from .mystery import hidden
+from ...machine.logs import mystery_run
+from ...machine.manipulator import load
+from ...mechanics.actuation import control_matrix
+from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
+from ...mechanics.closure import estimate_pose
+from ...mechanics.kinematics import inverse_kinematics
+from ..checker import Exercise
+from ..mystery import hidden
 
 
 def _poses(rng, count: int = 5):

@@ -1,84 +1,40 @@
-"""Actuation over the workspace: control fields, mode maps, parameterization singularities (fig. 8), prestress."""
+"""Figures of lesson 02: control fields, mode maps, parameterization singularities, prestress, weighted torques."""
 
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib import patheffects
+from matplotlib.patches import Circle
 
-from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import (
+from ...figures.machine import plot_machine, plot_path, plot_workspace
+from ...figures.maps import (
+    curve_crossings,
+    grid_points,
+    mode_name,
+    on_grid,
+    pair_line,
+    pair_measures,
+    pair_name,
+    plot_map,
+    plot_pair_curves,
+)
+from ...figures.style import ALARM, NEUTRAL, arm_line, axes_or_new
+from ...mechanics.actuation import (
     control_matrix,
     control_vector_fields,
-    distal_cross_products,
     drive_pairs,
     force_polygon,
     singular_values,
 )
-from ..mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
-from ..mechanics.maps import workspace_grid
-from .machine import plot_machine, plot_path, plot_workspace
-from .style import ALARM, NEUTRAL, arm_line, axes_or_new
-
-_OUTLINED = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
-
-
-def pair_name(pair: tuple[int, int]) -> str:
-    """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
-    return f"({pair[0] + 1},{pair[1] + 1})"
-
-
-def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
-    """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
-    left_out = [i for i in range(robot.n_arms) if i not in pair]
-    return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
-
-
-def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
-    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y."""
-    ax = axes_or_new(ax, figsize=(4.6, 3.9))
-    # What lies under the mask may be anything; colour maps look at it.
-    values = np.ma.array(np.ma.filled(values, 0.0), mask=np.ma.getmaskarray(values))
-    mesh = ax.pcolormesh(x, y, values, cmap="cividis", vmin=vmin, vmax=vmax, shading="nearest", rasterized=True)
-    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
-    ax.grid(False)
-    if bar:
-        extend = "max" if vmax is not None and values.max() > vmax else "neither"
-        ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85, extend=extend)
-    return ax
-
-
-def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = False, n: int = 300, **line):
-    """Curves where the two distal links of a pair are parallel: its parameterization singularities.
-
-    on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
-    """
-    ax = axes_or_new(ax, figsize=(4.2, 4.2))
-    x, y, inside = workspace_grid(robot, n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)
-    cross = np.zeros((*inside.shape, len(drive_pairs(robot))))
-    cross[inside] = distal_cross_products(robot, inverse_kinematics(robot, points[inside], mode))
-    for k, pair in enumerate(drive_pairs(robot)):
-        if pairs is not None and pair not in pairs:
-            continue
-        look = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
-        value = np.ma.array(cross[..., k], mask=~inside)
-        drawn = ax.contour(x, y, value, levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
-                           linewidths=look.get("linewidth", 1.6), zorder=3)
-        if on_map:
-            drawn.set_path_effects(_OUTLINED)
-        else:
-            ax.plot([], [], **look, label=f"links {pair[0] + 1} and {pair[1] + 1} parallel")
-    return ax
+from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
 
 
 def plot_control_fields(robot, axes=None, n: int = 15):
     """Control vector fields (8)-(9), one panel per drive: end-effector acceleration per torque, m/s^2 per N m."""
     if axes is None:
-        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True)[1]
+        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True, squeeze=False)[1][0]
     # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
-    x, y, inside = workspace_grid(robot.replace(lengths=0.985 * robot.lengths), n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    *_, points = grid_points(robot.replace(lengths=0.985 * robot.lengths), n)
     field = control_vector_fields(robot, inverse_kinematics(robot, points))
     for i, ax in enumerate(axes):
         plot_workspace(robot, ax)
@@ -105,10 +61,10 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
         if marks is not None and marks[k] is not None:
             ax.plot(*marks[k], "o", mfc="none", mec=ALARM, mew=2.2, ms=14, zorder=5)
-        ax.set_title("(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")")
+        ax.set_title(mode_name(mode))
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
-    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of Ã, all drives", shrink=0.8)
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="$σ_{min}(\\tilde{A})$, all drives", shrink=0.8)
     return axes
 
 
@@ -117,7 +73,7 @@ def plot_grid_search(spacings, minima, ax=None):
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for k, (label, values) in enumerate(minima.items()):
         ax.loglog(1e3 * np.asarray(spacings), values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
-    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min on the grid")
+    ax.set(xlabel="grid spacing in mm", ylabel="smallest $σ_{min}(\\tilde{A})$ on the grid")
     ax.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
     ax.legend(loc="center left", title="mode")
@@ -125,7 +81,7 @@ def plot_grid_search(spacings, minima, ax=None):
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
-    """Fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
+    """One pose of the kind of fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
     robot = trajectory.robot
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
@@ -152,27 +108,20 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     return axes
 
 
-def curve_crossings(trajectory) -> list[np.ndarray]:
-    """For each pair of drives the samples just before the path crosses the curve of this pair."""
-    cross = distal_cross_products(trajectory.robot, trajectory.q)
-    return [np.flatnonzero(np.diff(np.sign(c)) != 0) for c in cross.T]
-
-
 def plot_prestress_maps(robot, axes=None, n: int = 161):
-    """Share |n_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
+    """Share |eta_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
-    x, y, inside = workspace_grid(robot, n)
-    A = control_matrix(robot, inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside]))
-    share = np.ma.masked_all((3, *inside.shape))
-    share[:, inside] = np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]).T
+    x, y, inside, points = grid_points(robot, n)
+    A = control_matrix(robot, inverse_kinematics(robot, points))
+    share = on_grid(inside, np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]))
     for i, ax in enumerate(axes):
-        plot_map(x, y, share[i], ax, vmin=0.0, vmax=1.0, bar=False)
-        pair = tuple(j for j in range(3) if j != i)
+        plot_map(x, y, share[..., i], ax, vmin=0.0, vmax=1.0, bar=False)
+        pair = drive_pairs(robot)[2 - i]
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |n_i| of the prestress", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share $|η_i|$ of the prestress", shrink=0.85)
     return axes
 
 
@@ -189,7 +138,7 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     for i in range(robot.n_arms) if drives else ():
         ax.plot(*np.outer([-torque, torque], A[i]).T, **arm_line(i), zorder=3, label=f"drive {i + 1}")
     if guaranteed is not None:
-        ax.add_patch(plt.Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
+        ax.add_patch(Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
     room = 1.12 * np.abs(corners).max()
     ax.set(aspect="equal", xlabel="force in x in N", ylabel="force in y in N", xlim=(-room, room), ylim=(-room, room))
     return ax
@@ -199,10 +148,22 @@ def plot_pair_measures(trajectory, ax=None):
     """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path."""
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
     robot, A = trajectory.robot, control_matrix(trajectory.robot, trajectory.q)
-    for pair in drive_pairs(robot):
-        sigma = singular_values(A[:, list(pair)])[:, 1]
+    for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="σ_min in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", ylabel="$σ_{min}$ of its rows of A in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
+
+
+def plot_torque_choices(trajectory, choices: dict, axes=None):
+    """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m."""
+    if axes is None:
+        axes = plt.subplots(1, len(choices), figsize=(12.0, 3.1), sharey=True, squeeze=False)[1][0]
+    for ax, (title, torques) in zip(axes, choices.items(), strict=True):
+        for i, torque in enumerate(1e3 * np.asarray(torques).T):
+            ax.plot(trajectory.t, torque, label=f"drive {i + 1}", **arm_line(i))
+        ax.set(title=title, xlabel="time in s", ylabel="torque in mN m", xlim=(trajectory.t[0], trajectory.t[-1]))
+        ax.label_outer()
+    axes[0].legend(loc="upper right")
+    return axes

@@ -1,0 +1,27 @@
+"""Torques and errors of closed-loop runs over time."""
+
+from __future__ import annotations
+
+from .style import arm_line, axes_or_new
+
+
+def plot_torques(run, ax=None, title: str = "", milli: bool = True):
+    """Drive torques over time, in mN m or, for large ones, in N m."""
+    scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
+    return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
+
+
+def plot_errors(run, ax=None, title: str = ""):
+    """Errors of the true base angles over time."""
+    return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
+
+
+def lines_per_drive(run, values, ax, ylabel: str, title: str):
+    """One line per drive; the margin keeps the legend off the curves, also on shared axes."""
+    ax = axes_or_new(ax)
+    for i, line in enumerate(values.T):
+        ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))
+    ax.margins(y=0.18)
+    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]))
+    ax.legend(ncols=run.robot.n_arms, loc="upper right")
+    return ax

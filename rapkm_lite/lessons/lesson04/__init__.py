@@ -1,0 +1,1 @@
+"""Lesson 04: the antagonism filter and the energy."""

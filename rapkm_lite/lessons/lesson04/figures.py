@@ -1,0 +1,157 @@
+"""Figures of lesson 04: torques, antagonism and energies of runs without and with filter, two five-bars in one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ...figures.machine import arm_points, plane_axes
+from ...figures.runs import lines_per_drive
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
+from ...mechanics.actuation import drive_pairs
+from ...mechanics.antagonism import null_vector
+from ...mechanics.closure import estimate_pose
+from ...mechanics.kinematics import forward_kinematics, inverse_kinematics
+from ...simulation.energy import antagonistic_torque
+
+
+def _pair_poses(robot, q_a, guess) -> dict:
+    """What each equivalent five-bar (fig. 3) makes of measured base angles q_a (N,) in rad, by pair of drives.
+
+    Each value is the configuration (4,) in rad of ``robot.with_arms(pair)``, found from the point `guess` (2,) in m.
+    """
+    pairs = drive_pairs(robot)
+    return {pair: estimate_pose(robot.with_arms(pair), np.asarray(q_a)[list(pair)], guess) for pair in pairs}
+
+
+def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
+    """The machine at x (2,) in m as two five-bars that share a drive (fig. 3), with offsets (N,) in rad.
+
+    Left: both five-bars as their measured angles say, the offsets magnified.  Right: in mm about x, the end-effector
+    as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
+    """
+    axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
+    x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
+    true = inverse_kinematics(robot, x)[: robot.n_arms]
+    pairs = drive_pairs(robot)
+    shown = _pair_poses(robot, true + magnify * offset, x)
+    for pair, face in zip((pairs[0], pairs[-1]), ("white", ALARM), strict=True):
+        five_bar = robot.with_arms(pair)
+        for i, points in zip(pair, arm_points(five_bar, shown[pair]), strict=True):
+            axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
+            axes[0].plot(*points[0], "o", color=arm_colour(i), ms=11, zorder=4)
+            axes[0].plot(*points[1], "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, zorder=4)
+        axes[0].plot(*points[2], "s", mfc=face, mec=NEUTRAL, mew=1.8, ms=9, zorder=5,
+                     label=f"seen by drives {pair[0] + 1} and {pair[1] + 1}")
+    axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
+    plane_axes(robot, axes[0])
+    low, high = robot.base.min(axis=0) - 0.11, robot.base.max(axis=0) + 0.08
+    axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1] + 0.13), title=f"offsets magnified {magnify:g} times")
+    axes[0].legend(loc="upper left")
+
+    seen = _pair_poses(robot, true + offset, x)
+    points = {pair: forward_kinematics(robot.with_arms(pair), q) for pair, q in seen.items()}
+    _plot_beliefs(robot, x, points, forward_kinematics(robot, estimate_pose(robot, true + offset, x)), axes[1])
+    return axes
+
+
+def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
+    """Points (2,) in m by pair of drives, the least-squares point and the true one, in mm about x."""
+    corners = 1e3 * (np.array([*points.values()]) - x)
+    ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
+    for (j, k), corner in zip(points, corners, strict=True):
+        ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
+        side = np.sign(corner[1] - corners[:, 1].mean())  # the name stands outside the triangle
+        ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), textcoords="offset points",
+                    ha="center", va="center", fontsize=9.5)
+    ax.plot(*(1e3 * (estimate - x)), "D", color=NEUTRAL, ms=7)
+    ax.annotate("least squares", 1e3 * (estimate - x), xytext=(0, -13), textcoords="offset points",
+                ha="center", va="center", fontsize=9.5)
+    ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
+    ax.annotate("true", (0, 0), xytext=(10, -4), textcoords="offset points", fontsize=9.5)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.35)
+    ax.set(xlabel="x − true x in mm", ylabel="y − true y in mm", title="the same, true size, close up")
+
+
+# Colour and dashes of runs that are compared on one axis: they belong to no arm.
+_RUN_LINES: tuple[dict[str, Any], ...] = (
+    {"color": BEFORE, "linestyle": "-"},
+    {"color": ALARM, "linestyle": (0, (5, 1.2))},
+    {"color": "#66AACC", "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": AFTER, "linestyle": "-"},
+    {"color": "#997700", "linestyle": (0, (1.5, 1.2))},
+)
+
+
+def plot_antagonism(run, ax=None, title: str = ""):
+    """The part N_{A^T} c of the drive torques that moves nothing, over time."""
+    return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
+
+
+def plot_difference(run, other, ax=None, title: str = ""):
+    """How much the true base angles of two runs along the same path differ, over time."""
+    return lines_per_drive(run, 1e6 * (run.q_a - other.q_a), ax, "difference in µrad", title)
+
+
+def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
+    """Norm of the drive torques over time, one line per run; `runs` maps a label to a run.
+
+    antagonism : show only the part that moves nothing.  log : logarithmic axis, cut off at 1e-9 N m.
+    """
+    ax = axes_or_new(ax, figsize=(9.8, 3.3))
+    for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
+        size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
+        ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
+    ax.set(xlabel="time in s", title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear",
+           ylabel=f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}")
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return ax
+
+
+def plot_torque_plane(runs: dict, ax=None, title: str = ""):
+    """Every sample of a run as a point: torque that moves over torque along the null vector of A^T.
+
+    The squared distance from the origin times R / k_t^2 is the copper loss in W.  For three arms with equal drives.
+    """
+    ax = axes_or_new(ax, figsize=(5.4, 3.4))
+    for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
+        along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
+        moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
+        ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
+    ax.set(xlabel="antagonism, nᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
+    ax.set_aspect("equal")
+    ax.set_ylim(0, 1.25 * ax.get_ylim()[1])
+    ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
+    ax.legend(loc="upper left", ncols=2)
+    return ax
+
+
+def plot_energies(rows: dict, ax=None, title: str = ""):
+    """Grouped bars of energies per drive; `rows` maps a label to (N,) energies in J, plain bars before hatched ones."""
+    ax = axes_or_new(ax)
+    count = len(rows)
+    width = 0.8 / count
+    fills = [{"alpha": 1.0}, {"alpha": 0.45}, {"alpha": 1.0, "hatch": "///"}, {"alpha": 0.45, "hatch": "///"}]
+    for k, (label, energies) in enumerate(rows.items()):
+        for i, energy in enumerate(energies):
+            at = i + (k - (count - 1) / 2) * width
+            ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
+            ax.text(at, max(energy, 0.0), f"{energy:.2f}", ha="center", va="bottom", fontsize=9 if count < 3 else 8)
+        ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
+    ax.set_xticks(range(len(energies)), [f"drive {i + 1}" for i in range(len(energies))])
+    ax.set(ylabel="electric energy in J", title=title)
+    ax.set_ylim(min(0.0, 1.25 * min(np.min(e) for e in rows.values())), 1.3 * max(np.max(e) for e in rows.values()))
+    ax.grid(axis="x", visible=False)
+    ax.legend(ncols=2, loc="upper left")
+    return ax
+
+
+def plot_table1(table, ax=None, title: str = "Table 1"):
+    """Measured and simulated energies of Table 1 side by side, without and with filter."""
+    rows = {}
+    for k, when in enumerate(("without filter", "with filter")):
+        rows |= {f"measured, {when}": table.measured[k], f"simulated, {when}": table.simulated[k]}
+    return plot_energies(rows, axes_or_new(ax, figsize=(9.0, 3.6)), title)
