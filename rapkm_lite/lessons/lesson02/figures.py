@@ -81,7 +81,7 @@ def plot_grid_search(spacings, minima, ax=None):
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
-    """One pose of the kind of fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
+    """A pose as in fig. 8: the five-bar of one pair, distal links parallel at x (2,) in m; the curves of all pairs."""
     robot = trajectory.robot
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
@@ -151,13 +151,18 @@ def plot_pair_measures(trajectory, ax=None):
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="$σ_{min}$ of its rows of A in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", ylabel="$σ_{min}$ of rows of A in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
 
 
 def plot_torque_choices(trajectory, choices: dict, axes=None):
-    """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m."""
+    """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m.
+
+    >>> import rapkm_lite as rk
+    >>> path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plot_torque_choices(path, {"least torque": rk.inverse_dynamics(path.robot, path.q, path.qd, path.qdd)})
+    """
     if axes is None:
         axes = plt.subplots(1, len(choices), figsize=(12.0, 3.1), sharey=True, squeeze=False)[1][0]
     for ax, (title, torques) in zip(axes, choices.items(), strict=True):

@@ -105,7 +105,7 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
     flat = np.abs(np.gradient(torque)) == 0.0
     ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
-    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, rests here")
+    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, can rest here")
     ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
     ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
     return ax
