@@ -74,7 +74,7 @@ def _unexplained_gain(gains):
 EXERCISES = {
     "03.rest_error": Exercise(
         steady_state_error,
-        "solve the two equations A^T K_P (A dx + offset) = 0 for dx, then e = A dx",
+        "solve the two equations A^T K_P (A xi + offset) = 0 for the shift xi, then e = A xi",
         "rad", _rest_cases, _unbalanced, 1e-9),
     "03.fight": Exercise(
         _fight,
