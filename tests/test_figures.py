@@ -23,10 +23,10 @@ PURE_NUMBERS = {
     "largest singular value of F",
     "effective / nominal gain",
     "gain of drive 3 / gain of drives 1 and 2",
-    r"smallest $σ_{min}(\tilde{A})$ on the grid",
-    r"$σ_{min}(\tilde{A})$, all drives",
+    "smallest σ_min(Ã) on the grid",
+    "σ_min(Ã), all drives",
     "σ_min of the block Ã₁",
-    "share $|η_i|$ of the prestress",
+    "share |η_i| of the prestress",
 }
 
 

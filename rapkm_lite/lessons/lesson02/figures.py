@@ -64,7 +64,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         ax.set_title(mode_name(mode))
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
-    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="$σ_{min}(\\tilde{A})$, all drives", shrink=0.8)
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min(Ã), all drives", shrink=0.8)
     return axes
 
 
@@ -73,7 +73,7 @@ def plot_grid_search(spacings, minima, ax=None):
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for k, (label, values) in enumerate(minima.items()):
         ax.loglog(1e3 * np.asarray(spacings), values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
-    ax.set(xlabel="grid spacing in mm", ylabel="smallest $σ_{min}(\\tilde{A})$ on the grid")
+    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min(Ã) on the grid")
     ax.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
     ax.legend(loc="center left", title="mode")
@@ -121,7 +121,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share $|η_i|$ of the prestress", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |η_i| of the prestress", shrink=0.85)
     return axes
 
 
@@ -151,7 +151,7 @@ def plot_pair_measures(trajectory, ax=None):
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="$σ_{min}$ of rows of A in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", ylabel="σ_min(A), σ_min(A_jk) in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
 
