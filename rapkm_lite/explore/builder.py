@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import ipywidgets as widgets
 
-from .. import engine
 from ..machine.arguments import ConvergenceError
+from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
 from .live import LivePicture
 
@@ -81,7 +81,7 @@ def explorer(draw: Callable, controls: dict, panels: dict, *, layout=None, width
     if play is not None and play not in controls:
         raise ValueError(f"play = {play!r}; allowed: one of {', '.join(controls)}")
     picture = LivePicture(panels, layout, widths, size, setup)
-    return Explorer(draw, controls, picture, play, engine.COMPILED if live is None else live)
+    return Explorer(draw, controls, picture, play, COMPILED if live is None else live)
 
 
 class Explorer:
