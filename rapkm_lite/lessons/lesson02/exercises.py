@@ -24,7 +24,7 @@ def _control_matrix(a, d) -> np.ndarray:
 
 
 def _stretching(A, a, d) -> tuple[float, str]:
-    """The elbow moves with qd_i times a turned by a quarter turn, the tip with xd: a rigid distal link allows no difference along d."""
+    """A rigid distal link: elbow (qd_i times a, a quarter turn on) and tip (xd) have the same velocity along d."""
     x_rate = np.array([0.6, -0.8])
     stretch = np.abs((d * (x_rate - turn(a) * (A @ x_rate)[:, None])).sum(axis=1)) / np.linalg.norm(d, axis=1)
     return stretch.max(), "moving the end-effector at 1 m/s stretches a distal link, in m/s, by"
@@ -97,8 +97,8 @@ def _spread(x, mode) -> tuple[float, str]:
 EXERCISES = {
     "02.control_matrix": Exercise(
         reference=_control_matrix, cases=_arms, invariant=_stretching, unit="rad/m", tolerance=1e-10,
-        hint="the tip velocity xd and the elbow velocity, qd_i times a_i turned by a quarter turn, have the same component "
-             "along d_i; for the elbow it is qd_i times the cross product a_i x d_i; solve for qd_i, one row per arm",
+        hint="the tip velocity xd and the elbow velocity, qd_i times a_i turned by a quarter turn, have the same "
+             "component along d_i; for the elbow it is qd_i times the cross product a_i x d_i; solve for qd_i",
     ),
     "02.guaranteed_force": Exercise(
         reference=guaranteed_force, cases=_control_matrices, invariant=_overpromise, unit="N", tolerance=1e-9,
