@@ -60,6 +60,7 @@ from .lessons.lesson02.figures import (
     plot_pair_measures,
     plot_parameterization_singularities,
     plot_prestress_maps,
+    plot_torque_choices,
 )
 from .lessons.lesson03.figures import (
     plot_chatter,
@@ -167,6 +168,7 @@ __all__ = [
     "plot_synchronization",
     "plot_table1",
     "plot_topology",
+    "plot_torque_choices",
     "plot_torque_norms",
     "plot_torque_plane",
     "plot_torque_steps",

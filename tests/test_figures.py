@@ -19,15 +19,15 @@ OFFSET = np.array([4e-3, -2e-3, 5e-3])
 # The axes of pure numbers: ratios, shares, and singular values of matrices between joint angles.
 PURE_NUMBERS = {
     "share of runs below, %",
-    r"step of the torque over width of the friction band, $K_P\Delta / (2f_c)$",
+    r"step of the torque over width of the friction band, $k_P\Delta_c / (2f_c)$",
     "torque jumps per second",
     "largest singular value of F",
     "effective / nominal gain",
     "gain of drive 3 / gain of drives 1 and 2",
-    "smallest σ_min on the grid",
-    "σ_min of Ã, all drives",
+    "smallest σ_min(Ã) on the grid",
+    "σ_min(Ã), all drives",
     "σ_min of the block Ã₁",
-    "share |n_i| of the prestress",
+    "share |η_i| of the prestress",
 }
 
 

@@ -79,7 +79,7 @@ def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, ba
     """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y.
 
     >>> import rapkm_lite as rk
-    >>> ax = plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min of Ã, all drives")
+    >>> ax = plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min(Ã), all drives")
     """
     ax = axes_or_new(ax, figsize=(4.6, 3.9))
     # What lies under the mask may be anything; colour maps look at it.

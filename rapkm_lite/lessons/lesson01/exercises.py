@@ -1,4 +1,4 @@
-"""Exercises of lesson 01: loop constraints, orthogonal complement, forces in the end-effector pin."""
+"""Exercises of lesson 01: loop constraints, orthogonal complement, projected motion equations, forces in the pin."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ...mechanics.dynamics import (
 )
 from ...mechanics.kinematics import (
     constraint_jacobian,
+    constraint_jacobian_dot,
     forward_kinematics,
     inverse_kinematics,
     loop_constraints,
@@ -81,6 +82,25 @@ def _moving_poses(rng) -> list[tuple]:
     return cases
 
 
+def _pairs_in_motion(rng) -> list[tuple]:
+    """Poses in motion with drive torques, each with a pair of joints that is well away from its singularities."""
+    cases = []
+    for robot, q, pair in _regular_pairs(rng):
+        qd = orthogonal_complement(robot, q, pair) @ rng.uniform(-1.0, 1.0, 2)
+        cases.append((robot, q, qd, rng.uniform(-0.2, 0.2, robot.n_arms), pair))
+    return cases
+
+
+def projected_accelerations(robot: Manipulator, q, qd, c, independent) -> np.ndarray:
+    """Accelerations (2N,) in rad/s^2, by way of (2) with its multipliers: the same for every `independent`."""
+    return forward_dynamics(robot, q, qd, c)[0]
+
+
+def _loops_stay_closed(qdd, robot, q, qd, c, independent) -> tuple[float, str]:
+    gap = constraint_jacobian(robot, q) @ qdd + constraint_jacobian_dot(robot, q, qd) @ qd
+    return np.abs(gap).max(), "the gaps accelerate, J qdd + Jdot qd (m/s^2)"
+
+
 def pin_forces(robot: Manipulator, q, qd, c) -> np.ndarray:
     """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, from the multipliers of (2).
 
@@ -116,6 +136,15 @@ EXERCISES = {
         hint="rows `independent` of F are the identity, the others -J1^-1 J2; J1 are the dependent columns",
         unit="rad/rad",
         tolerance=1e-10,
+    ),
+    "01.projected_accelerations": Exercise(
+        reference=projected_accelerations,
+        cases=_pairs_in_motion,
+        invariant=_loops_stay_closed,
+        hint="Gbar, Cbar and Qbar are (7), and A in (6) are the first N rows of F; solve for q2dd, then "
+        "go back to all joints with the derivative of qd = F q2d, which has two terms",
+        unit="rad/s^2",
+        tolerance=1e-8,
     ),
     "01.pin_forces": Exercise(
         reference=pin_forces,

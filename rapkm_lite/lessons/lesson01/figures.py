@@ -22,8 +22,8 @@ def plot_joint_angles(robot, q, ax=None):
     for i in range(N):
         base, elbow = float(q[i]), float(q[N + i])
         at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
-        _angle(ax, robot.base[i], 0.0, base, size, f"$q_{{{i + 1}}}$", arm_colour(i))
-        _angle(ax, at, base, base + elbow, size, f"$q_{{{N + i + 1}}}$", arm_colour(i))
+        _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_colour(i))
+        _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_colour(i))
     return ax
 
 
@@ -64,7 +64,7 @@ def plot_topology(robot, ax=None):
     ax.text((N - 1) / 2, 0, "ground", ha="center", va="center", zorder=6)
     for i in range(N):
         ax.plot([i, i], [0.1, 2], color=arm_colour(i), lw=3)
-        for y, name in ((0.55, f"$q_{{{i + 1}}}$ driven"), (1.5, f"$q_{{{N + i + 1}}}$")):
+        for y, name in ((0.55, f"$q^{{{i + 1}}}$ driven"), (1.5, f"$q^{{{N + i + 1}}}$")):
             ax.text(i + 0.07, y, name, color=arm_colour(i), va="center")
         for y, link in ((1, i + 1), (2, N + i + 1)):
             ax.text(i, y, f"link {link}", ha="center", va="center", zorder=5,
@@ -151,7 +151,7 @@ def plot_complement_size(trajectory, pairs, ax=None):
     for pair in pairs:
         size = np.linalg.norm(orthogonal_complement(trajectory.robot, trajectory.q, pair), ord=2, axis=(-2, -1))
         (out, *_) = [i for i in range(trajectory.robot.n_arms) if i not in pair]
-        names = f"$q_{{{pair[0] + 1}}}$, $q_{{{pair[1] + 1}}}$ independent"
+        names = f"$q^{{{pair[0] + 1}}}$, $q^{{{pair[1] + 1}}}$ independent"
         ax.semilogy(trajectory.t, size, label=names, **arm_line(out))
     ax.axhline(1.0, color=NEUTRAL, lw=1.0, label="$N_J$: size 1 everywhere")
     ax.set(xlabel="time in s", ylabel="largest singular value of F", xlim=(0, trajectory.t[-1]))

@@ -1,4 +1,4 @@
-"""Figures of lesson 02: control fields, mode maps, parameterization singularities (fig. 8), prestress."""
+"""Figures of lesson 02: control fields, mode maps, parameterization singularities, prestress, weighted torques."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         ax.set_title(mode_name(mode))
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
-    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of Ã, all drives", shrink=0.8)
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min(Ã), all drives", shrink=0.8)
     return axes
 
 
@@ -73,7 +73,7 @@ def plot_grid_search(spacings, minima, ax=None):
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for k, (label, values) in enumerate(minima.items()):
         ax.loglog(1e3 * np.asarray(spacings), values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
-    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min on the grid")
+    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min(Ã) on the grid")
     ax.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
     ax.legend(loc="center left", title="mode")
@@ -81,7 +81,7 @@ def plot_grid_search(spacings, minima, ax=None):
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
-    """Fig. 8: the five-bar of one pair with its distal links parallel at x (2,) in m, and the curves of all pairs."""
+    """A pose as in fig. 8: the five-bar of one pair, distal links parallel at x (2,) in m; the curves of all pairs."""
     robot = trajectory.robot
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
@@ -109,7 +109,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
 
 
 def plot_prestress_maps(robot, axes=None, n: int = 161):
-    """Share |n_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
+    """Share |eta_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
     x, y, inside, points = grid_points(robot, n)
@@ -121,7 +121,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |n_i| of the prestress", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |η_i| of the prestress", shrink=0.85)
     return axes
 
 
@@ -151,6 +151,24 @@ def plot_pair_measures(trajectory, ax=None):
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="σ_min in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", ylabel="σ_min(A), σ_min(A_jk) in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
+
+
+def plot_torque_choices(trajectory, choices: dict, axes=None):
+    """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m.
+
+    >>> import rapkm_lite as rk
+    >>> path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plot_torque_choices(path, {"least torque": rk.inverse_dynamics(path.robot, path.q, path.qd, path.qdd)})
+    """
+    if axes is None:
+        axes = plt.subplots(1, len(choices), figsize=(12.0, 3.1), sharey=True, squeeze=False)[1][0]
+    for ax, (title, torques) in zip(axes, choices.items(), strict=True):
+        for i, torque in enumerate(1e3 * np.asarray(torques).T):
+            ax.plot(trajectory.t, torque, label=f"drive {i + 1}", **arm_line(i))
+        ax.set(title=title, xlabel="time in s", ylabel="torque in mN m", xlim=(trajectory.t[0], trajectory.t[-1]))
+        ax.label_outer()
+    axes[0].legend(loc="upper right")
+    return axes

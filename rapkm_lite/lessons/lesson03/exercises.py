@@ -45,7 +45,7 @@ def _fight(n, gains, offset):
 
 def _open_chain(c, n, gains, offset):
     """Stretches c / k and offsets of the springs in series must close: n.(c / k + offset) = 0."""
-    return abs(n @ (c / gains + offset)), "gap n.(c / k + offset) of the springs in series, rad"
+    return abs(n @ (c / gains + offset)), "gap eta.(c / K + offset) of the springs in series, rad"
 
 
 def _rests(name: str):
@@ -74,11 +74,11 @@ def _unexplained_gain(gains):
 EXERCISES = {
     "03.rest_error": Exercise(
         steady_state_error,
-        "solve the two equations A^T K_P (A dx + offset) = 0 for dx, then e = A dx",
+        "solve the two equations A^T K_P (A xi + offset) = 0 for the shift xi, then e = A xi",
         "rad", _rest_cases, _unbalanced, 1e-9),
     "03.fight": Exercise(
         _fight,
-        "c = -mu n; the errors -c / k - offset must lie in the tangent plane, so n times them is zero",
+        "c = mu eta; the errors -c / K - offset must lie in the tangent plane, so eta times them is zero",
         "N m", _fight_cases, _open_chain, 1e-9),
     "03.counts": Exercise(
         lambda K_P, friction: np.pi * K_P / friction,
@@ -89,10 +89,10 @@ EXERCISES = {
                                        "difference of the torque step from 2 f_c, in N m"), 1e-8),
     "03.offsets": Exercise(
         lambda: hidden("offset_a")[0],
-        "each rest gives one equation n.offset = -n.c / k; three rests, three unknowns",
+        "each rest gives one equation eta.offset = -eta.c / k_P; three rests, three unknowns",
         "rad", invariant=_unexplained_torque, tolerance=3e-4),
     "03.gains": Exercise(
         lambda: hidden("gain")[1],
-        "at rest c_i = -k_i times (measured minus desired): a straight line through the origin for each drive",
+        "at rest c_i = -K_i times (measured minus desired): a straight line through the origin for each drive",
         "N m/rad", invariant=_unexplained_gain, tolerance=0.2),
 }

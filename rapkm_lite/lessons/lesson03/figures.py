@@ -105,7 +105,7 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
     flat = np.abs(np.gradient(torque)) == 0.0
     ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
-    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, rests here")
+    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, can rest here")
     ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
     ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
     return ax
@@ -125,7 +125,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
     ax.set(xscale="log", title=title,
-           xlabel="step of the torque over width of the friction band, $K_P\\Delta / (2f_c)$",
+           xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
            ylabel="torque jumps per second")
     _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
     ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
