@@ -67,8 +67,8 @@ from .lessons.lesson03.figures import (
 )
 from .lessons.lesson04.figures import (
     plot_antagonism,
-    plot_difference,
     plot_energies,
+    plot_joint_moves,
     plot_synchronization,
     plot_table1,
     plot_torque_norms,
@@ -83,6 +83,7 @@ from .lessons.lesson05.figures import (
     plot_lyapunov,
     plot_pairs,
     plot_partition_rules,
+    plot_singular_poses,
     plot_step_response,
     plot_torques_and_errors,
 )
@@ -121,7 +122,6 @@ __all__ = [
     "plot_configuration_space",
     "plot_control_fields",
     "plot_cut_tree",
-    "plot_difference",
     "plot_disagreement",
     "plot_ee_errors",
     "plot_ee_paths",
@@ -135,6 +135,7 @@ __all__ = [
     "plot_gain_ratio",
     "plot_grid_search",
     "plot_joint_angles",
+    "plot_joint_moves",
     "plot_landscape",
     "plot_log",
     "plot_loop_gaps",
@@ -153,6 +154,7 @@ __all__ = [
     "plot_prestress_maps",
     "plot_readings",
     "plot_rest_torques",
+    "plot_singular_poses",
     "plot_step_response",
     "plot_synchronization",
     "plot_table1",
