@@ -75,7 +75,6 @@ from .lessons.lesson04.figures import (
     plot_torque_plane,
 )
 from .lessons.lesson05.figures import (
-    plot_ee_errors,
     plot_ee_paths,
     plot_effective_gain,
     plot_feedback_along,
@@ -123,7 +122,6 @@ __all__ = [
     "plot_control_fields",
     "plot_cut_tree",
     "plot_disagreement",
-    "plot_ee_errors",
     "plot_ee_paths",
     "plot_effective_gain",
     "plot_energies",

@@ -85,7 +85,6 @@ CALLS = {
     "plot_feedback_map": lambda w: (w["robot"], (0, 1)),
     "plot_feedback_along": lambda w: (w["path"],),
     "plot_torques_and_errors": lambda w: (w["run"],),
-    "plot_ee_errors": lambda w: (w["runs"],),
     "plot_ee_paths": lambda w: (w["runs"],),
     "plot_pairs": lambda w: (w["switched"],),
     "plot_partition_rules": lambda w: (w["robot"],),

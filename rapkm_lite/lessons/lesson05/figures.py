@@ -92,11 +92,8 @@ def plot_feedback_along(trajectory, ax=None):
     return ax
 
 
-def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_to: float | None = None):
-    """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve.
-
-    linear_to : torque in N m beyond which the torque axis is logarithmic; None for a linear axis.
-    """
+def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
+    """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve."""
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
     plot_torques(run, axes[0], title, milli=False)
@@ -105,27 +102,10 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_t
     for ax in axes:
         for t in run.t[at]:
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
-    if linear_to is not None:
-        axes[0].set_yscale("symlog", linthresh=linear_to)
-        low, high = axes[0].get_ylim()
-        ticks = [t for t in (-100, -10, -1, -0.1, 0, 0.1, 1, 10, 100) if low <= t <= high]
-        axes[0].set_yticks(ticks, [f"{t:g}" for t in ticks])
     # One legend for both panels, above the data.
     axes[0].get_legend().remove()
     axes[1].legend(ncols=run.robot.n_arms, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return axes
-
-
-def plot_ee_errors(runs: dict, ax=None):
-    """Distance of the end-effector from its desired position over time, one line per run; keys are labels."""
-    ax = axes_or_new(ax)
-    for label, run in runs.items():
-        distance = np.linalg.norm(run.x - run.trajectory.x, axis=-1)
-        ax.semilogy(run.t[1:], 1e3 * distance[1:], label=label, **_law_line(label))
-    longest = max(run.t[-1] for run in runs.values())
-    ax.set(xlabel="time in s", ylabel="end-effector error in mm", xlim=(0, longest), ylim=(0.05, None))
-    ax.legend(ncols=len(runs), loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    return ax
 
 
 def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -0.045)):
