@@ -76,8 +76,8 @@ EXERCISES = {
         "N m per rad/s^2", _pairs_at_poses, _acceleration),
     "05.explicit_pseudoinverse": Exercise(
         explicit_pseudoinverse,
-        "with B = (A~_1^T)^+ A~_2^T first the bottom block, (I + B^T B)^-1 B^T (A~_1^T)^+; the top one is (A~_1^T)^+ minus "
-        "B times it; then put the rows into the order of the drives",
+        "with B = (A~_1^T)^+ A~_2^T first the bottom block, (I + B^T B)^-1 B^T (A~_1^T)^+; the top one is "
+        "(A~_1^T)^+ minus B times it; then put the rows into the order of the drives",
         "(without unit)", _partitions, _penrose),
     "05.gain_for_bandwidth": Exercise(
         gain_for_bandwidth,

@@ -195,6 +195,5 @@ def plot_lyapunov(t, functions: dict, rate, axes=None):
     axes[1].axhline(rate, color=ALARM, ls=":", label=f"{rate:g} 1/s")
     axes[0].set(xlabel="time in s", ylabel="value in J", xlim=(0, t[-1]))
     axes[1].set(xlabel="time in s", ylabel="rate of decay in 1/s", xlim=(0, t[-1]), ylim=(0, None))
-    axes[0].legend(loc="upper right")
-    axes[1].legend(loc="upper right", ncols=len(functions) + 1)
+    axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(functions) + 1)
     return axes
