@@ -87,7 +87,6 @@ from .lessons.lesson05.figures import (
     plot_torques_and_errors,
 )
 from .lessons.lesson06.figures import (
-    plot_agreement,
     plot_bands,
     plot_gain_curve,
     plot_landscape,
@@ -112,7 +111,6 @@ __all__ = [
     "per_drive",
     "plane_axes",
     "plane_grid",
-    "plot_agreement",
     "plot_antagonism",
     "plot_available_forces",
     "plot_bands",

@@ -99,7 +99,6 @@ CALLS = {
     "plot_energies": lambda w: ({"a": scatter(3), "b": scatter(3)},),
     "plot_table1": lambda w: (rk.table1(),),
     "plot_landscape": lambda w: (np.arange(4.0), scatter(64).reshape(4, 4, 4), scatter(64).reshape(4, 4, 4)),
-    "plot_agreement": lambda w: (scatter(9), scatter(9)),
     "plot_gain_curve": lambda w: (np.geomspace(1, 50, 5), scatter(5), scatter(5), scatter(5)),
     "plot_placement": lambda w: (w["robot"], np.zeros((3, 2)), scatter(3)),
     "plot_bands": lambda w: ({"a": scatter(20), "b": scatter(20)},),
