@@ -4,6 +4,7 @@
     python notebooks/build.py 03 04          # the notebooks whose names begin so
     python notebooks/build.py overview       # the picture of the README
     python notebooks/build.py figures        # nothing but the list of all figures
+    python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
@@ -146,6 +147,53 @@ def figure_list() -> str:
     return "\n".join([*text, "", "__all__ = [", *(f'    "{name}",' for name in sorted(owner)), "]", ""])
 
 
+def cells(text: str) -> list[nbformat.NotebookNode]:
+    """Cells of a notebook written as text: a line ``# %%``, ``# %% [markdown]`` or ``# %% tags=[...]`` begins each one.
+
+    Lines of Markdown stand behind ``# ``.
+    """
+    made = []
+    for block in re.split(r"^# %%", text, flags=re.M)[1:]:
+        head, _, body = block.partition("\n")
+        if "[markdown]" in head:
+            made.append(nbformat.v4.new_markdown_cell(re.sub(r"^# ?", "", body, flags=re.M).strip()))
+        else:
+            tags = ast.literal_eval(head.partition("=")[2] or "[]")
+            made.append(nbformat.v4.new_code_cell(body.strip(), metadata={"tags": tags} if tags else {}))
+    return made
+
+
+def new(name: str) -> None:
+    """Lay out a lesson: its source in ``solutions/``, its room in ``rapkm_lite/lessons/``, its line in the README.
+
+    Raises ValueError when the name is not like 13_title or its number is taken.
+    """
+    number, _, words = name.partition("_")
+    room = PACKAGE / "lessons" / f"lesson{number}"
+    if not re.fullmatch(r"\d\d_[a-z0-9_]+", name) or room.exists():
+        raise ValueError(f"name = {name!r}; allowed: a number that no lesson has, and words, like 13_title")
+
+    def filled(path: Path) -> str:
+        return path.read_text(encoding="utf-8").replace("NN", number).replace("TITLE", words.replace("_", " "))
+
+    skeleton = HERE / "skeleton"
+    room.mkdir()
+    (room / "__init__.py").write_text(f'"""Lesson {number}: {words.replace("_", " ")}."""\n', encoding="utf-8")
+    for part in ("figures.py", "exercises.py"):
+        (room / part).write_text(filled(skeleton / part), encoding="utf-8")
+    notebook = nbformat.v4.new_notebook(cells=cells(filled(skeleton / "lesson.py")))
+    tidy(notebook)
+    nbformat.write(notebook, SOLUTIONS / f"{name}.ipynb")
+    readme = HERE.parent / "README.md"
+    question = notebook.cells[0].source.splitlines()[0].removeprefix("# ").partition(" · ")[2]
+    lines = readme.read_text(encoding="utf-8").splitlines(keepends=True)
+    last = max(k for k, line in enumerate(lines) if re.match(r"\| \[\d\d_", line))
+    lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 20 | – | – |\n")
+    readme.write_text("".join(lines), encoding="utf-8")
+    (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
+    print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number}")
+
+
 def main(wanted: list[str]) -> None:
     """Build the notebooks whose names begin with one of `wanted`, or all."""
 
@@ -166,4 +214,7 @@ def main(wanted: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    if sys.argv[1:2] == ["new"]:
+        new(*sys.argv[2:])
+    else:
+        main(sys.argv[1:])

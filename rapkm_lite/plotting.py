@@ -3,22 +3,27 @@
 Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.
 """
 
-from .figures.actuation import (
-    curve_crossings,
-    pair_line,
-    pair_name,
-    plot_map,
-    plot_pair_curves,
-)
 from .figures.machine import (
+    arm_points,
     plane_axes,
-    plane_grid,
+    plane_limits,
     plot_machine,
     plot_path,
     plot_workspace,
 )
+from .figures.maps import (
+    curve_crossings,
+    grid_points,
+    mode_name,
+    on_grid,
+    pair_line,
+    pair_measures,
+    pair_name,
+    plot_map,
+    plot_pair_curves,
+)
 from .figures.runs import (
-    per_drive,
+    lines_per_drive,
     plot_errors,
     plot_torques,
 )
@@ -104,13 +109,18 @@ __all__ = [
     "STYLE",
     "arm_colour",
     "arm_line",
+    "arm_points",
     "axes_or_new",
     "curve_crossings",
+    "grid_points",
+    "lines_per_drive",
+    "mode_name",
+    "on_grid",
     "pair_line",
+    "pair_measures",
     "pair_name",
-    "per_drive",
     "plane_axes",
-    "plane_grid",
+    "plane_limits",
     "plot_antagonism",
     "plot_available_forces",
     "plot_bands",

@@ -100,7 +100,9 @@ def test_one_picture_per_working_mode():
 
 def test_workspace_grid_keeps_off_the_boundary():
     robot = rk.load()
-    x, y = plotting.plane_grid(robot, 121)
-    points = np.stack([x, y], axis=-1)
-    q = rk.inverse_kinematics(robot, points[rk.reachable(robot, points)])
-    assert np.abs(np.sin(q[:, 3:])).min() > 1e-4
+    x, y, inside, points = plotting.grid_points(robot, 121)
+    q = rk.inverse_kinematics(robot, points)
+    assert np.abs(np.sin(q[:, 3:])).min() > 1e-6
+    np.testing.assert_array_equal(plotting.on_grid(inside, points)[inside], points)
+    i, j = np.argwhere(inside)[7]
+    assert points[7].tolist() == [x[j], y[i]]

@@ -5,11 +5,12 @@
 '0 mN m'
 """
 
+from ..figures.machine import plane_limits
 from .builder import Explorer, choice, explorer, log_slider, slider, switch
 from .geometry import actuation, machine, prestress
 from .landscape import landscape
 from .live import LivePicture
 from .motion import animation
-from .parts import draw_machine, drive_legend, legend, offset_sliders, plane_limits
+from .parts import draw_machine, drive_legend, legend, offset_sliders
 from .runs import bars, decentralized_run, steady_state
 from .torque import computed_torque

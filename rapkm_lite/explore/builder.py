@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import ipywidgets as widgets
 
-from .. import engine
 from ..machine.arguments import ConvergenceError
+from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
 from .live import LivePicture
 
@@ -81,7 +81,7 @@ def explorer(draw: Callable, controls: dict, panels: dict, *, layout=None, width
     if play is not None and play not in controls:
         raise ValueError(f"play = {play!r}; allowed: one of {', '.join(controls)}")
     picture = LivePicture(panels, layout, widths, size, setup)
-    return Explorer(draw, controls, picture, play, engine.COMPILED if live is None else live)
+    return Explorer(draw, controls, picture, play, COMPILED if live is None else live)
 
 
 class Explorer:
@@ -197,7 +197,7 @@ class Explorer:
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         """One output: the widget where a kernel runs, the picture and its numbers elsewhere."""
-        view = self.widget._repr_mimebundle_()
+        view = self.widget._repr_mimebundle_() or {}
         said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
         picture = base64.b64encode(self.png).decode()
         return {**view, "image/png": picture, "text/plain": "\n".join([repr(self), *said])}

@@ -8,17 +8,17 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from ..figures.actuation import pair_line, pair_name
-from ..figures.machine import plane_grid, plot_workspace
+from ..figures.machine import plane_limits, plot_workspace
+from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
-from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
+from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
 from .builder import Explorer, choice, explorer, slider
-from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive, plane_limits
+from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive
 
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
@@ -27,43 +27,28 @@ MAP = ListedColormap(["#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F
 LEVELS = BoundaryNorm([0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5], MAP.N)
 
 
-def mode_word(mode) -> str:
-    """A working mode as signs."""
-    return " ".join("+" if s > 0 else "−" for s in mode)
-
-
 def pair_legend(ax, robot: Manipulator) -> None:
     """A legend of the first pairs' lines."""
     pairs = act.drive_pairs(robot)[:4]
     legend(ax, [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)])
 
 
-def sigma_pairs(robot: Manipulator, q) -> np.ndarray:
-    """Smallest singular value of A for each pair of drives alone, (..., pairs) in rad/m."""
-    A = act.control_matrix(robot, q)
-    return np.stack([act.singular_values(A[..., list(p), :])[..., 1] for p in act.drive_pairs(robot)], axis=-1)
-
-
 def machine(robot: Manipulator | None = None) -> Explorer:
     """The end-effector by two sliders in every working mode, a map of sigma_min, and the five-bar of each pair."""
     robot = frictionless(robot)
     pairs = act.drive_pairs(robot)[:3]
-    modes = {mode_word(m): m for m in working_modes(robot)}
+    modes = {mode_name(m): m for m in working_modes(robot)}
     which = ["all drives", *(f"pair {pair_name(p)}" for p in pairs)]
-    gx, gy = plane_grid(robot, 121)
-    grid = np.stack([gx, gy], axis=-1)
-    extent = gx[0, 0], gx[0, -1], gy[0, 0], gy[-1, 0]
-    inside = reachable(robot, grid)
-    # On the very boundary an arm is straight and A in end-effector coordinates does not exist.
-    inside[inside] = np.all(np.abs(np.sin(inverse_kinematics(robot, grid[inside])[:, robot.n_arms :])) > 1e-6, axis=-1)
+    gx, gy, inside, points = grid_points(robot, 121)
+    # An image ends where its last pixels end, half a step beyond their centres.
+    wide, tall = (gx[1] - gx[0]) / 2, (gy[1] - gy[0]) / 2
+    extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ma.MaskedArray:
-        A = act.control_matrix(robot, inverse_kinematics(robot, grid[inside], modes[mode]))
+        A = act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
         rows = slice(None) if drives == which[0] else list(pairs[which.index(drives) - 1])
-        values = np.ma.masked_all(gx.shape)
-        values[inside] = act.singular_values(A[:, rows])[:, 1]
-        return values
+        return on_grid(inside, act.singular_values(A[:, rows])[:, 1])
 
     def draw(picture, x, y, mode, drives):
         sigma = sigma_map(mode, drives)
@@ -75,7 +60,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         draw_machine(picture, "machine", robot, q)
         numbers = {"degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
                    "σ_min of all drives": f"{all_drives:.2f} rad/m"}
-        for pair, name, value in zip(pairs, "abc", sigma_pairs(robot, q), strict=False):
+        for pair, name, value in zip(pairs, "abc", pair_measures(robot, q), strict=False):
             weak = value < WEAK
             draw_machine(picture, name, robot, q, arms=pair)
             picture.text(name, 0.5, 1.02, f"{pair_name(pair)}: {value:.2f} rad/m", inside=True, ha="center",
@@ -83,7 +68,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"
         return numbers
 
-    plane = plane_limits(robot)
+    plane = plane_limits(robot, 0.05)
     small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {"xticks": [], "yticks": [], "title": " "}
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
 
@@ -105,8 +90,8 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
-        size = 1e-3 * size
-        t = triangle(robot, size, dt=0.01) if path == "triangle" else circle(robot, size / 2, dt=0.01)
+        side = 1e-3 * size
+        t = triangle(robot, side, dt=0.01) if path == "triangle" else circle(robot, side / 2, dt=0.01)
         A = act.control_matrix(robot, t.q)
         if robot.n_arms == 3:
             null = null_vector(robot, t.q)
@@ -114,7 +99,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
             share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
             null = np.sqrt(np.maximum(share, 0.0))
-        return t, A, sigma_pairs(robot, t.q), null
+        return t, A, pair_measures(robot, t.q), null
 
     def draw(picture, place, path, size, torque):
         t, A, sigma, null = along(path, size)
@@ -153,7 +138,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         legend(axes["force"], [("all drives", {"color": AFTER})])
 
     way = "place on the path in %"
-    panels = {"plane": plane_limits(robot) | {"title": "Machine"},
+    panels = {"plane": plane_limits(robot, 0.05) | {"title": "Machine"},
               "sigma": {"title": "Pairs", "xlabel": way, "ylabel": "σ_min in rad/m", "xlim": (0, 100), "ylim": (0, 8)},
               "null": {"title": "Null vector", "xlabel": way, "ylabel": "component", "xlim": (0, 100),
                        "ylim": (-1.05, 1.05)},

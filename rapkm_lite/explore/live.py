@@ -149,7 +149,8 @@ class LivePicture:
         self._draw_background(renderer)
         for artist in sorted(self._drawn, key=lambda a: a.get_zorder()):
             artist.draw(renderer)
-        image = Image.frombuffer("RGBA", self.canvas.get_width_height(), self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+        pixels = np.asarray(self.canvas.buffer_rgba())
+        image = Image.frombuffer("RGBA", self.canvas.get_width_height(), pixels, "raw", "RGBA", 0, 1)
         file = io.BytesIO()
         # 64 colours are enough for lines on white, and half the size and time of all colours.
         image.convert("RGB").quantize(64, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(
@@ -190,7 +191,7 @@ class LivePicture:
             with mpl.rc_context(_RC):
                 self.figure.patch.draw(renderer)
                 ax.draw(renderer)
-                box = ax.get_tightbbox(renderer)
+                box = ax.get_tightbbox(renderer) or ax.bbox
             width, height = self.canvas.get_width_height()
             rows = slice(max(0, height - int(box.y1) - 3), max(0, height - int(box.y0) + 3))
             where = rows, slice(max(0, int(box.x0) - 3), int(box.x1) + 4)

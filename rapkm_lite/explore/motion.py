@@ -7,14 +7,14 @@ from functools import lru_cache
 import numpy as np
 
 from ..control.laws import PD
-from ..figures.machine import plot_path, plot_workspace
+from ..figures.machine import plane_limits, plot_path, plot_workspace
 from ..figures.style import AFTER, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider, switch
-from .parts import TIME, draw_machine, drive_legend, frictionless, plane_limits
+from .parts import TIME, draw_machine, drive_legend, frictionless
 from .runs import LAWS
 
 
@@ -58,7 +58,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         axes["plane"].set(**plane)
         drive_legend(axes["torque"], robot)
 
-    plane = plane_limits(robot) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
+    plane = plane_limits(robot, 0.05) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
               "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.lines import Line2D
 
+from ..figures.machine import arm_points
 from ..figures.style import NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.kinematics import arm_vectors
 from .builder import slider
 
 TIME = "time in s"
@@ -20,17 +20,16 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
 
 def draw_machine(picture, panel: str, robot: Manipulator, q, arms=None, faint=()) -> None:
     """The arms at one pose q (2N,): filled circles are drives, open ones passive joints; `faint` arms are pale."""
-    a, d = arm_vectors(robot, q)
+    chains = arm_points(robot, q)
     for i in range(robot.n_arms) if arms is None else arms:
-        points = np.stack([robot.base[i], robot.base[i] + a[i], robot.base[i] + a[i] + d[i]])
+        points = chains[i]
         colour, alpha = arm_colour(i), 0.2 if i in faint else 1.0
         picture.line(panel, *points.T, color=colour, linewidth=4, alpha=alpha, solid_capstyle="round", zorder=3)
         picture.line(panel, *points[0], color=colour, marker="o", markersize=10, alpha=alpha, zorder=4)
         picture.line(panel, *points[1], color=colour, marker="o", markersize=6.5, alpha=alpha, markerfacecolor="white",
                      markeredgewidth=2, zorder=4)
-    tip = robot.base[0] + a[0] + d[0]
-    picture.line(panel, *tip, color=NEUTRAL, marker="s", markersize=7, markerfacecolor="white", markeredgewidth=1.8,
-                 zorder=5)
+    picture.line(panel, *chains[0, 2], color=NEUTRAL, marker="s", markersize=7, markerfacecolor="white",
+                 markeredgewidth=1.8, zorder=5)
 
 
 def legend(ax, entries) -> None:
@@ -50,14 +49,6 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
     values = np.resize(values, robot.n_arms)
     return {f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(values[i]))
             for i in range(robot.n_arms)}
-
-
-def plane_limits(robot: Manipulator) -> dict:
-    """Keywords of a panel that shows the plane: equal scales and room for the machine in any pose."""
-    room = robot.lengths[:, 0].max() + 0.05 * robot.lengths.max()
-    low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
-    return {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (low[0], high[0]),
-            "ylim": (low[1], high[1])}
 
 
 def per_drive(values, digits: int) -> str:

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
-from ..figures.actuation import pair_line, pair_name
-from ..figures.machine import plane_grid, plot_workspace
+from ..figures.machine import plot_workspace
+from ..figures.maps import grid_points, on_grid, pair_line, pair_name
 from ..figures.style import AFTER, NEUTRAL, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
-from ..mechanics.kinematics import inverse_kinematics, reachable
+from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .builder import Explorer, choice, explorer, slider
@@ -42,13 +42,9 @@ def singular_curves(robot: Manipulator) -> dict:
     """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
     from contourpy import contour_generator
 
-    gx, gy = plane_grid(robot, 161)
-    grid = np.stack([gx, gy], axis=-1)
-    inside = reachable(robot, grid)
-    values = np.full((*gx.shape, len(act.drive_pairs(robot))), np.nan)
-    values[inside] = act.distal_cross_products(robot, inverse_kinematics(robot, grid[inside]))
-    return {pair: [line for line in contour_generator(gx, gy, np.ma.masked_invalid(values[..., i])).lines(0.0)]
-            for i, pair in enumerate(act.drive_pairs(robot))}
+    x, y, inside, points = grid_points(robot, 161)
+    values = on_grid(inside, act.distal_cross_products(robot, inverse_kinematics(robot, points)))
+    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(act.drive_pairs(robot))}
 
 
 def computed_torque(robot: Manipulator | None = None) -> Explorer:

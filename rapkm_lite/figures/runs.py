@@ -8,15 +8,15 @@ from .style import arm_line, axes_or_new
 def plot_torques(run, ax=None, title: str = "", milli: bool = True):
     """Drive torques over time, in mN m or, for large ones, in N m."""
     scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
-    return per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
+    return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
 
 
 def plot_errors(run, ax=None, title: str = ""):
     """Errors of the true base angles over time."""
-    return per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
+    return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
 
 
-def per_drive(run, values, ax, ylabel: str, title: str):
+def lines_per_drive(run, values, ax, ylabel: str, title: str):
     """One line per drive; the margin keeps the legend off the curves, also on shared axes."""
     ax = axes_or_new(ax)
     for i, line in enumerate(values.T):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import matplotlib as mpl
 import matplotlib.pyplot as plt
+import matplotlib.style
 
 STYLE = Path(__file__).with_name("rapkm.mplstyle")
 # P. Tol's high-contrast scheme first; from the fourth arm on, colours between them in lightness.
@@ -36,6 +37,7 @@ def axes_or_new(ax=None, **figure):
         return ax
     # The figure comes first: a backend that is loaded inside a style context is not interactive when the context ends,
     # and a notebook would show no figure any more.
-    fig = plt.figure(layout="constrained", **({"figsize": (8.0, 3.2)} | figure))
-    with mpl.style.context(STYLE):
+    settings: dict[str, Any] = {"figsize": (8.0, 3.2)} | figure
+    fig = plt.figure(layout="constrained", **settings)
+    with matplotlib.style.context(STYLE):
         return fig.add_subplot()

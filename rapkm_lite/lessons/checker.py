@@ -44,6 +44,54 @@ def exercises() -> dict[str, Exercise]:
     return found
 
 
+class _Verdict(Exception):
+    """What ends an examination before its last case: the verdict and its sentence."""
+
+
+def _answer(answer, case: tuple, shape: tuple[int, ...]) -> np.ndarray:
+    """What an answer gives for one case, as an array of the expected shape; raises `_Verdict` where it gives none."""
+    try:
+        got = answer(*case) if callable(answer) else answer
+    except NotImplementedError:
+        raise _Verdict("todo", "not yet") from None
+    except Exception as error:
+        raise _Verdict("wrong", f"your code stops with {type(error).__name__}: {error}") from error
+    if got is Ellipsis or got is None:
+        raise _Verdict("todo", "not yet: no value is returned")
+    try:
+        got = np.asarray(got, dtype=float)
+    except (TypeError, ValueError):
+        raise _Verdict("wrong", "the answer is not numeric") from None
+    if got.shape != shape:
+        raise _Verdict("wrong", f"the answer has shape {got.shape}, expected {shape}")
+    if not np.all(np.isfinite(got)):
+        raise _Verdict("wrong", "the answer holds NaN or infinity")
+    return got
+
+
+def _measure(exercise: Exercise, answer) -> str:
+    """The sentence for a right answer; raises `_Verdict` with the measured number for any other."""
+    if answer is Ellipsis or answer is None:
+        raise _Verdict("todo", "not yet")
+    cases, limit = exercise.cases(np.random.default_rng(20_111_130)), exercise.tolerance
+    worst = lawful = 0.0
+    sentence = ""
+    for case in cases:
+        want = np.asarray(exercise.reference(*case), dtype=float)
+        got = _answer(answer, case, want.shape)
+        worst = max(worst, float(np.max(np.abs(got - want), initial=0.0)))
+        if exercise.invariant:
+            number, text = exercise.invariant(got, *case)
+            if number >= lawful:
+                lawful, sentence = float(number), text
+    if worst > limit:
+        raise _Verdict("wrong", f"it is off by up to {worst:.3g} {exercise.unit} (allowed {limit:.0e})")
+    if lawful > limit:
+        raise _Verdict("wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e})")
+    law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
+    return f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
+
+
 def examine(name: str, answer) -> tuple[str, str]:
     """Verdict ("ok", "todo" or "wrong") and a sentence with the measured number for an answer to one exercise.
 
@@ -52,42 +100,11 @@ def examine(name: str, answer) -> tuple[str, str]:
     known = exercises()
     if name not in known:
         raise ValueError(f"name = {name!r}; allowed: {', '.join(sorted(known))}")
-    exercise = known[name]
-    if answer is Ellipsis or answer is None:
-        return "todo", f"not yet. Hint: {exercise.hint}"
-    cases = exercise.cases(np.random.default_rng(20_111_130))
-    worst = lawful = 0.0
-    sentence = ""
-    for case in cases:
-        try:
-            got = answer(*case) if callable(answer) else answer
-        except NotImplementedError:
-            return "todo", f"not yet. Hint: {exercise.hint}"
-        except Exception as error:
-            return "wrong", f"your code stops with {type(error).__name__}: {error}. Hint: {exercise.hint}"
-        if got is Ellipsis or got is None:
-            return "todo", f"not yet: no value is returned. Hint: {exercise.hint}"
-        want = np.asarray(exercise.reference(*case), dtype=float)
-        try:
-            got = np.asarray(got, dtype=float)
-        except (TypeError, ValueError):
-            return "wrong", f"the answer is not numeric. Hint: {exercise.hint}"
-        if got.shape != want.shape:
-            return "wrong", f"the answer has shape {got.shape}, expected {want.shape}. Hint: {exercise.hint}"
-        if not np.all(np.isfinite(got)):
-            return "wrong", f"the answer holds NaN or infinity. Hint: {exercise.hint}"
-        worst = max(worst, float(np.max(np.abs(got - want), initial=0.0)))
-        if exercise.invariant:
-            number, text = exercise.invariant(got, *case)
-            if number >= lawful:
-                lawful, sentence = float(number), text
-    limit = exercise.tolerance
-    if worst > limit:
-        return "wrong", f"it is off by up to {worst:.3g} {exercise.unit} (allowed {limit:.0e}). Hint: {exercise.hint}"
-    if exercise.invariant and lawful > limit:
-        return "wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e}). Hint: {exercise.hint}"
-    law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
-    return "ok", f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
+    try:
+        return "ok", _measure(known[name], answer)
+    except _Verdict as verdict:
+        word, sentence = verdict.args
+        return word, f"{sentence}. Hint: {known[name].hint}"
 
 
 def check(name: str, answer):

@@ -10,7 +10,7 @@ import numpy as np
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.controller import Controller
 from ..control.laws import PD, AntagonismFilter, CommandFilter, Law
-from ..engine import lanes, tables
+from ..engine import COMPILED, lanes, tables
 from ..machine.arguments import ConvergenceError, real_array
 from .patience import patience
 
@@ -82,8 +82,6 @@ def _diagonal(name: str, K: np.ndarray, size: int, N: int) -> np.ndarray:
 
 def _plain(array: np.ndarray):
     """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
-    from ..engine.jit import COMPILED
-
     return array if COMPILED else array.tolist()
 
 

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plot_machine
+from ...figures.maps import mode_name
 from ...mechanics.kinematics import inverse_kinematics, working_modes
 
 
@@ -16,6 +17,6 @@ def plot_working_modes(robot, x, axes=None):
         axes = plt.subplots(2, len(modes) // 2, figsize=(2.5 * len(modes) // 2, 5.2), sharex=True, sharey=True)[1]
     for ax, mode in zip(np.ravel(axes), modes, strict=True):
         plot_machine(robot, inverse_kinematics(robot, x, mode), ax, labels=False)
-        ax.set_title("(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")", loc="center")
+        ax.set_title(mode_name(mode), loc="center")
         ax.label_outer()
     return axes

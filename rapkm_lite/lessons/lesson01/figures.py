@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+import matplotlib.style
 import numpy as np
+from matplotlib.ticker import MultipleLocator
 
 from ...figures.machine import plot_machine
+from ...figures.maps import mode_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
@@ -17,7 +20,7 @@ def plot_joint_angles(robot, q, ax=None):
     ax = plot_machine(robot, q, ax, labels=False)
     N, size = robot.n_arms, 0.28 * robot.lengths.max()
     for i in range(N):
-        base, elbow = q[i], q[N + i]
+        base, elbow = float(q[i]), float(q[N + i])
         at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
         _angle(ax, robot.base[i], 0.0, base, size, f"$q_{{{i + 1}}}$", arm_colour(i))
         _angle(ax, at, base, base + elbow, size, f"$q_{{{N + i + 1}}}$", arm_colour(i))
@@ -105,14 +108,14 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     q (2N,) marks a configuration, F (2N, 2) a patch of the tangent plane there, `trajectory` draws its path on V.
     """
     if ax is None:
-        with mpl.style.context(STYLE):
+        with matplotlib.style.context(STYLE):
             ax = plt.figure(figsize=(6.4, 5.4)).add_subplot(projection="3d", computed_zorder=False)
     rims = []
     shades = mpl.colormaps["cividis"](np.linspace(0.9, 0.3, len(modes)))
     for shade, mode in zip(shades, modes, strict=True):
         sheet = np.rad2deg(configuration_sheet(robot, mode))
-        name = "".join("+" if s > 0 else "−" for s in mode)
-        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.8, lw=0, rstride=1, cstride=1, label=f"mode {name}")
+        label = f"mode {mode_name(mode)}"
+        ax.plot_surface(*sheet[..., :3].T, color=shade, alpha=0.8, lw=0, rstride=1, cstride=1, label=label)
         ax.plot(*sheet[-1, :, :3].T, color=NEUTRAL, lw=0.8)
         rims.append(sheet[-1])
     if len(rims) == 2:
@@ -131,10 +134,10 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     ax.set(xlabel="base angle 1 in °", ylabel="base angle 2 in °", zlabel="base angle 3 in °")
     ax.set_aspect("equal")
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_major_locator(mpl.ticker.MultipleLocator(90 if len(modes) > 2 else 45))
+        axis.set_major_locator(MultipleLocator(90 if len(modes) > 2 else 45))
         axis.labelpad = 10
     ax.view_init(elev=22, azim=-105)
-    ax.set_box_aspect(None, zoom=0.95)
+    ax.set_box_aspect(None, zoom=0.95)  # pyright: ignore[reportArgumentType]
     ax.legend(loc="upper left", fontsize=9)
     return ax
 
@@ -173,7 +176,7 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
     for i, force in enumerate(forces):
-        ax.annotate("", x + force / newton_per_metre, x, zorder=7,
+        ax.annotate("", tuple(x + force / newton_per_metre), tuple(x), zorder=7,
                     arrowprops={"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0})
         ax.plot([], [], color=arm_colour(i), lw=2.4, label=f"on arm {i + 1}: {np.hypot(*force):.2f} N")
     ax.legend(loc="upper left")

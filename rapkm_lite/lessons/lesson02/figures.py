@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import Circle
 
-from ...figures.actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.machine import plot_machine, plot_path, plot_workspace
+from ...figures.maps import (
+    curve_crossings,
+    grid_points,
+    mode_name,
+    on_grid,
+    pair_line,
+    pair_measures,
+    pair_name,
+    plot_map,
+    plot_pair_curves,
+)
 from ...figures.style import ALARM, NEUTRAL, arm_line, axes_or_new
 from ...mechanics.actuation import (
     control_matrix,
@@ -16,16 +27,14 @@ from ...mechanics.actuation import (
     singular_values,
 )
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
-from ...mechanics.maps import workspace_grid
 
 
 def plot_control_fields(robot, axes=None, n: int = 15):
     """Control vector fields (8)-(9), one panel per drive: end-effector acceleration per torque, m/s^2 per N m."""
     if axes is None:
-        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True)[1]
+        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True, squeeze=False)[1][0]
     # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
-    x, y, inside = workspace_grid(robot.replace(lengths=0.985 * robot.lengths), n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    *_, points = grid_points(robot.replace(lengths=0.985 * robot.lengths), n)
     field = control_vector_fields(robot, inverse_kinematics(robot, points))
     for i, ax in enumerate(axes):
         plot_workspace(robot, ax)
@@ -52,7 +61,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
         if marks is not None and marks[k] is not None:
             ax.plot(*marks[k], "o", mfc="none", mec=ALARM, mew=2.2, ms=14, zorder=5)
-        ax.set_title("(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")")
+        ax.set_title(mode_name(mode))
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
     np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min of Ã, all drives", shrink=0.8)
@@ -103,13 +112,12 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
     """Share |n_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
-    x, y, inside = workspace_grid(robot, n)
-    A = control_matrix(robot, inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside]))
-    share = np.ma.masked_all((3, *inside.shape))
-    share[:, inside] = np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]).T
+    x, y, inside, points = grid_points(robot, n)
+    A = control_matrix(robot, inverse_kinematics(robot, points))
+    share = on_grid(inside, np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]))
     for i, ax in enumerate(axes):
-        plot_map(x, y, share[i], ax, vmin=0.0, vmax=1.0, bar=False)
-        pair = tuple(j for j in range(3) if j != i)
+        plot_map(x, y, share[..., i], ax, vmin=0.0, vmax=1.0, bar=False)
+        pair = drive_pairs(robot)[2 - i]
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
@@ -130,7 +138,7 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     for i in range(robot.n_arms) if drives else ():
         ax.plot(*np.outer([-torque, torque], A[i]).T, **arm_line(i), zorder=3, label=f"drive {i + 1}")
     if guaranteed is not None:
-        ax.add_patch(plt.Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
+        ax.add_patch(Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
     room = 1.12 * np.abs(corners).max()
     ax.set(aspect="equal", xlabel="force in x in N", ylabel="force in y in N", xlim=(-room, room), ylim=(-room, room))
     return ax
@@ -140,8 +148,7 @@ def plot_pair_measures(trajectory, ax=None):
     """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path."""
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
     robot, A = trajectory.robot, control_matrix(trajectory.robot, trajectory.q)
-    for pair in drive_pairs(robot):
-        sigma = singular_values(A[:, list(pair)])[:, 1]
+    for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
     ax.set(xlabel="time in s", ylabel="σ_min in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plane_axes, plot_path
+from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
 from ...mechanics.kinematics import inverse_kinematics
-from ...mechanics.maps import workspace_grid
 
 
 def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
@@ -47,8 +49,8 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
     """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots."""
     ax = plot_torques(run, ax, title)
-    dots = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
-    look = dots if np.ndim(theory) == 2 else {"lw": 0.9}
+    dots: dict[str, Any] = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
+    look: dict[str, Any] = dots if np.ndim(theory) == 2 else {"lw": 0.9}
     for values in 1e3 * np.broadcast_to(theory, run.c.shape).T:
         ax.plot(run.t, values, color=AFTER, zorder=4, **look)
     return ax
@@ -57,7 +59,7 @@ def plot_rest_torques(run, theory, ax=None, title: str = ""):
 def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m)."""
     ax = axes_or_new(ax)
-    looks = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
+    looks: list[dict[str, Any]] = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
     for look, (label, values) in zip(looks, theories.items(), strict=True):
         ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
@@ -77,19 +79,16 @@ def _plain_ticks(ax, values) -> None:
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
     """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all."""
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
-    x, y, inside = workspace_grid(robot, n)
-    q = inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
-    torque, signed = np.full((2, n, n), np.nan)
-    torque[inside] = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
-    signed[inside] = null_vector(robot, q) @ np.asarray(offset, dtype=float)
-    image = ax.pcolormesh(x, y, np.ma.masked_invalid(torque), shading="nearest", rasterized=True, vmin=0.0)
+    x, y, inside, points = grid_points(robot, n)
+    q = inverse_kinematics(robot, points)
+    torque = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
+    plot_map(x, y, on_grid(inside, torque), ax, vmin=0.0, label="norm of the rest torques in mN m")
+    signed = on_grid(inside, null_vector(robot, q) @ np.asarray(offset, dtype=float))
     ax.contour(x, y, signed, levels=[0.0], colors="white", linewidths=1.6)
-    ax.figure.colorbar(image, ax=ax, label="norm of the rest torques in mN m", shrink=0.9)
     if trajectory is not None:
         plot_path(trajectory, ax, color="white", ls="--")
     plane_axes(robot, ax)
     ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], title=title)
-    ax.grid(visible=False)
     return ax
 
 
@@ -104,10 +103,9 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     held = np.abs(torque) <= 1e3 * friction
     ax.axhspan(-1e3 * friction, 1e3 * friction, color="#DDE3EA", label="friction holds")
     ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
-    for mask, look in ((~held, {"color": ALARM}), (held, {"color": AFTER, "lw": 3.5})):
-        label = "measured, rests here" if look["color"] == AFTER else "measured, is driven on"
-        steps = np.where(mask & (np.abs(np.gradient(torque)) == 0.0), torque, np.nan)
-        ax.plot(angle, steps, label=label, **look)
+    flat = np.abs(np.gradient(torque)) == 0.0
+    ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
+    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, rests here")
     ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
     ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
     return ax
@@ -122,7 +120,8 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
     ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
     ax.axvline(1.0, color=NEUTRAL, lw=1.0)
-    dots, crosses = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}, {"color": ALARM, "mew": 1.8, "ms": 7}
+    dots: dict[str, Any] = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}
+    crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
     ax.set(xscale="log", title=title,

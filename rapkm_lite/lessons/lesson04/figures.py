@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures.actuation import pair_line
-from ...figures.machine import plane_axes
-from ...figures.runs import per_drive
+from ...figures.machine import arm_points, plane_axes
+from ...figures.maps import pair_line
+from ...figures.runs import lines_per_drive
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 from ...mechanics.actuation import drive_pairs
 from ...mechanics.antagonism import null_vector
 from ...mechanics.closure import estimate_pose
-from ...mechanics.kinematics import arm_vectors, forward_kinematics, inverse_kinematics
+from ...mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ...simulation.energy import antagonistic_torque
 
 
@@ -38,9 +40,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     shown = _pair_poses(robot, true + magnify * offset, x)
     for pair, face in zip((pairs[0], pairs[-1]), ("white", ALARM), strict=True):
         five_bar = robot.with_arms(pair)
-        a, d = arm_vectors(five_bar, shown[pair])
-        for k, i in enumerate(pair):
-            points = np.stack([robot.base[i], robot.base[i] + a[k], robot.base[i] + a[k] + d[k]])
+        for i, points in zip(pair, arm_points(five_bar, shown[pair]), strict=True):
             axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
             axes[0].plot(*points[0], "o", color=arm_colour(i), ms=11, zorder=4)
             axes[0].plot(*points[1], "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, zorder=4)
@@ -107,7 +107,7 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
 
 
 # Colour and dashes of runs that are compared on one axis: they belong to no arm.
-_RUN_LINES = (
+_RUN_LINES: tuple[dict[str, Any], ...] = (
     {"color": BEFORE, "linestyle": "-"},
     {"color": ALARM, "linestyle": (0, (5, 1.2))},
     {"color": "#66AACC", "linestyle": (0, (4, 1.2, 1, 1.2))},
@@ -118,7 +118,7 @@ _RUN_LINES = (
 
 def plot_antagonism(run, ax=None, title: str = ""):
     """The part N_{A^T} c of the drive torques that moves nothing, over time."""
-    return per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
+    return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
 
 
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):

@@ -6,15 +6,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import effective_gain, feedback_norm
-from ...figures.actuation import curve_crossings, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.machine import plot_machine, plot_path, plot_workspace
+from ...figures.maps import curve_crossings, grid_points, on_grid, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.runs import plot_errors, plot_torques
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...machine.arguments import transpose
 from ...mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics
-from ...mechanics.maps import workspace_grid
 from ...mechanics.partition import select_independent
 
 # Wrong, makeshift, right: the same look in every figure of the lesson.
@@ -33,17 +32,6 @@ def _frame(ax):
     """Fill the axes with the workspace of the testbed's size."""
     ax.set(xlim=(-0.21, 0.21), ylim=(-0.19, 0.25))
     return ax
-
-
-def _grid_poses(robot, n: int):
-    x, y, inside = workspace_grid(robot, n)
-    return x, y, inside, inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
-
-
-def _field(inside, values):
-    field = np.ma.masked_all(inside.shape)
-    field[inside] = values
-    return field
 
 
 def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
@@ -72,8 +60,8 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
 
 def plot_feedback_map(robot, pair, ax=None, n: int = 220):
     """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic."""
-    x, y, inside, q = _grid_poses(robot, n)
-    level = _field(inside, np.log10(feedback_norm(robot, q, pair)))
+    x, y, inside, points = grid_points(robot, n)
+    level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
     ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
     plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
     return _frame(ax)
@@ -146,12 +134,12 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
     """Smallest singular value of the block A~_1 that each partition rule of (27) picks, over the workspace."""
     if axes is None:
         axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1]
-    x, y, inside, q = _grid_poses(robot, n)
-    A = redundant_control_matrix(robot, q)
+    x, y, inside, points = grid_points(robot, n)
+    A = redundant_control_matrix(robot, inverse_kinematics(robot, points))
     for ax, rule in zip(axes, rules, strict=True):
         block = np.take_along_axis(A, select_independent(A, rule)[..., None], axis=-2)
         sigma = singular_values(transpose(block))[:, 1]
-        plot_map(x, y, _field(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
+        plot_map(x, y, on_grid(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
         plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
         _frame(ax).label_outer()
     axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="σ_min(Ã₁)", shrink=0.85)

@@ -2,30 +2,54 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib import patheffects
 
 from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import (
-    distal_cross_products,
-    drive_pairs,
-)
+from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.maps import workspace_grid
 from .style import arm_line, axes_or_new
 
-_OUTLINED = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
+_OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
 
 
-def pair_name(pair: tuple[int, int]) -> str:
+def pair_name(pair) -> str:
     """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
     return f"({pair[0] + 1},{pair[1] + 1})"
 
 
-def pair_line(robot: Manipulator, pair: tuple[int, int]) -> dict:
+def mode_name(mode) -> str:
+    """A working mode as signs, as in the lessons: [1, 1, -1] becomes '(+, +, −)'."""
+    return "(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")"
+
+
+def pair_line(robot: Manipulator, pair) -> dict:
     """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
     left_out = [i for i in range(robot.n_arms) if i not in pair]
     return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
+
+
+def pair_measures(robot: Manipulator, q) -> np.ndarray:
+    """Smallest singular value of the rows of A of each pair of drives, (..., pairs) in rad/m; q is (..., 2N)."""
+    A = control_matrix(robot, q)
+    return np.stack([singular_values(A[..., list(pair), :])[..., 1] for pair in drive_pairs(robot)], axis=-1)
+
+
+def grid_points(robot: Manipulator, n: int, box=None):
+    """Samples x (n,), y (n,) in m, inside (n, n), and the points (k, 2) in m of this grid that all arms reach bent."""
+    x, y, inside = workspace_grid(robot, n, box)
+    return x, y, inside, np.stack(np.meshgrid(x, y), axis=-1)[inside]
+
+
+def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
+    """Values (k, ...) at the points of `grid_points` back on the grid, (n, n, ...); masked outside."""
+    values = np.asarray(values)
+    grid = np.ma.masked_all((*inside.shape, *values.shape[1:]))
+    grid[inside] = values
+    return grid
 
 
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
@@ -48,16 +72,13 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
     on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
-    x, y, inside = workspace_grid(robot, n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)
-    cross = np.zeros((*inside.shape, len(drive_pairs(robot))))
-    cross[inside] = distal_cross_products(robot, inverse_kinematics(robot, points[inside], mode))
+    x, y, inside, points = grid_points(robot, n)
+    cross = on_grid(inside, distal_cross_products(robot, inverse_kinematics(robot, points, mode)))
     for k, pair in enumerate(drive_pairs(robot)):
         if pairs is not None and pair not in pairs:
             continue
-        look = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
-        value = np.ma.array(cross[..., k], mask=~inside)
-        drawn = ax.contour(x, y, value, levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
+        look: dict[str, Any] = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
+        drawn = ax.contour(x, y, cross[..., k], levels=[0.0], colors=[look["color"]], linestyles=[look["linestyle"]],
                            linewidths=look.get("linewidth", 1.6), zorder=3)
         if on_map:
             drawn.set_path_effects(_OUTLINED)

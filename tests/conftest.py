@@ -1,0 +1,42 @@
+"""Where each test belongs: one group per test, chosen by its file, so that ``pytest -m fast`` is the inner loop.
+
+fast      textbook, control, simulation, checks of exercises, rooms: under a minute together
+slow      engine, studies, figures, explorers, types, the way of a new lesson
+notebook  cells and stored outputs of the lessons
+oracle    peer engines and symbolic derivations
+browser   a real JupyterLab
+"""
+
+from pathlib import Path
+
+import pytest
+
+GROUPS = {
+    "slow": ["test_docs", "test_engine", "test_explore", "test_figures", "test_run_figures", "test_skeleton",
+             "test_sweep", "test_types"],
+    "oracle": ["test_oracles", "test_symbolic"],
+    "browser": ["test_lab"],
+}
+# Longer than their file lets one expect.
+SLOW = {
+    "test_lyapunov_function_falls_at_the_rate_of_the_damping",
+    "test_switching_takes_the_best_pair_and_hysteresis_saves_switches",
+    "test_runs_below_the_threshold_come_to_rest",
+    "test_runs_without_a_place_of_rest_keep_moving",
+}
+NOTEBOOK = {"test_solved_lesson_passes_every_check_in_strict_mode"}
+_GROUP = {stem: group for group, stems in GROUPS.items() for stem in stems}
+
+
+def group(item) -> str:
+    """The group of a collected test."""
+    if item.path.suffix == ".ipynb" or getattr(item, "originalname", "") in NOTEBOOK:
+        return "notebook"
+    if getattr(item, "originalname", "") in SLOW:
+        return "slow"
+    return _GROUP.get(Path(item.path).stem, "fast")
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        item.add_marker(getattr(pytest.mark, group(item)))

@@ -1,0 +1,51 @@
+"""The pages say what is so: their code runs, their links lead somewhere, the drawing is that of the imports."""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import pytest
+from test_rooms import ARROWS, DOORS, ROOMS, room
+
+matplotlib.use("agg")
+
+ROOT = Path(__file__).parents[1]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "notebooks").glob("*.md"))]
+NAMES = {"ids": lambda path: path.name}
+
+
+def text(path):
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", [p for p in PAGES if "```python" in text(p)], **NAMES)
+def test_code_of_a_page_runs_from_top_to_bottom(path):
+    # Classes that a page defines belong to the module that runs it.
+    names = {"__name__": "__main__"}
+    for block in re.findall(r"```python\n(.*?)```", text(path), re.S):
+        exec(compile(block, path.name, "exec"), names)
+
+
+@pytest.mark.parametrize("path", PAGES, **NAMES)
+def test_links_lead_somewhere(path):
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text(path)):
+        if "://" not in target:
+            assert (path.parent / target).exists(), target
+
+
+def test_the_drawing_of_the_rooms_is_that_of_the_imports():
+    drawing = re.search(r"```mermaid\n(.*?)```", text(ROOT / "docs" / "architecture.md"), re.S)[1]
+    drawn = set(re.findall(r"^ *(\w+) --> (\w+)$", drawing, re.M))
+    real = {(room(a), room(b)) for a, others in ARROWS.items() for b in others if room(a) != room(b)}
+    real = {("rapkm_lite" if a == "__init__" else a, b) for a, b in real if a != "__main__"}
+    assert drawn <= real, f"drawn, but there is no such import: {drawn - real}"
+    reach = set(drawn)
+    for _ in ROOMS + DOORS:
+        reach |= {(a, d) for a, b in reach for c, d in drawn if b == c}
+    assert real <= reach, f"imported, but not to be seen in the drawing: {real - reach}"
+
+
+def test_how_to_add_pages_are_linked_from_the_front_door():
+    front = text(ROOT / "CONTRIBUTING.md")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert f"docs/{page.name}" in front

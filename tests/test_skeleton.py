@@ -1,0 +1,31 @@
+"""A new lesson: from the skeleton to green tests in a copy of the repository."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(folder, *command):
+    environment = os.environ | {"PYTHONPATH": str(folder)}
+    done = subprocess.run([sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    return done.stdout
+
+
+def test_a_lesson_made_from_the_skeleton_is_green(tmp_path):
+    skipped = shutil.ignore_patterns("__pycache__", "*.ipynb", ".ipynb_checkpoints")
+    for name in ("rapkm_lite", "notebooks", "tests", "data"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=skipped)
+    for name in ("README.md", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    run(tmp_path, "notebooks/build.py", "new", "97_turning_drives")
+    run(tmp_path, "notebooks/build.py", "97")
+    tests = ("tests/test_lessons.py", "tests/test_figures.py", "notebooks")
+    said = run(tmp_path, "-m", "pytest", "-q", *tests, "-k", "97 or figures_is_generated", "-p", "no:cacheprovider")
+    assert "passed" in said and "failed" not in said
+    assert run(tmp_path, "-c", "from rapkm_lite import plotting; print(plotting.plot_turning_97.__module__)").strip() \
+        == "rapkm_lite.lessons.lesson97.figures"
