@@ -5,6 +5,7 @@ import importlib.util
 import inspect
 import io
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,8 +23,9 @@ from rapkm_lite import explore
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
-NAMES = ["machine", "steady_state", "decentralized_run", "actuation", "computed_torque", "animation", "prestress",
-         "landscape"]
+# Every public function that makes an explorer of a machine.
+NAMES = sorted(name for name, made in vars(explore).items()
+               if inspect.isfunction(made) and list(inspect.signature(made).parameters) == ["robot"])
 _made = {}
 
 
@@ -56,6 +58,13 @@ def assert_sound(explorer):
     assert "nan" not in words.lower() and "inf " not in words.lower(), words
     assert bool(explorer.numbers) != bool(explorer.problem)
     assert explorer.png.startswith(b"\x89PNG")
+
+
+def test_every_explorer_of_the_room_is_offered():
+    written = set()
+    for path in Path(explore.__file__).parent.glob("*.py"):
+        written |= set(re.findall(r"^def ([a-z]\w*)\(.*\) -> Explorer:", path.read_text(encoding="utf-8"), re.M))
+    assert written == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)

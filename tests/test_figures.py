@@ -1,6 +1,7 @@
 """Every figure function: units on every labelled axis, the axes it was given, rcParams untouched."""
 
 import doctest
+import functools
 import inspect
 
 import matplotlib
@@ -51,8 +52,6 @@ def values_first(xyv):
 
 
 CALLS = {
-    "plot_map": lambda w: (np.arange(3.0), np.arange(3.0), np.ma.masked_greater(np.eye(3), 2)),
-    "plot_pair_curves": lambda w: (w["robot"],),
     "plot_control_fields": lambda w: (w["robot"],),
     "plot_mode_maps": lambda w: (w["robot"], *values_first(rk.actuation_map(
         w["robot"], mode=rk.working_modes(w["robot"]), n=41))),
@@ -75,9 +74,6 @@ CALLS = {
     "plot_complement_size": lambda w: (w["path"], [(0, 1)]),
     "plot_loop_gaps": lambda w: (w["path"].t, {"gap": 1e-3 + 0 * w["path"].t}),
     "plot_pin_forces": lambda w: (w["robot"], w["q"], np.ones((3, 2))),
-    "plot_machine": lambda w: (w["robot"], w["q"]),
-    "plot_workspace": lambda w: (w["robot"],),
-    "plot_path": lambda w: (w["path"],),
     "plot_working_modes": lambda w: (w["robot"], [0.02, -0.03]),
     "plot_synchronization": lambda w: (w["robot"], [0.0, 0.0], OFFSET),
     "plot_joint_moves": lambda w: (w["robot"], [-0.1, -0.06], [0.1, -0.06], np.array([0.2, 0.1]), np.array([0.1, 0.03]),
@@ -92,8 +88,6 @@ CALLS = {
     "plot_effective_gain": lambda w: (w["path"], np.diag([1.0, 1, 1, 0, 0, 0])),
     "plot_step_response": lambda w: (w["path"].t, {"measured": w["path"].t}, {"predicted": w["path"].t}),
     "plot_lyapunov": lambda w: (w["path"].t, {"one": np.exp(-w["path"].t), "two": np.exp(-2 * w["path"].t)}, 1.0),
-    "plot_torques": lambda w: (w["run"],),
-    "plot_errors": lambda w: (w["run"],),
     "plot_antagonism": lambda w: (w["run"],),
     "plot_torque_norms": lambda w: (w["runs"],),
     "plot_torque_plane": lambda w: (w["runs"],),
@@ -108,14 +102,14 @@ CALLS = {
 FIGURES = sorted(n for n in plotting.__all__ if n.startswith("plot_"))
 
 
-def drawn(name, world):
+def drawn(name, world, **given):
     """What a figure returns for the arguments above, or the `ax` of the example in its docstring."""
-    function = getattr(plotting, name)
+    function = functools.partial(getattr(plotting, name), **given)
     if name in CALLS:
         return function(*CALLS[name](world))
-    example = doctest.DocTestParser().get_examples(function.__doc__)
+    example = doctest.DocTestParser().get_examples(getattr(plotting, name).__doc__)
     assert example, f"{name} has neither arguments in CALLS nor an example in its docstring"
-    names = {name: function}
+    names = vars(plotting) | {name: function}
     exec("".join(line.source for line in example), names)
     return names["ax"]
 
@@ -143,12 +137,12 @@ def test_axes_carry_units(name, world):
         plt.close("all")
 
 
-@pytest.mark.parametrize("name", [n for n in CALLS if "ax" in inspect.signature(getattr(plotting, n)).parameters])
+@pytest.mark.parametrize("name", [n for n in FIGURES if "ax" in inspect.signature(getattr(plotting, n)).parameters])
 def test_given_axes_are_used_and_returned(name, world):
     figure = plt.figure()
     ax = figure.add_subplot(projection="3d" if name == "plot_configuration_space" else None)
     try:
-        assert getattr(plotting, name)(*CALLS[name](world), ax=ax) is ax
+        assert drawn(name, world, ax=ax) is ax
         assert plt.get_fignums() == [figure.number]
     finally:
         plt.close("all")

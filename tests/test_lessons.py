@@ -137,3 +137,14 @@ def test_readme_asks_the_question_of_the_lesson(path):
     assert number == path.stem[:2]
     readme = (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8")
     assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
+
+
+@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+def test_tables_agree_with_the_lesson(path):
+    text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
+    minutes = re.search(r"\*\*(?:Minutes|Time):?\W*(\d+)", text)
+    row = next(line for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines()
+               if path.name in line).split("|")
+    assert minutes and row[3].strip() == minutes[1]
+    for name in re.findall(r"`([\w.]+)`", row[5]):
+        assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"

@@ -10,7 +10,12 @@ from .style import NEUTRAL, arm_colour, axes_or_new
 
 
 def arm_points(robot, q) -> np.ndarray:
-    """Base, elbow and tip of every arm, (..., N, 3, 2) in m, at q (..., 2N)."""
+    """Base, elbow and tip of every arm, (..., N, 3, 2) in m, at q (..., 2N).
+
+    >>> import rapkm_lite as rk
+    >>> arm_points(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))[:, 2].round(12).tolist()
+    [[0.02, -0.03], [0.02, -0.03], [0.02, -0.03]]
+    """
     a, d = arm_vectors(robot, q)
     return np.stack([robot.base + 0 * a, robot.base + a, robot.base + a + d], axis=-2)
 
@@ -19,6 +24,9 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
     """Draw the arms at one pose q (2N,); `arms` picks some of them (0-based), each from its own base to its own tip.
 
     Filled circles are driven joints, open circles passive ones, the square is the end-effector.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_machine(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     chains = arm_points(robot, q)
@@ -37,7 +45,11 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
 
 
 def plot_workspace(robot, ax=None, n: int = 240, colour: str = "#EEF2F6"):
-    """Shade the points that all arms reach."""
+    """Shade the points that all arms reach.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_workspace(rk.load())
+    """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     # A little more than the workspace, so that its outline closes.
     left, right, low, high = sampling_box(robot)
@@ -49,7 +61,11 @@ def plot_workspace(robot, ax=None, n: int = 240, colour: str = "#EEF2F6"):
 
 
 def plot_path(trajectory, ax=None, **line):
-    """Draw the end-effector path."""
+    """Draw the end-effector path.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_path(rk.triangle(rk.load()))
+    """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     ax.plot(*trajectory.x.T, **({"color": NEUTRAL, "lw": 1.2, "zorder": 2} | line))
     return plane_axes(trajectory.robot, ax)

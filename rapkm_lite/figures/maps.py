@@ -17,12 +17,20 @@ _OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewi
 
 
 def pair_name(pair) -> str:
-    """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'."""
+    """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'.
+
+    >>> pair_name((1, 2))
+    '(2,3)'
+    """
     return f"({pair[0] + 1},{pair[1] + 1})"
 
 
 def mode_name(mode) -> str:
-    """A working mode as signs, as in the lessons: [1, 1, -1] becomes '(+, +, −)'."""
+    """A working mode as signs, as in the lessons: [1, 1, -1] becomes '(+, +, −)'.
+
+    >>> mode_name([1, 1, -1])
+    '(+, +, −)'
+    """
     return "(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")"
 
 
@@ -33,27 +41,46 @@ def pair_line(robot: Manipulator, pair) -> dict:
 
 
 def pair_measures(robot: Manipulator, q) -> np.ndarray:
-    """Smallest singular value of the rows of A of each pair of drives, (..., pairs) in rad/m; q is (..., 2N)."""
+    """Smallest singular value of the rows of A of each pair of drives, (..., pairs) in rad/m; q is (..., 2N).
+
+    >>> import rapkm_lite as rk
+    >>> pair_measures(rk.load(), rk.inverse_kinematics(rk.load(), [0.0, 0.0])).round(3)
+    array([3.75, 3.75, 3.75])
+    """
     A = control_matrix(robot, q)
     return np.stack([singular_values(A[..., list(pair), :])[..., 1] for pair in drive_pairs(robot)], axis=-1)
 
 
 def grid_points(robot: Manipulator, n: int, box=None):
-    """Samples x (n,), y (n,) in m, inside (n, n), and the points (k, 2) in m of this grid that all arms reach bent."""
+    """Samples x (n,), y (n,) in m, inside (n, n), and the points (k, 2) in m of this grid that all arms reach bent.
+
+    >>> import rapkm_lite as rk
+    >>> x, y, inside, points = grid_points(rk.load(), 50)
+    >>> points.shape == (inside.sum(), 2)
+    True
+    """
     x, y, inside = workspace_grid(robot, n, box)
     return x, y, inside, np.stack(np.meshgrid(x, y), axis=-1)[inside]
 
 
 def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
-    """Values (k, ...) at the points of `grid_points` back on the grid, (n, n, ...); masked outside."""
+    """Values (k, ...) at the points of `grid_points` back on the grid, (n, n, ...); masked outside.
+
+    >>> on_grid(np.array([[True, False], [True, True]]), [1.0, 2.0, 3.0]).tolist()
+    [[1.0, None], [2.0, 3.0]]
+    """
     values = np.asarray(values)
-    grid = np.ma.masked_all((*inside.shape, *values.shape[1:]))
+    grid = np.ma.array(np.zeros((*inside.shape, *values.shape[1:])), mask=True)
     grid[inside] = values
     return grid
 
 
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
-    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y."""
+    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min of Ã, all drives")
+    """
     ax = axes_or_new(ax, figsize=(4.6, 3.9))
     # What lies under the mask may be anything; colour maps look at it.
     values = np.ma.array(np.ma.filled(values, 0.0), mask=np.ma.getmaskarray(values))
@@ -70,6 +97,9 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
     """Curves where the two distal links of a pair are parallel: its parameterization singularities.
 
     on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_pair_curves(rk.load(), n=81)
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     x, y, inside, points = grid_points(robot, n)
@@ -88,6 +118,11 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
 
 
 def curve_crossings(trajectory) -> list[np.ndarray]:
-    """For each pair of drives the samples just before the path crosses the curve of this pair."""
+    """For each pair of drives the samples just before the path crosses the curve of this pair.
+
+    >>> import rapkm_lite as rk
+    >>> [len(at) for at in curve_crossings(rk.triangle(rk.load()))]
+    [2, 2, 2]
+    """
     cross = distal_cross_products(trajectory.robot, trajectory.q)
     return [np.flatnonzero(np.diff(np.sign(c)) != 0) for c in cross.T]

@@ -6,13 +6,23 @@ from .style import arm_line, axes_or_new
 
 
 def plot_torques(run, ax=None, title: str = "", milli: bool = True):
-    """Drive torques over time, in mN m or, for large ones, in N m."""
+    """Drive torques over time, in mN m or, for large ones, in N m.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
+    >>> ax = plot_torques(run)
+    """
     scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
     return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
 
 
 def plot_errors(run, ax=None, title: str = ""):
-    """Errors of the true base angles over time."""
+    """Errors of the true base angles over time.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
+    >>> ax = plot_errors(run)
+    """
     return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
 
 

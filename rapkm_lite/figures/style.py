@@ -17,7 +17,7 @@ BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
 
 
 def use_style() -> None:
-    """Make the collection's look the default of this session; called by the first cell of a lesson."""
+    """Make the collection's look the default from now on; called by the first cell of a lesson."""
     plt.style.use(STYLE)
 
 
