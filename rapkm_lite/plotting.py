@@ -73,15 +73,14 @@ from .lessons.lesson03.figures import (
 )
 from .lessons.lesson04.figures import (
     plot_antagonism,
-    plot_difference,
     plot_energies,
+    plot_joint_moves,
     plot_synchronization,
     plot_table1,
     plot_torque_norms,
     plot_torque_plane,
 )
 from .lessons.lesson05.figures import (
-    plot_ee_errors,
     plot_ee_paths,
     plot_effective_gain,
     plot_feedback_along,
@@ -89,11 +88,11 @@ from .lessons.lesson05.figures import (
     plot_lyapunov,
     plot_pairs,
     plot_partition_rules,
+    plot_singular_poses,
     plot_step_response,
     plot_torques_and_errors,
 )
 from .lessons.lesson06.figures import (
-    plot_agreement,
     plot_bands,
     plot_gain_curve,
     plot_landscape,
@@ -123,7 +122,6 @@ __all__ = [
     "pair_name",
     "plane_axes",
     "plane_limits",
-    "plot_agreement",
     "plot_antagonism",
     "plot_available_forces",
     "plot_bands",
@@ -132,9 +130,7 @@ __all__ = [
     "plot_configuration_space",
     "plot_control_fields",
     "plot_cut_tree",
-    "plot_difference",
     "plot_disagreement",
-    "plot_ee_errors",
     "plot_ee_paths",
     "plot_effective_gain",
     "plot_energies",
@@ -146,6 +142,7 @@ __all__ = [
     "plot_gain_ratio",
     "plot_grid_search",
     "plot_joint_angles",
+    "plot_joint_moves",
     "plot_landscape",
     "plot_log",
     "plot_loop_gaps",
@@ -164,6 +161,7 @@ __all__ = [
     "plot_prestress_maps",
     "plot_readings",
     "plot_rest_torques",
+    "plot_singular_poses",
     "plot_step_response",
     "plot_synchronization",
     "plot_table1",

@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import arm_points, plane_axes
+from ...figures.maps import pair_line
 from ...figures.runs import lines_per_drive
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 from ...mechanics.actuation import drive_pairs
@@ -27,7 +28,7 @@ def _pair_poses(robot, q_a, guess) -> dict:
 
 
 def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
-    """The machine at x (2,) in m as two five-bars that share a drive (fig. 3), with offsets (N,) in rad.
+    """The machine at x (2,) in m as two five-bars that share a drive, with offsets (N,) in rad.
 
     Left: both five-bars as their measured angles say, the offsets magnified.  Right: in mm about x, the end-effector
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
@@ -76,6 +77,35 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     ax.set(xlabel="x − true x in mm", ylabel="y − true y in mm", title="the same, true size, close up")
 
 
+def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
+    """Fig. 3: drives that move along straight lines in joint space, and by how much they contradict each other.
+
+    Left: what the pairs (1,2) and (2,3) make of such a move from `start` to `stop` (2,) in m, and the straight line.
+    Right: largest contradiction `gap` (k,) in rad over the distance of the via points, `spacing` (k,) in m, a line of
+    slope two, and the level `marked` in rad to compare with.  Returns both axes.
+    """
+    axes = plt.subplots(1, 2, figsize=(10.0, 3.3), width_ratios=(1.35, 1))[1] if axes is None else axes
+    ends = inverse_kinematics(robot, np.stack([start, stop]))
+    part = np.linspace(0, 1, 61)[:, None]
+    q = ends[0] + part * (ends[1] - ends[0])
+    line = np.add(start, part * np.subtract(stop, start))
+    axes[0].plot(*(1e3 * line.T), color="#BBBBBB", lw=5, label="straight line")
+    for pair in (drive_pairs(robot)[0], drive_pairs(robot)[-1]):
+        five_bar, x = robot.with_arms(pair), [line[0]]
+        for angles in q[1:, list(pair)]:
+            x.append(forward_kinematics(five_bar, estimate_pose(five_bar, angles, x[-1])))
+        axes[0].plot(*(1e3 * np.array(x).T), label=f"drives {pair[0] + 1} and {pair[1] + 1}", **pair_line(robot, pair))
+    axes[0].set(xlabel="x in mm", ylabel="y in mm", title="one straight move in joint space", aspect="equal")
+    axes[0].set(ylim=np.array([-30, 45]) + 1e3 * line[:, 1].mean())
+    axes[0].legend(loc="upper center", ncols=3)
+    axes[1].loglog(1e3 * spacing, 1e3 * gap, "o", color=AFTER, label="straight lines in joint space")
+    axes[1].loglog(1e3 * spacing, 1e3 * gap[-1] * (spacing / spacing[-1]) ** 2, "--", color=NEUTRAL, label="slope two")
+    axes[1].axhline(1e3 * marked, color=ALARM, ls=":", label="offsets of this lesson")
+    axes[1].set(xlabel="distance of via points in mm", ylabel="contradiction in mrad", title="more via points")
+    axes[1].legend(loc="upper left")
+    return axes
+
+
 # Colour and dashes of runs that are compared on one axis: they belong to no arm.
 _RUN_LINES: tuple[dict[str, Any], ...] = (
     {"color": BEFORE, "linestyle": "-"},
@@ -89,11 +119,6 @@ _RUN_LINES: tuple[dict[str, Any], ...] = (
 def plot_antagonism(run, ax=None, title: str = ""):
     """The part N_{A^T} c of the drive torques that moves nothing, over time."""
     return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
-
-
-def plot_difference(run, other, ax=None, title: str = ""):
-    """How much the true base angles of two runs along the same path differ, over time."""
-    return lines_per_drive(run, 1e6 * (run.q_a - other.q_a), ax, "difference in µrad", title)
 
 
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
@@ -114,14 +139,14 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
 def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     """Every sample of a run as a point: torque that moves over torque along the null vector of A^T.
 
-    The squared distance from the origin times R / k_t^2 is the copper loss in W.  For three arms with equal drives.
+    The squared distance from the origin times R_el / k_t^2 is the copper loss in W.  For three arms with equal drives.
     """
     ax = axes_or_new(ax, figsize=(5.4, 3.4))
     for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
         along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
         ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
-    ax.set(xlabel="antagonism, nᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
+    ax.set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
     ax.set_aspect("equal")
     ax.set_ylim(0, 1.25 * ax.get_ylim()[1])
     ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)

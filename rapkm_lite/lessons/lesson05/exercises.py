@@ -29,10 +29,10 @@ def _pairs_at_poses(rng) -> list[tuple]:
     return [(robot, q, pair) for q, pair in zip(poses, 2 * drive_pairs(robot), strict=True)]
 
 
-def _acceleration(M, robot, q, pair) -> tuple[float, str]:
-    """Equation (2) with multipliers, from rest: the torques M v must accelerate the pair by v."""
+def _acceleration(Phi, robot, q, pair) -> tuple[float, str]:
+    """Equation (2) with multipliers, from rest: the torques Phi v must accelerate the pair by v."""
     still = np.zeros(robot.n_joints)
-    worst = max(np.abs(forward_dynamics(robot, q, still, M @ v)[0][list(pair)] - v).max() for v in np.eye(2))
+    worst = max(np.abs(forward_dynamics(robot, q, still, Phi @ v)[0][list(pair)] - v).max() for v in np.eye(2))
     return worst, "the multiplier form (2) answers 1 rad/s^2 of wanted acceleration with an error in rad/s^2 of"
 
 
@@ -63,7 +63,7 @@ def _bandwidths(rng) -> list[tuple]:
 
 
 def _slowest(K, robot, q, omega) -> tuple[float, str]:
-    """N_J S N_J has the eigenvalues of the effective gain and four zeros, without any choice of q2."""
+    """N_J I_a N_J has the eigenvalues of the effective gain and four zeros, without any choice of q2."""
     N_J = nullspace_projector(robot, q)
     slow = float(K) * np.linalg.eigvalsh(N_J[..., : robot.n_arms] @ N_J[..., : robot.n_arms, :])[..., -2].min()
     return abs(slow - omega**2), "the slowest direction along these poses misses omega^2, in 1/s^2, by"
@@ -76,7 +76,8 @@ EXERCISES = {
         "N m per rad/s^2", _pairs_at_poses, _acceleration),
     "05.explicit_pseudoinverse": Exercise(
         explicit_pseudoinverse,
-        "find B from A~_2 = B A~_1, stack I and B in the order of the drives, then solve with I + B^T B",
+        "with B = (A~_1^T)^+ A~_2^T first the bottom block, (I + B^T B)^-1 B^T (A~_1^T)^+; the top one is "
+        "(A~_1^T)^+ minus B times it; then put the rows into the order of the drives",
         "(without unit)", _partitions, _penrose),
     "05.gain_for_bandwidth": Exercise(
         gain_for_bandwidth,

@@ -6,14 +6,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import effective_gain, feedback_norm
-from ...figures.machine import plot_path, plot_workspace
+from ...figures.machine import plot_machine, plot_path, plot_workspace
 from ...figures.maps import curve_crossings, grid_points, on_grid, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.runs import plot_errors, plot_torques
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...machine.arguments import transpose
 from ...mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
 from ...mechanics.dynamics import orthogonal_complement
-from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.kinematics import arm_vectors, inverse_kinematics
 from ...mechanics.partition import select_independent
 
 # Wrong, makeshift, right: the same look in every figure of the lesson.
@@ -34,8 +34,32 @@ def _frame(ax):
     return ax
 
 
+def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
+    """Fig. 8 with the poses of a path: the five-bar of a pair, in colour, where the path crosses the pair's curve.
+
+    The arrow is the direction in which the end-effector moves while both base joints of the pair stand still.
+    """
+    robot = trajectory.robot
+    poses = [(pair, k) for pair in pairs for k in curve_crossings(trajectory)[drive_pairs(robot).index(pair)]]
+    if axes is None:
+        axes = plt.subplots(1, len(poses), figsize=(2.75 * len(poses), 3.3), sharey=True)[1]
+    for ax, (pair, k) in zip(np.ravel(axes), poses, strict=True):
+        q, x = trajectory.q[k], trajectory.x[k]
+        plot_workspace(robot, ax, n=120)
+        plot_path(trajectory, ax, color="#AAAAAA", lw=1.0)
+        plot_machine(robot, q, ax, arms=[i for i in range(robot.n_arms) if i not in pair], alpha=0.18, labels=False)
+        plot_machine(robot, q, ax, arms=pair, labels=False)
+        d = arm_vectors(robot, q)[1][pair[0]]
+        blind = 0.13 * np.array([-d[1], d[0]]) / np.hypot(*d)
+        for tip in (x + blind, x - blind):
+            ax.annotate("", tip, x, arrowprops={"arrowstyle": "->", "color": ALARM, "lw": 1.8}, zorder=7)
+        ax.set(xlim=(-0.33, 0.33), ylim=(-0.29, 0.36), title=f"pair {pair_name(pair)}, {trajectory.t[k]:.2f} s")
+        ax.label_outer()
+    return axes
+
+
 def plot_feedback_map(robot, pair, ax=None, n: int = 220):
-    """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic (fig. 8)."""
+    """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic."""
     x, y, inside, points = grid_points(robot, n)
     level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
     ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
@@ -56,11 +80,8 @@ def plot_feedback_along(trajectory, ax=None):
     return ax
 
 
-def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_to: float | None = None):
-    """Torques and angle errors of one run (figs. 9 and 10); thin lines where the path crosses the pair's curve.
-
-    linear_to : torque in N m beyond which the torque axis is logarithmic; None for a linear axis.
-    """
+def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
+    """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve."""
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
     plot_torques(run, axes[0], title, milli=False)
@@ -69,27 +90,10 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = "", linear_t
     for ax in axes:
         for t in run.t[at]:
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
-    if linear_to is not None:
-        axes[0].set_yscale("symlog", linthresh=linear_to)
-        low, high = axes[0].get_ylim()
-        ticks = [t for t in (-100, -10, -1, -0.1, 0, 0.1, 1, 10, 100) if low <= t <= high]
-        axes[0].set_yticks(ticks, [f"{t:g}" for t in ticks])
     # One legend for both panels, above the data.
     axes[0].get_legend().remove()
     axes[1].legend(ncols=run.robot.n_arms, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return axes
-
-
-def plot_ee_errors(runs: dict, ax=None):
-    """Distance of the end-effector from its desired position over time, one line per run; keys are labels."""
-    ax = axes_or_new(ax)
-    for label, run in runs.items():
-        distance = np.linalg.norm(run.x - run.trajectory.x, axis=-1)
-        ax.semilogy(run.t[1:], 1e3 * distance[1:], label=label, **_law_line(label))
-    longest = max(run.t[-1] for run in runs.values())
-    ax.set(xlabel="time in s", ylabel="end-effector error in mm", xlim=(0, longest), ylim=(0.05, None))
-    ax.legend(ncols=len(runs), loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    return ax
 
 
 def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -0.045)):
@@ -138,7 +142,7 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
         plot_map(x, y, on_grid(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
         plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
         _frame(ax).label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="σ_min of the block Ã₁", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="σ_min(Ã₁)", shrink=0.85)
     return axes
 
 
@@ -169,12 +173,15 @@ def plot_step_response(t, measured: dict, predicted: dict, ax=None):
     return ax
 
 
-def plot_lyapunov(t, V, to_come, ax=None):
-    """Lyapunov function and the work that damping has still to do, both in J, on a logarithmic axis."""
-    ax = axes_or_new(ax)
-    ax.semilogy(t, V, color=AFTER, label="V from the simulated state")
-    show = slice(None, None, max(1, len(t) // 40))
-    ax.semilogy(t[show], to_come[show], "o", color=ALARM, mfc="white", ms=5, label="work of the damping from now on")
-    ax.set(xlabel="time in s", ylabel="energy in J", xlim=(0, t[-1]))
-    ax.legend(loc="upper right")
-    return ax
+def plot_lyapunov(t, functions: dict, rate, axes=None):
+    """Lyapunov functions in J by label on a logarithmic axis, and their rates of decay; a line at `rate` in 1/s."""
+    if axes is None:
+        axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1]
+    for (label, V), line in zip(functions.items(), ({"color": BEFORE}, {"color": AFTER, "ls": "--"}), strict=False):
+        axes[0].semilogy(t, V, label=label, **line)
+        axes[1].plot(t[1:], -np.diff(np.log(V)) / np.diff(t), label=label, **line)
+    axes[1].axhline(rate, color=ALARM, ls=":", label=f"{rate:g} 1/s")
+    axes[0].set(xlabel="time in s", ylabel="value in J", xlim=(0, t[-1]))
+    axes[1].set(xlabel="time in s", ylabel="rate of decay in 1/s", xlim=(0, t[-1]), ylim=(0, None))
+    axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(functions) + 1)
+    return axes

@@ -29,7 +29,7 @@ def _trace(S, robot, trajectory, K_P):
     # The projector N_{A^T} has the trace m - delta at every instant.
     spare = robot.n_arms - 2
     expected = (K_P / robot.torque_constant[0]) ** 2 * robot.resistance[0] * spare * trajectory.t[-1]
-    return abs(np.trace(S) / expected - 1), "the trace of S differs from (R/k_t²) K_P² (m - δ) T, relatively by"
+    return abs(np.trace(S) / expected - 1), "the trace of S differs from (R_el/k_t²) k_P² (m - δ) T, relatively by"
 
 
 def expected_cost(S, sigma) -> float:
@@ -74,7 +74,7 @@ def _no_cheaper(cost, S, size):
 EXERCISES = {
     "06.form": Exercise(
         uniform_form, cases=_paths, invariant=_trace, tolerance=1e-6, unit="J/rad²",
-        hint="N = I - A (A^T A)^-1 A^T at every sample; sum K_P² (R/k_t²) N over the holds, times dt",
+        hint="N = I - A (A^T A)^-1 A^T at every sample; sum k_P² (R_el/k_t²) N over the holds, times dt",
     ),
     "06.expected_cost": Exercise(
         expected_cost, cases=_forms, invariant=_sampled, tolerance=1e-9, unit="J",

@@ -27,17 +27,6 @@ def plot_landscape(values, cube, theory, axes=None):
     return axes
 
 
-def plot_agreement(theory, simulated, ax=None):
-    """Simulated against predicted energies in J, with the line of agreement."""
-    ax = axes_or_new(ax, figsize=(4.6, 3.6))
-    ax.loglog(theory, simulated, ".", color=arm_colour(0), ms=3, alpha=0.5)
-    ends = [np.min(theory), np.max(theory)]
-    ax.loglog(ends, ends, color=ALARM, lw=1.2, label="theory line")
-    ax.set(xlabel="predicted energy in J", ylabel="simulated energy in J")
-    ax.legend(loc="upper left")
-    return ax
-
-
 def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
     """Total energies (k,) in J over the gain K_P (k,) in N m/rad, and the antagonistic part."""
     ax = axes_or_new(ax, figsize=(6.2, 3.6))
