@@ -105,7 +105,7 @@ def test_every_drive_its_own_gain():
 
 
 def test_smooth_sign_is_tanh():
-    from rapkm_lite.engine.plant import smooth_sign
+    from rapkm_lite.engine.leaves import smooth_sign
 
     z = np.concatenate([np.linspace(-30, 30, 2001), np.logspace(-12, 2, 200)])
     tanh = np.array([getattr(smooth_sign, "py_func", smooth_sign)(float(v)) for v in z])
@@ -113,7 +113,7 @@ def test_smooth_sign_is_tanh():
 
 
 def test_small_angle_is_arcsin():
-    from rapkm_lite.engine.plant import small_angle
+    from rapkm_lite.engine.leaves import small_angle
 
     s = np.linspace(-0.1, 0.1, 401)
     # The series of arcsin cut after s^17 leaves less than 0.01 |s|^19.

@@ -160,20 +160,20 @@ def add_work(lanes, arms, w):
 
 
 @kernel
-def closed_loops(lanes, drives, arms, faulty, extra, modelled, sensor, law, dt, table, faults, w, history):
-    """Sampled runs side by side, whatever their law: a single run with its history, a study with sums in w.
+def closed_loops(kind, modelled, sensor, law, dt, table, faults, w, history):
+    """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
-    The sizes of the first tuples tell the compiler what there is: runs, drives, arms of a row, faults, friction or
-    gravity of the machine and of the model; modelled is None for decentralized laws, whose kernel then lacks the rest.
+    modelled : None for laws without a model, whose kernel is smaller; else the `extra` of the model.
     """
-    L, columns = len(lanes), 6 + 9 * len(arms)
+    lanes, drives, arms, study, faulty, extra = kind
+    columns = 6 + 9 * len(arms)
     samples = len(table) // columns
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
     for k in range(samples):
         o = k * columns
 
         # Sense: the machine as it is, and what the hold will start from.
-        if L > 1:
+        if len(study) > 0:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
             add_work(lanes, arms, w)
         else:
@@ -192,7 +192,7 @@ def closed_loops(lanes, drives, arms, faulty, extra, modelled, sensor, law, dt, 
                 measured_rate(lanes, drives, arms, table, o, w)
             else:
                 true_pose(lanes, drives, arms, law, w)
-        if L > 1 and k + 1 == samples:
+        if len(study) > 0 and k + 1 == samples:
             return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
@@ -210,7 +210,7 @@ def closed_loops(lanes, drives, arms, faulty, extra, modelled, sensor, law, dt, 
             break_drives(lanes, arms, faults, w, k)
 
         # Record.
-        if L > 1:
+        if len(study) > 0:
             add_up(lanes, drives, arms, w)
         else:
             record(drives, arms, history, w, k)
@@ -219,11 +219,11 @@ def closed_loops(lanes, drives, arms, faulty, extra, modelled, sensor, law, dt, 
             return
 
         # Hold.
-        if L > 1:
+        if len(study) > 0:
             plant.hold(lanes, arms, extra, w, dt)
         else:
             single.hold(arms, extra, w, dt)
-        if plant.judge(lanes, arms, w, k) == L:
+        if plant.judge(lanes, arms, w, k) == len(lanes):
             return
 
 

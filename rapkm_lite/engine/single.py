@@ -6,7 +6,7 @@ import math
 
 from .jit import kernel, leaf, outlined
 from .leaves import drag, geometry, share, small_angle, solve2
-from .plant import FAST, MOST_STEPS, STIFF, mend, stiffness
+from .plant import FAST, MOST_STEPS, STIFF, judge, mend, stiffness
 from .rows import *
 from .tables import *
 
@@ -168,14 +168,13 @@ def observe(arms, extra, table, x, y, vx, vy, w, q, qd):
 
 @kernel
 def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
-    """`hold` for a controller in Python: the state after torques c (N,), and a number not positive for a lost arm."""
+    """`hold` for a controller in Python: the state after the torques c (N,), and its status."""
     W = len(arms)
     put(arms, w, x, y, vx, vy)
     sense(arms, extra, table, 0, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
     hold(arms, extra, w, dt)
-    low = w[LOW * W]
-    for i in range(1, W):
-        low = min(low, w[LOW * W + i])
-    return w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)], low
+    w[of(STATUS, 0, W, 1)] = DONE
+    judge(((),), arms, w, 0)
+    return (w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)], w[of(STATUS, 0, W, 1)])

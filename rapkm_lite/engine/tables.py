@@ -15,6 +15,9 @@ MEASURED, TRUE = range(2)
 # Rows per sample of the fault table.
 JUMP, HELD, ALIVE, LIMITED = range(4)
 
+# Sizes as `sizes` makes them: runs, drives, arms of a row; one entry for sums instead of a history, for faults, for
+# friction or gravity.
+Kind = namedtuple("Kind", "lanes drives arms study faulty extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 Law = namedtuple("Law", "form filter pose same switched")
 

@@ -16,7 +16,6 @@ from .setup import Outcome, Setup
 
 __all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Code", "Plant", "encode", "many", "single"]
 
-FAULTS = True
 LANES = 16 if COMPILED else 1
 _made = weakref.WeakKeyDictionary()
 
@@ -163,12 +162,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     code, sizes = codes[0], tables.sizes
     law = tables.Law(code.form, code.filter, tables.TRUE if code.true_pose else tables.MEASURED,
                      model.same_kinematics(robot), code.switched)
-    kind = (sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), _extra(robot),
-            _extra(model) if code.form > tables.PID else None)
+    kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(history is None)), sizes(int(setup.faults is not None)),
+                       _extra(robot))
+    modelled = _extra(model) if code.form > tables.PID else None
     w, log = _plain(work), _plain(np.empty(0) if history is None else history.reshape(-1))
-    with patience(*map(str, kind)), np.errstate(all="ignore"):
+    with patience(kind, modelled), np.errstate(all="ignore"):
         try:
-            closed_loops(*kind, _sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
+            closed_loops(kind, modelled, _sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
                          _made_for(trajectory, W, _motion), _faults(setup.faults, W), w, log)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
@@ -254,6 +254,7 @@ class Plant:
         self._extra, table = _extra(robot), _made_for(trajectory, W, _motion)
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
+        self.status = DONE
         start = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
         with patience("plant", W, len(self._extra)):
             self.observe(0, start)
@@ -266,10 +267,10 @@ class Plant:
         return q, qd
 
     def hold(self, state, c: np.ndarray, dt: float):
-        """The state after the torques c (N,) were held for dt; None when the machine has left the workspace."""
+        """The state after the torques c (N,) were held for dt; None when the machine was lost: `status` says how."""
         try:
-            *state, low = self._advance(self._arms, self._extra, self._table[0], *state, self._w, c, dt)
+            *state, status = self._advance(self._arms, self._extra, self._table[0], *state, self._w, c, dt)
         except (ArithmeticError, ValueError):
-            return None
-        x, y, vx, vy = state
-        return state if low > 0.0 and abs(x) + abs(y) + abs(vx) + abs(vy) < 1e300 else None
+            status = LEFT_WORKSPACE
+        self.status = int(status)
+        return state if status == DONE else None

@@ -9,13 +9,14 @@ from ..control.grammar import BadAnswer, coordinates
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..control.sample import Controller
 from ..mechanics.actuation import distal_cross_products, drive_pairs
-from .compiled import LEFT_WORKSPACE, NO_POSE, SINGULAR, Plant
+from .compiled import LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, Plant
 from .setup import Setup
 
 REASONS = {
     LEFT_WORKSPACE: "the machine left the workspace",
     NO_POSE: "the measured base angles fit no pose of the controller's model",
     SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
+    TOO_STIFF: "friction is too stiff for the sampling time",
 }
 
 
@@ -23,6 +24,8 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     """What went wrong at sample k."""
     if status not in REASONS:
         return str(cause) if isinstance(cause, BadAnswer) else f"the law raised {type(cause).__name__}: {cause}"
+    if status == TOO_STIFF:
+        return too_stiff(setup)
     pair = coordinates(law, None) if _ours(law) else None
     if pair is not None and tuple(sorted(pair)) in drive_pairs(setup.model):
         crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
@@ -31,6 +34,15 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
             return (f"{REASONS[status]} (near a parameterization singularity of its independent drives "
                     f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)")
     return f"{REASONS[status]} ({_stability(setup, law, k)})"
+
+
+def too_stiff(setup: Setup) -> str:
+    """The sentence on friction that would need more steps per hold than the engine takes."""
+    robot = setup.robot
+    return (f"{REASONS[TOO_STIFF]} of {setup.trajectory.dt:g} s: f_c / v0 = "
+            f"{robot.friction.max() / robot.friction_velocity:g} N m s/rad (friction {robot.friction.max():g} N m, "
+            f"friction_velocity {robot.friction_velocity:g} rad/s) needs more than 4000 steps in a hold; allowed: a "
+            "larger friction_velocity, less friction or a shorter dt")
 
 
 def _stability(setup: Setup, law, k: int) -> str:

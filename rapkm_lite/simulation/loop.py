@@ -8,11 +8,12 @@ from __future__ import annotations
 import copy
 
 from ..control.sample import Controller, NoPose
-from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, Plant
+from .compiled import DONE, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup, blank
 
-LAW_FAILED = 4
+LAW_FAILED = -1
+"""Status beside those of the engine: the law raised."""
 
 
 def own_copy(law):
@@ -54,7 +55,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, Exception | None]:
             if k < last:
                 state = plant.hold(state, torque, dt)                                  # hold
                 if state is None:
-                    return Outcome(LEFT_WORKSPACE, k, *history), None
+                    return Outcome(plant.status, k, *history), None
     except NoPose as error:
         return Outcome(NO_POSE, k, *history), error
     except Exception as error:

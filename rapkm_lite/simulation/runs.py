@@ -13,7 +13,7 @@ from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
 from ..mechanics.trajectory import Trajectory
-from .compiled import DONE, FAULTS, LEFT_WORKSPACE, encode, single
+from .compiled import DONE, LEFT_WORKSPACE, TOO_STIFF, encode, single
 from .energy import electric_energy
 from .explain import explain
 from .faults import Fault, check_faults
@@ -141,14 +141,9 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
     return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law, faults)
 
 
-def code_of(law, setup: Setup):
-    """The law as the engine runs it in this set-up; None where it has to run in Python."""
-    return None if setup.faults is not None and not FAULTS else encode(law, setup.model)
-
-
 def complete(setup: Setup, law, faults=()) -> Run:
     """The whole run; raises SimulationError with a part of it."""
-    code, cause = code_of(law, setup), None
+    code, cause = encode(law, setup.model), None
     if code is not None:
         outcome = single(setup, code)
     else:
@@ -164,7 +159,7 @@ def complete(setup: Setup, law, faults=()) -> Run:
 def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
     """The rows of an outcome that hold something."""
     status, sample, states, *columns = outcome
-    rows = slice(sample + (status in (DONE, LEFT_WORKSPACE)))
+    rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
     q_a, qd_a, c, pairs = (column[rows] for column in columns)
     states = states[rows]
     return Run(setup.robot, law, setup.trajectory, setup.sensors, faults, setup.trajectory.t[rows], states[:, :2],

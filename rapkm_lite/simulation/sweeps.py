@@ -15,13 +15,13 @@ from ..machine.arguments import real_array
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory
-from .compiled import DONE, many
+from .compiled import DONE, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import REASONS
 from .faults import check_faults
 from .loop import LAW_FAILED, own_copy
 from .patience import progress_bar
-from .runs import SimulationError, code_of, complete
+from .runs import SimulationError, complete
 from .sensors import Sensors
 from .setup import Setup, prepare
 
@@ -89,7 +89,7 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     laws, offsets = _rows(law, offsets, robot.n_arms)
     faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
-    in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if code_of(one, setup) is None]
+    in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup.model) is None]
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)
@@ -221,7 +221,7 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
 
     A function of values only, so that any executor can send it to another process.
     """
-    codes = {id(law): code_of(law, setup) for law in laws}
+    codes = {id(law): encode(law, setup.model) for law in laws}
     rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
     fast = [i for i, law in enumerate(laws) if codes[id(law)] is not None]
     if fast:
