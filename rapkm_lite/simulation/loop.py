@@ -12,7 +12,7 @@ from .compiled import DONE, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup, blank
 
-LAW_FAILED = -1
+LAW_FAILED = -2
 """Status beside those of the engine: the law raised."""
 
 
