@@ -2,6 +2,7 @@
 
 from types import ModuleType as _Module
 
+from .control.compiled_law import CompiledLaw, compiled
 from .control.computed_torque import (
     APD,
     CTC,
