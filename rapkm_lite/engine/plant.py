@@ -137,7 +137,7 @@ def count_steps(lanes, arms, w, dt):
                                 w[at(B2, i, j, W, L)], w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)],
                                 w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = max(1.0, near * math.ceil(max(stiff / STIFF, fast / FAST)))
+        n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = n
         w[of(STEP, j, W, L)] = dt / n if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.

@@ -80,8 +80,8 @@ def sizes(count: int) -> tuple:
 
 
 def extra(robot) -> tuple:
-    """Has an entry when the machine has friction or gravity."""
-    return sizes(int(bool(robot.friction.any() or robot.gravity.any())))
+    """One entry for a machine with friction only, two for one with gravity, none for one with neither."""
+    return sizes(2 if robot.gravity.any() else int(bool(robot.friction.any())))
 
 
 def width(N: int, alone: bool) -> int:

@@ -189,9 +189,10 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
-    if history is not None:
-        history[:] = np.reshape(log, history.shape)
-    work[:] = w
+    if not COMPILED:
+        work[:] = w
+        if history is not None:
+            history[:] = np.reshape(log, history.shape)
 
     def row(name: str) -> np.ndarray:
         index = getattr(rows, name)
