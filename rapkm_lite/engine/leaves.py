@@ -106,3 +106,22 @@ def share(s1, s2, l1sq, l2sq, place, vx, vy):
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
     return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv * (base + back)
+
+
+@leaf
+def pose_terms(l2sq, scale, place, ux, uy, e):
+    """An arm in the least-squares pose of the measured base angles: Hessian and gradient of half the squared error,
+    its row of A, and a number that is negative where the series does not hold or the arm does not reach.
+
+    u : unit vector of the desired proximal link.  e : measured minus desired base angle, rad.
+    """
+    ax, ay, dx, dy, ad, inv, area2 = place
+    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
+    s = (ux * ay - uy * ax) * scale
+    near = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
+    r = e - small_angle(s)
+    # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
+    h = r * inv
+    g1, g2 = 1.0 - h * ad, h * l2sq
+    return (g1 * bx * bx - g2 * lx * lx, g1 * bx * by - g2 * lx * ly, g1 * by * by - g2 * ly * ly, bx * r, by * r,
+            bx, by, near)

@@ -14,7 +14,7 @@ from .rows import *
 from .tables import *
 
 # Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
-STIFF, FAST, MOST_STEPS = 1.2, 0.8, 4000.0
+STIFF, FAST, MOST_STEPS = 1.0, 0.6, 4000.0
 
 
 @outlined
