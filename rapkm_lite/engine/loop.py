@@ -185,11 +185,12 @@ def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, histor
         # Sense: the machine as it is, and what the hold will start from.
         if len(study) > 0:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
-            add_work(lanes, arms, w)
         else:
             far = single.sense(arms, extra, table, o, w, dt)
         if far > 0:
             plant.mend(lanes, arms, table, o, w)
+        if len(study) > 0:
+            add_work(lanes, arms, w)
 
         # Measure: ideal encoders have their errors from `sense`.
         if real:
