@@ -51,7 +51,7 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
             w[at(ED, i, j, W, L)] -= want(table, o, RATE, i, W)
 
 
-@leaf
+@outlined
 def proportional(lanes, arms, w):
     """PD (12)."""
     P = len(arms) * len(lanes)
@@ -158,7 +158,7 @@ def add_up(lanes, drives, arms, w):
         w[of(ANTAGONISM, j, W, L)] += null
 
 
-@leaf
+@outlined
 def add_work(lanes, arms, w):
     """Work of the hold that ends at this sample."""
     P = len(arms) * len(lanes)

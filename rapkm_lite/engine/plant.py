@@ -208,7 +208,7 @@ def hold(lanes, arms, extra, w, dt):
         step(lanes, arms, extra, w)
 
 
-@leaf
+@outlined
 def judge(lanes, arms, w, k):
     """Mark the runs lost in the hold after sample k, or before it by their law; returns how many have ended."""
     L, W = len(lanes), len(arms)
