@@ -6,22 +6,35 @@ It holds, one after the other: t; q_a, qd_a; x, xd, xdd; q, qd, qdd; the matrice
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .jit import leaf, outlined
-from .leaves import geometry, smooth_sign
+from .leaves import geometry, smooth_sign, solve2
 from .rows import *
 from .tables import *
 
 
 @leaf
-def product(out, A, B):
-    """out = A B."""
-    for i in range(A.shape[0]):
-        for j in range(B.shape[1]):
+def product(out, A, B, rows, inner, columns):
+    """out = A B of matrices with these sizes, which the compiler knows."""
+    for i in range(rows):
+        for j in range(columns):
             s = 0.0
-            for k in range(A.shape[1]):
+            for k in range(inner):
                 s += A[i, k] * B[k, j]
+            out[i, j] = s
+
+
+@leaf
+def transposed(out, A, B, rows, inner, columns):
+    """out = A^T B."""
+    for i in range(rows):
+        for j in range(columns):
+            s = 0.0
+            for k in range(inner):
+                s += A[k, i] * B[k, j]
             out[i, j] = s
 
 
@@ -76,6 +89,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     Qn, p = matrix(room, p, n, 1)
     A_tilde, p = matrix(room, p, N, n)
     pinv, p = matrix(room, p, N, n)
+    scratch = np.empty((7, n, 2))
     J[:], J_dot[:], G[:], C_[:] = 0.0, 0.0, 0.0, 0.0
     env = ENVIRONMENT + GRAVITY_X
     gx, gy = w[of(env, 0, W, 1)], w[of(env + 1, 0, W, 1)]
@@ -86,7 +100,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         if law.asks == DESIRED:
             cos, sin = want(table, o, COS, i, W), want(table, o, SIN, i, W)
             turn_c, turn_s = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
-            l1, l2 = np.sqrt(l1sq), np.sqrt(l2sq)
+            l1, l2 = math.sqrt(l1sq), math.sqrt(l2sq)
             ax, ay, dx, dy = l1 * cos, l1 * sin, l2 * (cos * turn_c - sin * turn_s), l2 * (sin * turn_c + cos * turn_s)
             base = want(table, o, RATE, i, W)
             link = base + want(table, o, ELBOW_RATE, i, W)
@@ -121,57 +135,91 @@ def fill_matrices(drives, arms, law, table, o, w, room):
                 J_dot[2 * row, i] = -sign * (base * ax + link * dx)
                 J_dot[2 * row + 1, i] = -sign * (base * ay + link * dy)
                 J_dot[2 * row, N + i], J_dot[2 * row + 1, N + i] = -sign * link * dx, -sign * link * dy
-    A[:] = F[:N]
-    project(F, F_dot, P, P_dot)
-    half, turned = np.empty((n, 2)), np.empty((n, 2))
-    product(half, C_, F)
-    product(turned, G, F_dot)
-    half += turned
-    product(turned, G, F)
-    product(G2, F.T, turned)
-    product(C2, F.T, half)
-    product(Q2, F.T, Q_)
-    work, sums = np.empty((n, n)), np.empty((n, n))
-    product(work, G, P)
-    product(Gn, P, work)
-    product(work, C_, P)
-    product(sums, G, P_dot)
-    work += sums
-    product(Cn, P, work)
-    product(Qn, P, Q_)
-    A_tilde[:] = P[:N]
-    product(half[:2], A.T, A)
-    det = half[0, 0] * half[1, 1] - half[0, 1] * half[1, 0]
+    U, V, H, T = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(N):
-        u = (half[1, 1] * A[i, 0] - half[0, 1] * A[i, 1]) / det
-        v = (half[0, 0] * A[i, 1] - half[1, 0] * A[i, 0]) / det
+        A[i, 0], A[i, 1] = F[i, 0], F[i, 1]
+    # Minimal coordinates: F^T G F, F^T (C F + G Fdot), F^T Q.
+    product(H, G, F, n, n, 2)
+    transposed(G2, F, H, 2, n, 2)
+    product(H, C_, F, n, n, 2)
+    product(T, G, F_dot, n, n, 2)
+    for i in range(n):
+        H[i, 0], H[i, 1] = H[i, 0] + T[i, 0], H[i, 1] + T[i, 1]
+    transposed(C2, F, H, 2, n, 2)
+    transposed(Q2, F, Q_, 2, n, 1)
+    # Redundant coordinates with N = U U^T: U (U^T G U) U^T and so on.
+    project(F, F_dot, U, V, P, P_dot, n)
+    small, wide = scratch[4], scratch[5 : 7].reshape(2, 2 * n)
+    product(H, G, U, n, n, 2)
+    transposed(small, U, H, 2, n, 2)
+    product(T, U, small, n, 2, 2)
+    spread(Gn, T, U, n)
+    for i in range(2):
+        for j in range(n):
+            s = 0.0
+            for k in range(n):
+                s += H[k, i] * P_dot[k, j]
+            wide[i, j] = s
+    product(T, C_, U, n, n, 2)
+    transposed(small, U, T, 2, n, 2)
+    for i in range(2):
+        for j in range(n):
+            wide[i, j] += small[i, 0] * U[j, 0] + small[i, 1] * U[j, 1]
+    product(Cn, U, wide, n, 2, n)
+    transposed(small, U, Q_, 2, n, 1)
+    product(Qn, U, small, n, 2, 1)
+    for i in range(N):
+        for j in range(n):
+            A_tilde[i, j] = P[i, j]
+    m11 = m12 = m22 = 0.0
+    for i in range(N):
+        m11, m12, m22 = m11 + A[i, 0] * A[i, 0], m12 + A[i, 0] * A[i, 1], m22 + A[i, 1] * A[i, 1]
+    for i in range(N):
+        u, v = solve2(m11, m12, m22, A[i, 0], A[i, 1])
         for j in range(n):
             pinv[i, j] = u * F[j, 0] + v * F[j, 1]
 
 
-@outlined
-def project(F, F_dot, P, P_dot):
-    """The projector onto the range of F and its rate, from an orthonormal basis of the two columns."""
-    n = F.shape[0]
-    U = F.copy()
-    R = np.eye(2)
-    # Twice is enough: Gram-Schmidt once more removes what rounding left.
+@leaf
+def spread(out, A, B, n):
+    """out = A B^T of two columns each."""
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1]
+
+
+@leaf
+def project(F, F_dot, U, V, P, P_dot, n):
+    """The projector onto the range of F and its rate, from an orthonormal basis U of the two columns."""
+    r11, r12, r22 = 1.0, 0.0, 1.0
+    for i in range(n):
+        U[i, 0], U[i, 1] = F[i, 0], F[i, 1]
+    # Gram-Schmidt twice: the second time removes what rounding left.
     for _ in range(2):
-        a = np.sqrt((U[:, 0] ** 2).sum())
-        U[:, 0] /= a
-        b = (U[:, 0] * U[:, 1]).sum()
-        U[:, 1] -= b * U[:, 0]
-        c = np.sqrt((U[:, 1] ** 2).sum())
-        U[:, 1] /= c
-        R[0, 1] = a * R[0, 1] + b * R[1, 1]
-        R[0, 0], R[1, 1] = a * R[0, 0], c * R[1, 1]
-    product(P, U, U.T)
+        aa = ab = bb = 0.0
+        for i in range(n):
+            aa += U[i, 0] * U[i, 0]
+        a = math.sqrt(aa)
+        for i in range(n):
+            U[i, 0] /= a
+            ab += U[i, 0] * U[i, 1]
+        for i in range(n):
+            U[i, 1] -= ab * U[i, 0]
+            bb += U[i, 1] * U[i, 1]
+        b = math.sqrt(bb)
+        for i in range(n):
+            U[i, 1] /= b
+        r11, r12, r22 = a * r11, a * r12 + ab * r22, b * r22
+    spread(P, U, U, n)
     # F_dot R^-1, then its part across the range.
-    V = np.empty((n, 2))
-    V[:, 0] = F_dot[:, 0] / R[0, 0]
-    V[:, 1] = (F_dot[:, 1] - V[:, 0] * R[0, 1]) / R[1, 1]
-    for j in range(2):
-        s, t = (U[:, 0] * V[:, j]).sum(), (U[:, 1] * V[:, j]).sum()
-        V[:, j] -= s * U[:, 0] + t * U[:, 1]
-    product(P_dot, V, U.T)
-    P_dot += P_dot.T.copy()
+    p11 = p12 = p21 = p22 = 0.0
+    for i in range(n):
+        V[i, 0] = F_dot[i, 0] / r11
+        V[i, 1] = (F_dot[i, 1] - V[i, 0] * r12) / r22
+        p11, p12 = p11 + U[i, 0] * V[i, 0], p12 + U[i, 0] * V[i, 1]
+        p21, p22 = p21 + U[i, 1] * V[i, 0], p22 + U[i, 1] * V[i, 1]
+    for i in range(n):
+        V[i, 0], V[i, 1] = V[i, 0] - U[i, 0] * p11 - U[i, 1] * p21, V[i, 1] - U[i, 0] * p12 - U[i, 1] * p22
+    for i in range(n):
+        for j in range(n):
+            P_dot[i, j] = V[i, 0] * U[j, 0] + V[i, 1] * U[j, 1] + U[i, 0] * V[j, 0] + U[i, 1] * V[j, 1]
