@@ -18,6 +18,7 @@ from ..machine.arguments import (
     real_array,
 )
 from ..machine.manipulator import Manipulator
+from ..machine.values import Array, OptionalArray, OptionalPair, default
 from ..mechanics.actuation import (
     control_matrix,
     distal_cross_products,
@@ -47,10 +48,10 @@ class APD(LawValue):
     Raises ValueError at run time where the independent coordinates are singular.
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
-    independent: tuple[int, int] | None = (0, 1)
-    W: np.ndarray | None = None
+    K_P: Array
+    K_D: Array
+    independent: OptionalPair = default((0, 1))
+    W: OptionalArray = default(None)
     pose: str = "measured"
 
     def __post_init__(self):
@@ -106,8 +107,8 @@ class SwitchedCTC(LawValue):
     its memory.
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
+    K_P: Array
+    K_D: Array
     hysteresis: float = 1.2
     pose: str = "measured"
 
@@ -131,7 +132,8 @@ class SwitchedCTC(LawValue):
         measure = np.abs(distal_cross_products(model, exact_array("q", q, model.n_joints)))
         pairs, best = drive_pairs(model), int(np.argmax(measure))
         if current is not None:
-            current = tuple(sorted(joint_indices("current", current, model.n_arms)))
+            j, k = sorted(joint_indices("current", current, model.n_arms))
+            current = j, k
             if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
                 return current
         return pairs[best]
@@ -179,8 +181,8 @@ class RedundantAPD(LawValue):
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
+    K_P: Array
+    K_D: Array
     rule: str = "sigma_min"
     pose: str = "measured"
 

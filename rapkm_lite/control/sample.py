@@ -86,7 +86,8 @@ class Controller:
     """
 
     def __init__(self, law, model: Manipulator, dt: float = 1e-3):
-        self.law, self.model, self.dt, self.x = law, model, positive_number("dt", dt), None
+        self.law, self.model, self.dt = law, model, positive_number("dt", dt)
+        self.x: np.ndarray | None = None
         self.memory = as_law(law).start(model, self.dt)
 
     @property

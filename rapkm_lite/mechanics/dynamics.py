@@ -55,7 +55,8 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
     Gbar = F^T G F, Cbar = F^T (C F + G Fdot), both (..., 2, 2); Qbar = F^T Q, (..., 2).
     Raises ValueError where the choice of independent coordinates is singular.
     """
-    return tuple(part.copy() for part in at(robot, q, given(qd)).using(independent).minimal)
+    Gbar, Cbar, Qbar = at(robot, q, given(qd)).using(independent).minimal
+    return Gbar.copy(), Cbar.copy(), Qbar.copy()
 
 
 def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
@@ -97,7 +98,8 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
     G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), both (..., 2N, 2N); Q~ = N_J Q, (..., 2N).
     Raises ValueError at c-space singularities.
     """
-    return tuple(part.copy() for part in at(robot, q, given(qd)).redundant)
+    G, C, Q = at(robot, q, given(qd)).redundant
+    return G.copy(), C.copy(), Q.copy()
 
 
 def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..machine.arguments import check_leading, real_array
 from ..machine.manipulator import Manipulator
@@ -27,7 +28,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def unit_vector(angle: np.ndarray) -> np.ndarray:
+def unit_vector(angle: ArrayLike) -> np.ndarray:
     """(cos, sin) of an angle in rad, on a new last axis."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 

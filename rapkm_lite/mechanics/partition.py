@@ -35,7 +35,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
 def _solve_small(B: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(I + B^T B)^-1 right."""
     if B.shape[-1] == 1:
-        return right / (1.0 + np.vecdot(B, B, axis=-2)[..., None])
+        return right / (1.0 + product(B.mT, B))
     return np.linalg.solve(np.eye(B.shape[-1]) + product(B.mT, B), right)
 
 

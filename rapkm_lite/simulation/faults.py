@@ -5,6 +5,7 @@ Drives count from 0, times are in s from the start of the run.  To add a fault, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from ..control.laws import torque_limit
 from ..machine.arguments import bounded, exact_array, whole_number
 from ..machine.datafiles import known
-from ..machine.values import Value
+from ..machine.values import Array, Value
 
 
 class FaultTable(NamedTuple):
@@ -44,11 +45,15 @@ class Fault(Value):
 
     def _check(self) -> None:
         """Drive and times of a fault, each a plain number."""
-        self._set(drive=whole_number("drive", self.drive, 0))
+        given = self._fields()
+        self._set(drive=whole_number("drive", given["drive"], 0))
         for name in ("time", "start", "stop", "jump"):
-            if hasattr(self, name):
-                value = exact_array(name, getattr(self, name))
+            if name in given:
+                value = exact_array(name, given[name])
                 self._set(**{name: float(value if name == "jump" else bounded(name, value, 0.0, strict=False))})
+
+
+FaultsLike = Iterable[Fault] | Fault | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +64,7 @@ class TorqueLimit(Fault):
     TorqueLimit(0.3)
     """
 
-    limit: np.ndarray
+    limit: Array
 
     def __post_init__(self):
         self._set(limit=torque_limit(self.limit))
@@ -142,8 +147,9 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     shape = len(t), N
     table = FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
     for fault in faults:
-        if getattr(fault, "drive", 0) >= N:
-            raise ValueError(f"drive = {fault.drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
+        drive = getattr(fault, "drive", 0)
+        if drive >= N:
+            raise ValueError(f"drive = {drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
         fault.mark(table, t)
     return table
 

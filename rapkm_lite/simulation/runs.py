@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..control.grammar import LawLike
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
@@ -16,7 +18,7 @@ from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, TOO_STIFF, encode, single
 from .energy import electric_energy
 from .explain import explain
-from .faults import Fault, check_faults
+from .faults import Fault, FaultsLike, check_faults
 from .loop import closed_loop, own_copy
 from .sensors import Sensors
 from .setup import Outcome, Setup, prepare
@@ -113,9 +115,9 @@ class Run(Value):
         return f"Run({len(self) and self.t[-1]:g} s, {type(self.law).__name__}, energy ({joules}) J)"
 
 
-def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encoder=None,
-             model: Manipulator | None = None, velocity_filter: float | None = None, faults=(),
-             sensors: Sensors | None = None) -> Run:
+def simulate(robot: Manipulator, law: LawLike, trajectory: Trajectory, offset: ArrayLike = 0.0,
+             encoder: float | None = None, model: Manipulator | None = None, velocity_filter: float | None = None,
+             faults: FaultsLike = (), sensors: Sensors | None = None) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
     The run starts at rest at the first point of the path.  The controller measures q_a + offset and the true rates.
