@@ -153,6 +153,10 @@ class CommandFilter(LawValue):
 
     c = -K_P R_P e - K_D R_D ed, R_P = (A^T K_P)^+ A^T K_P and R_D alike.  The end-effector force is that of (16), the
     torques only for K = k_P I.
+
+    >>> import rapkm_lite as rk
+    >>> rk.CommandFilter(rk.PD(7.05, 0.225))
+    CommandFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
     """
 
     law: PD

@@ -55,6 +55,14 @@ class At(Value):
     it: ``at.G.copy()``).  Those that need qd raise ValueError when it was not given, those that do not exist at a
     singular pose raise there.  F, A and what follows from them belong to the end-effector position as independent
     coordinates, or to the two joints chosen by `using`.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.at(robot, q)
+    At('testbed', 1 pose)
+    >>> rk.at(robot, q).using((0, 1)).A.round(3)
+    array([[ 1.   ,  0.   ],
+           [ 0.   ,  1.   ],
+           [-0.651, -1.205]])
     """
 
     robot: Manipulator

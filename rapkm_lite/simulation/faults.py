@@ -78,7 +78,12 @@ class TorqueLimit(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeadDrive(Fault):
-    """A drive gives no torque from `time` on; it goes on measuring."""
+    """A drive gives no torque from `time` on; it goes on measuring.
+
+    >>> import rapkm_lite as rk
+    >>> rk.DeadDrive(drive=1, time=0.5)
+    DeadDrive(1, 0.5)
+    """
 
     drive: int
     time: float
@@ -96,6 +101,10 @@ class EncoderDropout(Fault):
     """An encoder repeats its last reading before `start` for start <= t < stop; at the first sample it reads once.
 
     Its rate is that of the repeated reading: zero where rates are ideal, else what the velocity filter makes of it.
+
+    >>> import rapkm_lite as rk
+    >>> rk.EncoderDropout(drive=0, start=0.5, stop=0.7)
+    EncoderDropout(0, 0.5, 0.7)
     """
 
     drive: int
@@ -114,7 +123,12 @@ class EncoderDropout(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OffsetJump(Fault):
-    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds."""
+    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds.
+
+    >>> import rapkm_lite as rk
+    >>> rk.OffsetJump(drive=2, time=0.5, jump=5e-3)
+    OffsetJump(2, 0.5, 0.005)
+    """
 
     drive: int
     time: float

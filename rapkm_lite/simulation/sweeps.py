@@ -39,6 +39,11 @@ class Sweep(Value):
     antagonistic_energy : (k,) J, (R / k_t^2) times the integral of ||c_null||^2 at the true pose.
     x_final : (k, 2) end-effector position at the end, m.
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
+
+    >>> import rapkm_lite as rk
+    >>> study = rk.sweep(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), 1e-3 * np.eye(3))
+    >>> len(study), study.energies.shape, int(study.failed.sum())
+    (3, (3, 3), 0)
     """
 
     robot: Manipulator
@@ -87,6 +92,11 @@ def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Traj
     Raises ValueError for bad arguments; SimulationError naming the run and the time, with the run up to there as
     `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
     exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
+
+    >>> import rapkm_lite as rk
+    >>> path = rk.hold(rk.load(), [0.0, 0.0])
+    >>> rk.sweep(rk.load(), [rk.PD(k, 0.2) for k in (3.0, 7.0)], path, [4e-3, 0.0, 0.0]).energies.shape
+    (2, 3)
     """
     _check_options(failed, chunk)
     laws, offsets = _rows(law, offsets, robot.n_arms)
