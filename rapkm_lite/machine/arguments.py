@@ -176,11 +176,6 @@ def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 
-def transpose(matrix: np.ndarray) -> np.ndarray:
-    """Transpose of the last two axes."""
-    return matrix.mT
-
-
 def _at(index) -> str:
     return f"[{', '.join(map(str, index))}]" if len(index) else ""
 

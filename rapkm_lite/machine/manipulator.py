@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, real_array
+from .arguments import bounded, exact_array, positive_number, real_array
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
@@ -69,23 +69,16 @@ class Manipulator(Value):
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
         masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
         given: dict[str, Any] = {"base": base, "lengths": lengths, "masses": masses}
+        inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
+        given["inertias"] = bounded("inertias", inertias, 0.0, strict=False)
         given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
-        if self.inertias is None:
-            given["inertias"] = masses * lengths**2 / 12
-        else:
-            given["inertias"] = bounded("inertias", _per_link("inertias", self.inertias, N), 0.0, strict=False)
         for key in ("rotor_inertia", "friction"):
             given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=False)
         for key in ("resistance", "torque_constant"):
             given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=True)
-        given["gravity"] = real_array("gravity", self.gravity, 2)
-        if given["gravity"].shape != (2,):
-            raise ValueError(f"gravity has shape {given['gravity'].shape}; allowed: (2,)")
-        for key, strict in (("friction_velocity", True), ("load", False)):
-            value = real_array(key, getattr(self, key))
-            if value.ndim:
-                raise ValueError(f"{key} has shape {value.shape}; allowed: one number")
-            given[key] = float(bounded(key, value, 0.0, strict=strict))
+        given["gravity"] = exact_array("gravity", self.gravity, 2)
+        given["friction_velocity"] = positive_number("friction_velocity", self.friction_velocity)
+        given["load"] = float(bounded("load", exact_array("load", self.load), 0.0, strict=False))
         given["mode"] = _per_drive("mode", self.mode, N)
         if not np.all(np.abs(given["mode"]) == 1.0):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
