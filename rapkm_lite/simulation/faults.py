@@ -142,7 +142,9 @@ class OffsetJump(Fault):
         table.jump[_from(t, self.time), self.drive] += self.jump
 
 
-KINDS = {kind.__name__: kind for kind in (TorqueLimit, DeadDrive, EncoderDropout, OffsetJump)}
+def kinds() -> dict[str, type[Fault]]:
+    """All faults by name, also those that you wrote."""
+    return {kind.__name__: kind for kind in Fault.__subclasses__()}
 
 
 def _from(t: np.ndarray, time: float) -> np.ndarray:
@@ -173,17 +175,17 @@ def check_faults(faults) -> tuple[Fault, ...]:
     faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
     for fault in faults:
         if not isinstance(fault, Fault):
-            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(KINDS)}")
+            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(kinds())}")
     return faults
 
 
 def read_fault(table) -> Fault:
     """A fault from a table of a TOML file: its `kind` and its arguments."""
     if not isinstance(table, dict) or "kind" not in table:
-        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(KINDS)}")
+        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(kinds())}")
     values = {key: value for key, value in table.items() if key != "kind"}
-    known("kind of fault", table["kind"], list(KINDS))
-    kind = KINDS[table["kind"]]
+    known("kind of fault", table["kind"], list(kinds()))
+    kind = kinds()[table["kind"]]
     names = list(kind.__dataclass_fields__)
     for key in values:
         known(f"entry of {table['kind']}", key, names)
