@@ -1,4 +1,4 @@
-"""Run times as ratios to C, to our own PD law and to MuJoCo, the way to a first result, and the error of stiff friction.
+"""Run times as ratios to C, to our PD law and to MuJoCo, the first result of a session, errors of stiff friction.
 
     python -m tests.bench [kernels] [laws] [start] [mujoco] [friction]
 

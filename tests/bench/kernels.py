@@ -13,7 +13,7 @@ from rapkm_lite.simulation.sensors import Sensors
 from rapkm_lite.simulation.setup import prepare
 
 from . import yardsticks
-from .turns import in_turns
+from .turns import OWN_TIME, in_turns
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 BLOCK = np.random.default_rng(0).normal(0.0, 5e-3, (16, 3))
@@ -87,7 +87,7 @@ def single_runs(robot, folder: Path) -> None:
     """Print single runs: times, and ratios to C without and with friction and to our PD."""
     jobs = {name: single(machine, law, path) for name, machine, law, path in cases(robot)}
     against = yards(folder, robot, 1, IN_C)
-    t = in_turns(25, **jobs, **against)
+    t = in_turns(25, OWN_TIME, **jobs, **against)
     print("\nOne run of 5 s, kernel alone; medians in turns (in brackets: shortest times)")
     print(f"{'':40}{'ms':>6}{'/ C':>14}{'/ C, friction':>15}{'/ our PD':>14}")
     for name in jobs:
@@ -102,7 +102,7 @@ def studies(robot, folder: Path) -> None:
     """Print runs side by side: per core, and whole sweeps."""
     jobs = {name: block(machine, law, path) for name, machine, law, path in cases(robot)}
     against = yards(folder, robot, 8, ["PD"])
-    t = in_turns(15, **jobs, **against)
+    t = in_turns(15, OWN_TIME, **jobs, **against)
     # Sixteen runs here, eight in C.
     t |= {name: type(t[name])(2 * t[name].median, 2 * t[name].least) for name in against}
     print("\nStudies, speed per core as a multiple of C SIMD over runs (PD), and of our PD in lanes")

@@ -33,7 +33,7 @@ def aligned(size: int) -> np.ndarray:
     return room[start : start + size]
 
 
-def c_run(function, lanes, robot, path, offsets, measured=False, filtered=False):
+def c_run(function, lanes, robot, path, offsets, filtered=False, measured=False):
     """Prepare a run of the C kernel; returns the function that runs it and gives history and sums."""
     arms = np.ascontiguousarray(tables.arm_table(robot, robot.n_arms).T)
     table = np.ascontiguousarray(tables.motion_table(path, robot.n_arms))
