@@ -85,7 +85,7 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
     exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
     """
-    _check_options(failed, chunk)
+    _check_options(failed, chunk, executor)
     laws, offsets = _rows(law, offsets, robot.n_arms)
     faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
@@ -112,11 +112,13 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     return result
 
 
-def _check_options(failed, chunk) -> None:
+def _check_options(failed, chunk, executor) -> None:
     if failed not in ("raise", "mask"):
         raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
     if not isinstance(chunk, (int, np.integer)) or chunk < 1:
         raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
+    if executor is not None and not hasattr(executor, "submit"):
+        raise ValueError(f"executor = {executor!r}; allowed: an executor of concurrent.futures")
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:

@@ -7,7 +7,6 @@ import sys
 import time
 from typing import NamedTuple
 
-
 # The time of the calling thread does not see other programs that wait; on Windows it is too coarse.
 OWN_TIME = time.perf_counter if sys.platform == "win32" else time.thread_time
 
