@@ -46,7 +46,8 @@ def laws(N):
         "APD in x": rk.APD([300.0, 400.0], 20.0, None), "APD weighted": rk.APD(7.0, 0.2, (0, 1), W=gains),
         "CTC of a pair": rk.CTC(900.0, 60.0, (1, 0)), "CTC of elbows": rk.CTC(900.0, 60.0, (N, N + 1)),
         "CTC in x": rk.CTC([900.0, 700.0], 60.0, None, pose="true"), "CTC weighted": rk.CTC(900.0, 60.0, None, W=gains),
-        "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0, 1.05), "SwitchedCTC, true pose": rk.SwitchedCTC(900.0, 60.0, 1.0, "true"),
+        "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0, 1.05),
+        "SwitchedCTC, true pose": rk.SwitchedCTC(900.0, 60.0, 1.0, "true"),
         "RedundantAPD": rk.RedundantAPD(5.0, 0.2), "RedundantAPD (29)": rk.RedundantAPD(gains, 0.03 * gains),
         "RedundantCTC": rk.RedundantCTC(mixed, 60.0), "RedundantCTC (29)": rk.RedundantCTC(100 * gains, 9 * gains),
         "RedundantCTC line 2": rk.RedundantCTC(900.0, 60.0, projected=False, pose="true"),
@@ -88,7 +89,7 @@ def agree(robot, law, path, model=None, **options):
     return run
 
 
-CIRCLE = cut(rk.circle(MACHINE, radius=0.11, duration=0.8), 240, 121)
+CIRCLE = cut(rk.circle(MACHINE, radius=0.11, duration=0.8), 180, 121)
 SENSORS = {"encoder": 4000, "velocity_filter": 2e-3}
 FAULTS = [rk.TorqueLimit([0.6, np.inf, 0.5]), rk.DeadDrive(0, 0.09), rk.EncoderDropout(2, 0.02, 0.03),
           rk.EncoderDropout(2, 0.05, 0.07), rk.EncoderDropout(1, 0.0, 0.01), rk.OffsetJump(1, 0.04, 2e-3),
