@@ -91,12 +91,13 @@ __version__ = "0.1.0"
 
 # Spelled out, because editors read it.
 __all__ = [
-    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "CommandFilter", "CompiledLaw", "Controller", "ConvergenceError",
-    "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator", "OffsetJump",
+    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "CommandFilter", "CompiledLaw", "Controller",
+    "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator", "OffsetJump",
     "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
     "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter", "antagonism_form",
     "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "circle", "close_loops",
-    "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian", "constraint_jacobian_dot",
+    "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian",
+    "constraint_jacobian_dot",
     "constraint_rank", "control_matrix", "control_vector_fields", "copper_loss", "coriolis_matrix", "data_path",
     "degree_of_actuation", "degree_of_freedom", "distal_cross_products", "drive_pairs", "effective_gain",
     "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow", "force_polygon",

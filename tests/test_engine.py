@@ -6,10 +6,9 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from reference import reference
 
 import rapkm_lite as rk
-from rapkm_lite.mechanics.kinematics import ee_complement
 
 ANGLES = {2: [200.0, -20.0], 3: [210.0, 330.0, 90.0], 4: [225.0, 315.0, 45.0, 135.0]}
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
@@ -34,38 +33,6 @@ def machine(N, **values):
     angle = np.deg2rad(ANGLES[N])
     base = 0.23 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return rk.Manipulator(base=base, lengths=0.2, masses=0.134, rotor_inertia=3.35e-6, **values)
-
-
-def reference(robot, law, trajectory, offset, model=None):
-    """States and torques: DOP853 at tolerance 1e-12 in every hold, minimal coordinates x, textbook controller."""
-    model = model or robot
-    controller, independent = rk.Controller(law, model), None
-    trajectory = trajectory.for_robot(model)
-    N, state = robot.n_arms, np.concatenate([trajectory.x[0], trajectory.xd[0]])
-    path = rk.inverse_kinematics(robot, trajectory.x)[:, :N]
-    states, torques, angles = [], [], []
-
-    def rhs(t, state, c):
-        q = rk.inverse_kinematics(robot, state[:2])
-        qd = ee_complement(robot, q) @ state[2:]
-        G, C, Q = rk.minimal_dynamics(robot, q, qd, independent)
-        force = rk.control_matrix(robot, q, independent).T @ c - C @ state[2:] - Q
-        return np.concatenate([state[2:], np.linalg.solve(G, force)])
-
-    for k, t in enumerate(trajectory.t):
-        q = rk.inverse_kinematics(robot, state[:2])
-        qd = ee_complement(robot, q) @ state[2:]
-        q_a = path[k] + (q[:N] - path[k] + np.pi) % (2 * np.pi) - np.pi
-        # Angles near the desired ones, without a jump at +-pi.
-        q_a = q_a + 2 * np.pi * np.round((trajectory.q_a[k] - q_a) / (2 * np.pi))
-        c = controller(t, q_a + offset, qd[:N], trajectory[k], truth=(state[:2], state[2:]))
-        states.append(state)
-        torques.append(c)
-        angles.append(q_a)
-        if k + 1 < len(trajectory):
-            end = solve_ivp(rhs, (0.0, trajectory.dt), state, "DOP853", rtol=1e-12, atol=1e-14, args=(c,))
-            state = end.y[:, -1]
-    return np.array(states), np.array(angles), np.array(torques)
 
 
 def agrees(robot, law, model=None, duration=0.2):

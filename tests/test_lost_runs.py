@@ -32,6 +32,10 @@ class FailsAt:
         return pd(t, q_a, qd_a, desired) if t < self.time - 1e-9 else self.act()
 
 
+def stop():
+    raise StopIteration
+
+
 def boom():
     raise KeyError("gain table")
 
@@ -78,11 +82,17 @@ def test_an_exception_of_the_law_keeps_the_samples_before_it():
 @pytest.mark.parametrize(("answer", "reason"), [
     (lambda: None, "law returned None"), (lambda: np.array([0.0, np.nan, 0.0]), r"[1] = nan; allowed: finite numbers"),
     (lambda: [1.0], "law returned the shape (1,); allowed: (3,)"), (lambda: "c", "is not numeric"),
+    (lambda: np.zeros((1, 3)), "law returned the shape (1, 3)"), (lambda: np.zeros(3) + 0j, "is not numeric"),
+    (lambda: (np.zeros(3), None), "is not numeric"), (lambda: (c for c in "123"), "is not numeric"),
 ])
 def test_a_bad_answer_later_on(answer, reason):
     error = lost(ROBOT, FailsAt(0.1, answer), PATH)
     assert reason in error.reason and isinstance(error.__cause__, ValueError)
     consistent(error, 100)
+
+
+def test_an_exception_without_words():
+    assert lost(ROBOT, FailsAt(0.3, stop), PATH).reason == "the law raised StopIteration"
 
 
 def test_the_first_sample_belongs_to_the_caller():
@@ -94,8 +104,10 @@ def test_the_first_sample_belongs_to_the_caller():
 
 
 def test_an_interrupt_comes_through():
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         rk.simulate(ROBOT, FailsAt(0.1, interrupt), PATH)
+    consistent(caught.value, 100)
+    assert "up to t = 0.1000 s" in caught.value.__notes__[-1]
 
 
 @pytest.mark.parametrize("law", [rk.PD(1e4, 0.225), rk.PD(1e4 * np.eye(3), 0.225),

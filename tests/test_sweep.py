@@ -126,6 +126,7 @@ def test_result_is_an_array_of_energies():
     ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
     ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise' or 'mask'"),
     ({"chunk": 0}, "chunk = 0; allowed: a whole number >= 1"),
+    ({"executor": 3}, "executor = 3; allowed: an executor"),
     ({"encoder": -5}, "encoder = -5; allowed: > 0"),
 ])
 def test_bad_arguments(arguments, message):

@@ -98,7 +98,7 @@ def torque_limit(limit) -> np.ndarray:
     """A largest torque in N m, one number or (N,), not negative; infinity is no limit."""
     endless = np.asarray(limit) == math.inf
     array = real_array("limit", np.where(endless, 0.0, limit) if np.any(endless) else limit)
-    if array.ndim > 1:
+    if array.ndim > 1 or array.size == 0:
         raise ValueError(f"limit has shape {array.shape}; allowed: one number or one per drive")
     return np.where(endless, math.inf, bounded("limit", array, 0.0, strict=False))
 

@@ -23,7 +23,8 @@ REASONS = {
 def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None) -> str:
     """What went wrong at sample k."""
     if status not in REASONS:
-        return str(cause) if isinstance(cause, BadAnswer) else f"the law raised {type(cause).__name__}: {cause}"
+        words = f": {cause}" if str(cause) else ""
+        return str(cause) if isinstance(cause, BadAnswer) else f"the law raised {type(cause).__name__}{words}"
     if status == TOO_STIFF:
         return too_stiff(setup)
     pair = coordinates(law, None) if _ours(law) else None

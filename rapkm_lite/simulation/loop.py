@@ -28,10 +28,10 @@ def own_copy(law):
                          "allowed: an object that copy.deepcopy copies, or a function") from error
 
 
-def closed_loop(setup: Setup, law) -> tuple[Outcome, Exception | None]:
+def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     """One run with a law or callable that nobody else uses; returns it and the exception that stopped it.
 
-    What goes wrong at the first sample is an error of the caller, and raised as it is.
+    What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
     """
     robot, model, trajectory, sensors, faults = setup
     plant, encoders = Plant(robot, trajectory), Encoders(sensors, faults, trajectory.dt)
@@ -58,7 +58,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, Exception | None]:
                     return Outcome(plant.status, k, *history), None
     except NoPose as error:
         return Outcome(NO_POSE, k, *history), error
-    except Exception as error:
+    except BaseException as error:
         if k == 0:
             raise
         return Outcome(LAW_FAILED, k, *history), error

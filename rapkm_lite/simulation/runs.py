@@ -146,7 +146,8 @@ def simulate(robot: Manipulator, law: LawLike, trajectory: Trajectory, offset: A
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a user's law raises at
     the first sample comes through.  Whatever stops the run later raises SimulationError with the run up to there: a
-    machine that leaves the workspace, a lost pose, a singularity of the law's coordinates, an error in the law.
+    machine that leaves the workspace, a lost pose, a singularity of the law's coordinates, an error in the law.  A
+    Ctrl-C comes through, with the run up to there as its `partial`.
 
     >>> import rapkm_lite as rk
     >>> spring = lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
@@ -169,6 +170,10 @@ def complete(setup: Setup, law, faults=()) -> Run:
         law = own_copy(law)
         outcome, cause = closed_loop(setup, law)
     run = _run(setup, law, faults, outcome)
+    if cause is not None and not isinstance(cause, Exception):
+        cause.partial, time = run, setup.trajectory.t[outcome.sample]
+        cause.add_note(f"The run up to t = {time:.4f} s is the `partial` of this exception.")
+        raise cause
     if outcome.status != DONE:
         time, reason = setup.trajectory.t[outcome.sample], explain(setup, law, outcome.status, outcome.sample, cause)
         raise SimulationError(time, reason, run) from cause

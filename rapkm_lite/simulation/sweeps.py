@@ -98,7 +98,7 @@ def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Traj
     >>> rk.sweep(rk.load(), [rk.PD(k, 0.2) for k in (3.0, 7.0)], path, [4e-3, 0.0, 0.0]).energies.shape
     (2, 3)
     """
-    _check_options(failed, chunk)
+    _check_options(failed, chunk, executor)
     laws, offsets = _rows(law, offsets, robot.n_arms)
     faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
@@ -125,11 +125,13 @@ def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Traj
     return result
 
 
-def _check_options(failed, chunk) -> None:
+def _check_options(failed, chunk, executor) -> None:
     if failed not in ("raise", "mask"):
         raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
     if not isinstance(chunk, (int, np.integer)) or chunk < 1:
         raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
+    if executor is not None and not hasattr(executor, "submit"):
+        raise ValueError(f"executor = {executor!r}; allowed: an executor of concurrent.futures")
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:

@@ -1,6 +1,6 @@
-/* The yardstick: the same closed loop (PD, force filter, true or measured pose, frictionless, horizontal plane) in C.
-   Compiled twice: LANES = 1 is the scalar kernel with its history, LANES = 8 runs eight runs in one vector register
-   and keeps only sums. */
+/* The yardstick: the same closed loop (PD, force filter, true or measured pose, horizontal plane) in C.
+   LANES = 1 is the scalar kernel with its history, LANES = 8 runs eight runs in one vector register and keeps only
+   sums.  FRICTION = 1 adds friction in the drives, without the substeps that it would need. */
 #include <math.h>
 #if LANES == 1
 typedef double real;
@@ -24,9 +24,10 @@ static inline int any_above(real v, double limit) {
 }
 #endif
 #define N 3
+enum { ANGLE, RATE, COS, SIN, BLOCKS = 9 };
 #define EACH for (int i = 0; i < N; i++)
 
-typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, tip, w1, w2, friction, scale; } arm;
+typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, tip, w1, w2, friction, scale, elbow_scale; } arm;
 typedef struct { real ax, ay, ad, bx, by, lx, ly, inv, area2; } geo;
 
 static inline geo geometry(const arm *m, real x, real y) {
@@ -46,8 +47,17 @@ static inline real small_angle(real s) {
            z * (231. / 13312 + z * (143. / 10240 + z * (6435. / 557056)))))))));
 }
 
-static inline void dynamics(const arm *arms, const geo *g, real vx, real vy, const real *c, real *kx, real *ky,
-                            real *low) {
+/* tanh(z): e^u - 1 at u = 2 z / 256 by its series, doubled eight times. */
+static inline real smooth_sign(real z) {
+    real top = 40.0 + (real){0}, u = -smaller(-smaller(z + z, top), top) * 0.00390625;
+    real t = u * (1.0 + u * (1. / 2 + u * (1. / 6 + u * (1. / 24 + u * (1. / 120 + u * (1. / 720 + u * (1. / 5040 +
+             u * (1. / 40320 + u * (1. / 362880)))))))));
+    for (int i = 0; i < 8; i++) t = t * (2.0 + t);
+    return t / (2.0 + t);
+}
+
+static inline void dynamics(const arm *arms, const geo *g, real vx, real vy, const real *c, double sharpness, real *kx,
+                            real *ky, real *low) {
     real m11 = arms[0].tip + arms[1].tip + arms[2].tip + (real){0}, m12 = {0}, m22 = m11, fx = {0}, fy = {0};
     EACH {
         const arm *m = arms + i;
@@ -58,38 +68,41 @@ static inline void dynamics(const arm *arms, const geo *g, real vx, real vy, con
         real ba = b2 * q.ad + k2 * m->l2sq, la = b2 * m->l1sq + k2 * q.ad;
         real sx = m->s1 * q.bx, sy = m->s1 * q.by, tx = m->s2 * q.lx, ty = m->s2 * q.ly;
         m11 += sx * q.bx + tx * q.lx, m12 += sx * q.by + tx * q.ly, m22 += sy * q.by + ty * q.ly;
-        fx += q.bx * c[i] - sx * ba - tx * la, fy += q.by * c[i] - sy * ba - ty * la;
+        real drive = FRICTION ? c[i] - m->friction * smooth_sign(base * sharpness) : c[i];
+        fx += q.bx * drive - sx * ba - tx * la, fy += q.by * drive - sy * ba - ty * la;
     }
     real s = 1.0 / (m11 * m22 - m12 * m12);
     *kx = (m22 * fx - m12 * fy) * s, *ky = (m11 * fy - m12 * fx) * s;
 }
 
-static inline void accelerate(const arm *arms, real x, real y, real vx, real vy, const real *c, real *kx, real *ky,
-                              real *low) {
+static inline void accelerate(const arm *arms, real x, real y, real vx, real vy, const real *c, double sharpness,
+                              real *kx, real *ky, real *low) {
     geo g[N];
     EACH g[i] = geometry(arms + i, x, y);
-    dynamics(arms, g, vx, vy, c, kx, ky, low);
+    dynamics(arms, g, vx, vy, c, sharpness, kx, ky, low);
 }
 
 /* sums, in lanes: copper and work per drive, torque, antagonism; history, for one run: x y vx vy | q | qd | c.
    Returns how many Newton steps were taken. */
 long closed_loop(const arm *arms, const double *table, long samples, double dt, const double *offsets, double Kp,
-                 double Kd, double weight, int measured, int filtered, double *history, double *sums) {
-    const long cols = 6 + 8 * N;
+                 double Kd, double weight, double sharpness, int measured, int filtered, double *history,
+                 double *sums) {
+    const long cols = 6 + BLOCKS * N;
     real x, y, vx, vy, px, py, p1x, p1y, p2x, p2y, c[N], offset[N], old[N], copper[N], work[N], torque = {0}, null_ = {0};
     x = px = p1x = p2x = table[0] + (real){0}, y = py = p1y = p2y = table[1] + (real){0}, vx = vy = (real){0};
     EACH copper[i] = work[i] = old[i] = c[i] = (real){0}, offset[i] = *(const real *)(offsets + i * LANES);
 
     long steps = 0;
     for (long k = 0; k < samples; k++) {
-        const double *row = table + k * cols, *u = row + 6 + 6 * N, *v = row + 6 + 7 * N;
+        const double *row = table + k * cols, *want = row + 6 + ANGLE * N, *want_rate = row + 6 + RATE * N,
+                     *u = row + 6 + COS * N, *v = row + 6 + SIN * N;
         geo g[N];
         real e[N], rate[N], angle[N], a1[N], a2[N];
         EACH {
             g[i] = geometry(arms + i, x, y);
-            angle[i] = row[6 + i] + small_angle((u[i] * g[i].ay - v[i] * g[i].ax) * arms[i].scale);
+            angle[i] = want[i] + small_angle((u[i] * g[i].ay - v[i] * g[i].ax) * arms[i].scale);
             rate[i] = g[i].bx * vx + g[i].by * vy;
-            e[i] = angle[i] + offset[i] - row[6 + i];
+            e[i] = angle[i] + offset[i] - want[i];
             work[i] += c[i] * (angle[i] - old[i]), old[i] = angle[i];
             a1[i] = g[i].bx, a2[i] = g[i].by;
         }
@@ -114,7 +127,7 @@ long closed_loop(const arm *arms, const double *table, long samples, double dt, 
         }
         real m11 = {0}, m12 = {0}, m22 = {0}, fx = {0}, fy = {0};
         EACH {
-            c[i] = Kp * e[i] + Kd * (rate[i] - row[6 + 2 * N + i]);
+            c[i] = Kp * e[i] + Kd * (rate[i] - want_rate[i]);
             m11 += a1[i] * a1[i], m12 += a1[i] * a2[i], m22 += a2[i] * a2[i], fx += a1[i] * c[i], fy += a2[i] * c[i];
         }
         real s = 1.0 / (m11 * m22 - m12 * m12), gx = (m22 * fx - m12 * fy) * s, gy = (m11 * fy - m12 * fx) * s;
@@ -145,13 +158,13 @@ long closed_loop(const arm *arms, const double *table, long samples, double dt, 
             low = smaller(low, ahead);
         }
         real h2 = 0.5 * dt + (real){0}, k1x, k1y, k2x, k2y, k3x, k3y, k4x, k4y;
-        dynamics(arms, g, vx, vy, c, &k1x, &k1y, &low);
+        dynamics(arms, g, vx, vy, c, sharpness, &k1x, &k1y, &low);
         real ux = vx + h2 * k1x, uy = vy + h2 * k1y;
-        accelerate(arms, x + h2 * vx, y + h2 * vy, ux, uy, c, &k2x, &k2y, &low);
+        accelerate(arms, x + h2 * vx, y + h2 * vy, ux, uy, c, sharpness, &k2x, &k2y, &low);
         real wx = vx + h2 * k2x, wy = vy + h2 * k2y;
-        accelerate(arms, x + h2 * ux, y + h2 * uy, wx, wy, c, &k3x, &k3y, &low);
+        accelerate(arms, x + h2 * ux, y + h2 * uy, wx, wy, c, sharpness, &k3x, &k3y, &low);
         real zx = vx + dt * k3x, zy = vy + dt * k3y;
-        accelerate(arms, x + dt * wx, y + dt * wy, zx, zy, c, &k4x, &k4y, &low);
+        accelerate(arms, x + dt * wx, y + dt * wy, zx, zy, c, sharpness, &k4x, &k4y, &low);
         double d6 = dt / 6.0;
         x += d6 * (vx + 2.0 * (ux + wx) + zx), y += d6 * (vy + 2.0 * (uy + wy) + zy);
         vx += d6 * (k1x + 2.0 * (k2x + k3x) + k4x), vy += d6 * (k1y + 2.0 * (k2y + k3y) + k4y);

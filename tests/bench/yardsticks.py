@@ -12,15 +12,15 @@ import numpy as np
 from rapkm_lite.engine import tables
 
 
-def compile_c(folder: Path, lanes: int):
+def compile_c(folder: Path, lanes: int, friction: bool = False):
     """The C kernel for one run or for `lanes` runs in a vector register; None where there is no compiler."""
     compiler = shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
         return None
-    library = folder / f"kernel{lanes}.so"
+    library = folder / f"kernel{lanes}{friction}.so"
     source = Path(__file__).with_name("kernel.c")
-    subprocess.run([compiler, "-O3", "-march=native", "-fno-math-errno", f"-DLANES={lanes}", "-shared", "-fPIC", "-o",
-                    str(library), str(source), "-lm"], check=True)
+    subprocess.run([compiler, "-O3", "-march=native", "-ffast-math", f"-DLANES={lanes}", f"-DFRICTION={friction:d}",
+                    "-shared", "-fPIC", "-o", str(library), str(source), "-lm"], check=True)
     function = ctypes.CDLL(str(library)).closed_loop
     function.restype = ctypes.c_long
     return function
@@ -33,18 +33,20 @@ def aligned(size: int) -> np.ndarray:
     return room[start : start + size]
 
 
-def c_run(function, lanes, robot, path, offsets, measured, filtered):
+def c_run(function, lanes, robot, path, offsets, filtered=False, measured=False):
     """Prepare a run of the C kernel; returns the function that runs it and gives history and sums."""
-    arms, table = tables.arm_table(robot), np.ascontiguousarray(tables.motion_table(path))
+    arms = np.ascontiguousarray(tables.arm_table(robot, robot.n_arms).T)
+    table = np.ascontiguousarray(tables.motion_table(path, robot.n_arms))
     history, sums, offset = np.empty((len(path), 13)), aligned(10 * lanes), aligned(3 * lanes)
     offset[:] = np.broadcast_to(offsets, (lanes, 3)).T.ravel()
     weight = float((robot.resistance / robot.torque_constant**2)[0])
     pointer = [ctypes.c_void_p(v.ctypes.data) for v in (arms, table, offset, history, sums)]
+    real = ctypes.c_double
+    numbers = [real(v) for v in (7.05, 0.225, weight, 1 / robot.friction_velocity)]
 
     def run():
-        number, real = ctypes.c_long, ctypes.c_double
-        steps = function(pointer[0], pointer[1], number(len(path)), real(path.dt), pointer[2], real(7.05), real(0.225),
-                         real(weight), int(measured), int(filtered), pointer[3], pointer[4])
+        steps = function(pointer[0], pointer[1], ctypes.c_long(len(path)), real(path.dt), pointer[2], *numbers,
+                         int(measured), int(filtered), pointer[3], pointer[4])
         assert steps >= 0
         return history, sums.reshape(10, lanes)
 

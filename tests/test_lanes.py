@@ -1,0 +1,186 @@
+"""Every law three times: alone in the compiled loop, in lanes, and through the textbook layer; and stiff friction."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from reference import reference
+from samples import MACHINES
+
+import rapkm_lite as rk
+from rapkm_lite.simulation import compiled
+
+OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
+PD = rk.PD(7.05, 0.225)
+MACHINE = MACHINES["testbed"].replace(gravity=(0.3, -1.0), load=0.05)
+MODEL = MACHINE.replace(lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]], load=0.02, friction=3e-3)
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+
+
+class Textbook(rk.Law):
+    """A law of the package that the engine does not know: it runs through the formulas of `control`."""
+
+    def __init__(self, law):
+        self.law = law
+
+    def start(self, model, dt):
+        return self.law.start(model, dt)
+
+    def step(self, memory, sample):
+        return self.law.step(memory, sample)
+
+    def coordinates(self, memory):
+        return self.law.coordinates(memory)
+
+
+def laws(N):
+    """All laws that the engine knows, for N drives."""
+    pid = rk.PID(7.0, 90.0, 0.2, limit=0.5)
+    gains = np.linspace(5.0, 8.0, N)
+    mixed = np.linspace(300.0, 900.0, 2 * N)
+    bare = {"PD": rk.PD(gains, 0.225), "PID": pid,
+            "PID per drive": rk.PID(gains, 10 * gains, 0.03 * gains, 0.1 * gains)}
+    model = {
+        "APD of a pair": rk.APD(7.0, [0.2, 0.3], (0, 1)), "APD of an elbow": rk.APD([7.0, 5.0], 0.2, (1, N)),
+        "APD in x": rk.APD([300.0, 400.0], 20.0, None), "APD weighted": rk.APD(7.0, 0.2, (0, 1), W=gains),
+        "CTC of a pair": rk.CTC(900.0, 60.0, (1, 0)), "CTC of elbows": rk.CTC(900.0, 60.0, (N, N + 1)),
+        "CTC in x": rk.CTC([900.0, 700.0], 60.0, None, pose="true"), "CTC weighted": rk.CTC(900.0, 60.0, None, W=gains),
+        "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0, 1.05),
+        "SwitchedCTC, true pose": rk.SwitchedCTC(900.0, 60.0, 1.0, "true"),
+        "RedundantAPD": rk.RedundantAPD(5.0, 0.2), "RedundantAPD (29)": rk.RedundantAPD(gains, 0.03 * gains),
+        "RedundantCTC": rk.RedundantCTC(mixed, 60.0), "RedundantCTC (29)": rk.RedundantCTC(100 * gains, 9 * gains),
+        "RedundantCTC line 2": rk.RedundantCTC(900.0, 60.0, projected=False, pose="true"),
+    }
+    around = {
+        "filter": rk.AntagonismFilter(PD), "filter, true pose": rk.AntagonismFilter(PD, "true"),
+        "weighted filter": rk.AntagonismFilter(PD, W=gains), "filter of PID": rk.AntagonismFilter(pid),
+        "command filter": rk.CommandFilter(rk.PD(gains, 0.2)), "filter of APD": rk.AntagonismFilter(model["APD in x"]),
+        "filter of CTC": rk.AntagonismFilter(model["CTC of a pair"], W=gains),
+        "filter of SwitchedCTC": rk.AntagonismFilter(model["SwitchedCTC"]),
+        "filter of RedundantAPD": rk.AntagonismFilter(model["RedundantAPD"]),
+        "filter of line 2": rk.AntagonismFilter(model["RedundantCTC line 2"], "true"),
+    }
+    return bare | model | around
+
+
+def cut(path, first, count):
+    """Some samples of a path as a path of its own, which begins in motion."""
+    rows = slice(first, first + count)
+    return rk.follow(path.robot, path.t[:count], path.x[rows], path.xd[rows], path.xdd[rows])
+
+
+def agree(robot, law, path, model=None, **options):
+    """One run, its row in a sweep, and the textbook loop."""
+    offset = OFFSET[: robot.n_arms]
+    assert compiled.encode(law, model or robot) is not None
+    run = rk.simulate(robot, law, path, offset, model=model, **options)
+    slow = rk.simulate(robot, Textbook(law), path, offset, model=model, **options)
+    for name in ("x", "xd", "q_a", "qd_a", "c"):
+        assert_allclose(getattr(run, name), getattr(slow, name), rtol=0, atol=1e-9)
+    assert_array_equal(run.pairs, slow.pairs)
+    # In company, among runs that go other ways.
+    offsets = np.array([-offset, 0 * offset, offset, 2 * offset])
+    study = rk.sweep(robot, law, path, offsets, model=model, **options)
+    assert_allclose(study.energies[2], run.energy, rtol=1e-11, atol=1e-11)
+    assert_allclose(study.antagonistic_energy[2], rk.antagonistic_energy(run), rtol=1e-9, atol=1e-12)
+    assert_allclose(study.x_final[2], run.x[-1], rtol=0, atol=1e-11)
+    assert_allclose(study.torque_norm[2], np.sqrt(np.mean(np.sum(run.c[:-1] ** 2, axis=1))), rtol=0, atol=1e-11)
+    return run
+
+
+CIRCLE = cut(rk.circle(MACHINE, radius=0.11, duration=0.8), 180, 121)
+SENSORS = {"encoder": 4000, "velocity_filter": 2e-3}
+FAULTS = [rk.TorqueLimit([0.6, np.inf, 0.5]), rk.DeadDrive(0, 0.09), rk.EncoderDropout(2, 0.02, 0.03),
+          rk.EncoderDropout(2, 0.05, 0.07), rk.EncoderDropout(1, 0.0, 0.01), rk.OffsetJump(1, 0.04, 2e-3),
+          rk.OffsetJump(0, 0.0, -1e-3), rk.OffsetJump(2, 0.12, 1e-3)]  # at the first sample, and at the last
+
+
+@pytest.mark.parametrize("name", laws(3))
+def test_gravity_load_friction(name):
+    run = agree(MACHINE, laws(3)[name], CIRCLE)
+    if "Switched" in name:
+        assert run.switches > 0
+    if name == "PID":
+        assert (np.abs(run.c) == 0.5).any()  # the limit is met
+
+
+@pytest.mark.parametrize("name", laws(3))
+def test_another_model_and_real_encoders(name):
+    agree(MACHINE, laws(3)[name], CIRCLE, model=MODEL, **SENSORS)
+
+
+@pytest.mark.parametrize("sensors", [{}, SENSORS], ids=["ideal", "encoder"])
+@pytest.mark.parametrize("name", ["PD", "PID", "filter", "weighted filter", "command filter", "APD of an elbow",
+                                  "CTC in x", "SwitchedCTC", "RedundantAPD (29)", "RedundantCTC", "filter of PID"])
+def test_faults(name, sensors):
+    run = agree(MACHINE, laws(3)[name], CIRCLE, faults=FAULTS, **sensors)
+    assert not run.c[90:, 0].any() and (np.abs(run.c) <= [0.6, np.inf, 0.5]).all()
+
+
+@pytest.mark.parametrize("machine", ["five_bar", "four_arms", "asymmetric"])
+@pytest.mark.parametrize("name", ["PD", "filter", "APD weighted", "CTC of elbows", "SwitchedCTC", "RedundantAPD",
+                                  "RedundantCTC", "RedundantCTC line 2"])
+def test_other_machines(machine, name):
+    robot = MACHINES[machine].replace(gravity=(0.0, -2.0))
+    agree(robot, laws(robot.n_arms)[name], rk.circle(robot, radius=0.03, duration=0.12))
+
+
+# Company.
+def test_laws_of_all_kinds_in_one_sweep():
+    """A row has the bits of a sweep of its own, whatever its neighbours, the threads and the order."""
+    every = list(laws(3).values())
+    study = rk.sweep(MACHINE, every, CIRCLE, OFFSET[:3], faults=FAULTS, chunk=64)
+    with ThreadPoolExecutor(2) as pool:
+        others = [rk.sweep(MACHINE, every, CIRCLE, OFFSET[:3], faults=FAULTS, executor=pool, chunk=3),
+                  rk.sweep(MACHINE, every[::-1], CIRCLE, OFFSET[:3], faults=FAULTS)]
+    for name in COLUMNS:
+        column = getattr(study, name)
+        assert_array_equal(getattr(others[0], name), column)
+        assert_array_equal(getattr(others[1], name)[::-1], column)
+    for i, law in enumerate(every):
+        own = rk.sweep(MACHINE, law, CIRCLE, OFFSET[:3], faults=FAULTS)
+        for name in COLUMNS:
+            assert_array_equal(getattr(own, name)[0], getattr(study, name)[i])
+
+
+@pytest.mark.parametrize("name", ["PD", "filter", "CTC of elbows", "SwitchedCTC", "RedundantAPD"])
+def test_neighbours_that_fail_change_no_bit(name):
+    """Offsets that fit no pose, and offsets that drive the machine out of its workspace."""
+    law, good = laws(3)[name], np.random.default_rng(3).normal(0.0, 3e-3, (5, 3))
+    bad = np.array([[2.5, -2.5, 2.5], [0.8, 0.8, -0.8], [-1.2, 1.0, 1.2]])
+    offsets = np.concatenate([bad[:1], good[:3], bad[1:], good[3:]])
+    study = rk.sweep(MACHINE, law, CIRCLE, offsets, failed="mask")
+    rows = [1, 2, 3, 6, 7]
+    assert study.failed.any() and not study.failed[rows].any()
+    own = rk.sweep(MACHINE, law, CIRCLE, good)
+    for column in COLUMNS:
+        assert_array_equal(getattr(study, column)[rows], getattr(own, column))
+
+
+# Friction.
+FAST = rk.circle(MACHINES["testbed"], 0.1, 0.3)
+MOTIONS = {"a drive turns back": cut(FAST, 95, 26), "two turn back": cut(FAST, 160, 26),
+           "at rest": rk.hold(MACHINES["testbed"], (0.02, 0.03), 0.015)}
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(("friction", "velocity"), [(4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3),
+                                                    (1.0, 0.03), (1.0, 1e-3)])
+def test_friction_as_a_stiff_solver_has_it(friction, velocity, motion):
+    """LSODA at its tightest in every hold."""
+    robot, path = MACHINES["testbed"].replace(friction=friction, friction_velocity=velocity), MOTIONS[motion]
+    states = reference(robot, PD, path, OFFSET[:3], method="LSODA", rtol=1e-12, atol=1e-15)[0]
+    assert_allclose(rk.simulate(robot, PD, path, OFFSET[:3]).x, states[:, :2], rtol=0, atol=2e-9)
+    study = rk.sweep(robot, PD, path, [OFFSET[:3], [0.0, 0.0, 0.0]])
+    assert_allclose(study.x_final[0], states[-1, :2], rtol=0, atol=2e-9)
+
+
+def test_friction_beyond_all_measure():
+    robot, still = MACHINES["testbed"].replace(friction=50.0, friction_velocity=1e-6), MOTIONS["at rest"]
+    words = r"f_c / v0 = 5e\+07 N m s/rad \(friction 50 N m, friction_velocity 1e-06 rad/s\) needs more than 4000 steps"
+    for law in (PD, Textbook(PD)):
+        with pytest.raises(rk.SimulationError, match=words):
+            rk.simulate(robot, law, still, OFFSET[:3])
+        with pytest.raises(rk.SimulationError, match="run 0: .*" + words):
+            rk.sweep(robot, law, still, [OFFSET[:3], -OFFSET[:3]])
