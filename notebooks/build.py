@@ -8,8 +8,8 @@
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
-``NN_name.ipynb``, and links ``(../page)`` become ``(page)``.  Notebooks without a solution are executed as they are.  ``rapkm_lite/plotting.py``, the list of
-all figures, is written anew each time.
+``NN_name.ipynb``, and links ``(../page)`` become ``(page)``.  Notebooks without a solution are executed as they are.
+``rapkm_lite/plotting.py``, the list of all figures, is written anew each time.
 """
 
 from __future__ import annotations
