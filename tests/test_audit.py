@@ -352,12 +352,16 @@ def test_eq_32_sign_of_the_desired_acceleration_and_the_two_lines():
     c = law.torque(FRICTIONLESS, q, qd, q[:, :3], qd[:, :3], desired)
     assert_allclose(rk.forward_dynamics(FRICTIONLESS, q, qd, c)[0], qdd, atol=1e-9 * np.abs(qdd).max())
     # Printed v = qdd - ... with the actual acceleration is no law: qdd follows from c, and c from qdd.
-    # The lines differ: N_J G N_J v against N_J G v, unless v is tangent.
-    N, G = rk.nullspace_projector(FRICTIONLESS, q), rk.mass_matrix(FRICTIONLESS, q)
+    # The lines differ by N_J G ((I - N_J) v - Ndot_J qd): not at all for a possible acceleration, J v + Jdot qd = 0.
+    N, N_dot = rk.nullspace_projector(FRICTIONLESS, q), rk.nullspace_projector_dot(FRICTIONLESS, q, qd)
+    G, C = rk.mass_matrix(FRICTIONLESS, q), rk.coriolis_matrix(FRICTIONLESS, q, qd)
+    Gt, Ct, _ = rk.redundant_dynamics(FRICTIONLESS, q, qd)
+    lines = lambda v: (mv(Gt, v) + mv(Ct, qd), mv(N, mv(G, v) + mv(C, qd)))  # noqa: E731
     v = np.random.default_rng(0).normal(size=q.shape)
-    assert np.abs(mv(N @ G @ N, v) - mv(N @ G, v)).max() > 1e-3
-    tangent = mv(N, v)
-    assert_allclose(mv(N @ G @ N, tangent), mv(N @ G, tangent), atol=1e-15)
+    for tried, differ in ((v, True), (mv(N, v), True), (mv(N, v) + mv(N_dot, qd), False), (qdd, False)):
+        first, second = lines(tried)
+        assert_allclose(second - first, mv(N @ G, tried - mv(N, tried) - mv(N_dot, qd)), atol=1e-12)
+        assert (norm(second - first).max() > 1e-3) == differ
     # Line 1 has the symmetric stiffness F^T K F, line 2 has F^T G K F.
     K = np.array([300.0, 500.0, 900.0, 200.0, 400.0, 100.0])
     q = rk.inverse_kinematics(FRICTIONLESS, X)
