@@ -92,8 +92,8 @@ __version__ = "0.1.0"
 # Spelled out, because editors read it.
 __all__ = [
     "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "CommandFilter", "CompiledLaw", "Controller",
-    "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator", "OffsetJump",
-    "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
+    "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator",
+    "OffsetJump", "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
     "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter", "antagonism_form",
     "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "circle", "close_loops",
     "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian",

@@ -106,7 +106,7 @@ def test_what_does_not_compile_says_so():
     def words(t, q_a, qd_a, d):
         return "no torque"
 
-    with pytest.raises(ValueError, match="the law words cannot be compiled .* without @compiled"):
+    with pytest.raises(ValueError, match=r"the law words cannot be compiled .* without @compiled"):
         rk.simulate(ROBOT, words, PATH)
 
     @rk.compiled
