@@ -1,6 +1,7 @@
 /* The yardstick: the same closed loop (PD, force filter, true or measured pose, horizontal plane) in C.
    LANES = 1 is the scalar kernel with its history, LANES = 8 runs eight runs in one vector register and keeps only
-   sums.  FRICTION = 1 adds friction in the drives, without the substeps that it would need. */
+   sums.  FRICTION = 1 adds friction in the drives, without the substeps that it would need.  ANGLE, RATE, COS, SIN are
+   blocks of the engine's motion table, which has so many COLUMNS. */
 #include <math.h>
 #if LANES == 1
 typedef double real;
@@ -24,7 +25,6 @@ static inline int any_above(real v, double limit) {
 }
 #endif
 #define N 3
-enum { ANGLE, RATE, COS, SIN, BLOCKS = 9 };
 #define EACH for (int i = 0; i < N; i++)
 
 typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, tip, w1, w2, friction, scale, elbow_scale; } arm;
@@ -87,14 +87,13 @@ static inline void accelerate(const arm *arms, real x, real y, real vx, real vy,
 long closed_loop(const arm *arms, const double *table, long samples, double dt, const double *offsets, double Kp,
                  double Kd, double weight, double sharpness, int measured, int filtered, double *history,
                  double *sums) {
-    const long cols = 6 + BLOCKS * N;
     real x, y, vx, vy, px, py, p1x, p1y, p2x, p2y, c[N], offset[N], old[N], copper[N], work[N], torque = {0}, null_ = {0};
     x = px = p1x = p2x = table[0] + (real){0}, y = py = p1y = p2y = table[1] + (real){0}, vx = vy = (real){0};
     EACH copper[i] = work[i] = old[i] = c[i] = (real){0}, offset[i] = *(const real *)(offsets + i * LANES);
 
     long steps = 0;
     for (long k = 0; k < samples; k++) {
-        const double *row = table + k * cols, *want = row + 6 + ANGLE * N, *want_rate = row + 6 + RATE * N,
+        const double *row = table + k * COLUMNS, *want = row + 6 + ANGLE * N, *want_rate = row + 6 + RATE * N,
                      *u = row + 6 + COS * N, *v = row + 6 + SIN * N;
         geo g[N];
         real e[N], rate[N], angle[N], a1[N], a2[N];

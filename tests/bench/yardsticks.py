@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+import rapkm_lite as rk
 from rapkm_lite.engine import tables
 
 
@@ -19,7 +20,10 @@ def compile_c(folder: Path, lanes: int, friction: bool = False):
         return None
     library = folder / f"kernel{lanes}{friction}.so"
     source = Path(__file__).with_name("kernel.c")
-    subprocess.run([compiler, "-O3", "-march=native", "-ffast-math", f"-DLANES={lanes}", f"-DFRICTION={friction:d}",
+    still = rk.hold(rk.load(), (0.0, 0.0))
+    known = {"LANES": lanes, "FRICTION": int(friction), "COLUMNS": tables.motion_table(still, 3).shape[1],
+             **{name: getattr(tables, name) for name in ("ANGLE", "RATE", "COS", "SIN")}}
+    subprocess.run([compiler, "-O3", "-march=native", "-ffast-math", *(f"-D{k}={v}" for k, v in known.items()),
                     "-shared", "-fPIC", "-o", str(library), str(source), "-lm"], check=True)
     function = ctypes.CDLL(str(library)).closed_loop
     function.restype = ctypes.c_long
