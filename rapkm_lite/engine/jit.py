@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from . import COMPILED
 
@@ -23,7 +25,7 @@ def _sources() -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
 
 
-def kernel(function):
+def kernel(function) -> Callable[..., Any]:
     """Compile a function that Python calls: cached on disk, and running without the interpreter lock."""
     if not COMPILED:
         return function

@@ -42,7 +42,10 @@ def look(lanes, drives, arms, table, o, w):
             cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
             for j in range(L):
                 ad, den = w[at(MAD, i, j, W, L)], 1.0 / w[at(MINV, i, j, W, L)]
-                w[at(ELBOW_E, i, j, W, L)] = math.atan2(cos * den - sin * ad, cos * ad + sin * den)
+                s, t = cos * den - sin * ad, cos * ad + sin * den
+                # Only those that are far: no run feels its neighbours.
+                if not (abs(s * w[at(MODEL + ELBOW_SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
+                    w[at(ELBOW_E, i, j, W, L)] = math.atan2(s, t)
 
 
 @outlined

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,48 +45,54 @@ class Code:
 
 _FORMS = {PD: tables.PD, PID: tables.PID, APD: tables.APD, CTC: tables.CTC, SwitchedCTC: tables.CTC,
           RedundantAPD: tables.REDUNDANT_APD, RedundantCTC: tables.REDUNDANT_CTC}
-NO_JOINTS = {"JOINT_J": -1.0, "JOINT_K": -1.0}
+_ZERO = np.zeros(())
 _FILTERS = {AntagonismFilter: tables.FORCE_FILTER, CommandFilter: tables.COMMAND_FILTER}
 
 
-def encode(law, model) -> Code | None:
+def encode(law: Any, model) -> Code | None:
     """The engine's form of a law, or None where it has none: then the law runs through the textbook layer.
 
     The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
     """
-    N, form, weights, pose = model.n_arms, tables.NO_FILTER, None, getattr(law, "pose", None)
+    form, weights, pose = tables.NO_FILTER, None, getattr(law, "pose", None)
     if type(law) in _FILTERS:
         form, weights, law = _FILTERS[type(law)], getattr(law, "W", None), law.law
         if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
             return None
+    own = getattr(law, "W", None)
+    weights = weights if own is None else own
+    if weights is not None and np.ndim(weights) > 1:
+        return None
     if type(law) is CompiledLaw and COMPILED:
-        if np.ndim(weights) > 1:
-            return None
-        return Code(tables.USER, form, pose == "true", False, {"EASE": _ease(weights, N)}, dict(NO_JOINTS), law)
-    if type(law) not in _FORMS:
+        code, drives, run, user = tables.USER, {}, {}, law
+    elif type(law) in _FORMS and not any(getattr(law, name, _ZERO).ndim > 1 for name in ("K_P", "K_D", "K_I")):
+        (code, drives, run), user = _gains(law, model.n_arms), None
+    else:
         return None
-    weights = getattr(law, "W", weights)
-    if any(np.ndim(value) > 1 for value in (weights, law.K_P, law.K_D, getattr(law, "K_I", None))):
-        return None
-    code, drives, run = _FORMS[type(law)], {}, dict(NO_JOINTS)
+    drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
+    run = {"JOINT_J": -1.0, "JOINT_K": -1.0} | run
+    return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run, user)
+
+
+def _gains(law: Any, N: int) -> tuple[int, dict, dict]:
+    """Code of a law of this package, and what it fills the rows of drives and runs with."""
+    code = _FORMS[type(law)]
     if code in (tables.PD, tables.PID):
         names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == tables.PID else {})
-        drives = {row: _per(name, getattr(law, name), N) for row, name in names.items()}
-    elif code in (tables.REDUNDANT_APD, tables.REDUNDANT_CTC):
-        for row, name in (("P", "K_P"), ("D", "K_D")):
-            drives[f"GAIN_{row}"], drives[f"ELBOW_{row}"] = _joint_gains(name, getattr(law, name), N)
+        return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}
+    if code in (tables.REDUNDANT_APD, tables.REDUNDANT_CTC):
+        (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
         code = code if getattr(law, "projected", True) else tables.REDUNDANT_CTC_LINE2
-    else:
-        for row, name in (("PAIR_P", "K_P"), ("PAIR_D", "K_D")):
-            run[f"{row}1"], run[f"{row}2"] = _per(name, getattr(law, name), 2)
-        run["HYSTERESIS"] = float(getattr(law, "hysteresis", 1.0))
-        independent = getattr(law, "independent", None)
-        if independent is not None:
-            if max(independent) >= 2 * N:
-                raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
-            run["JOINT_J"], run["JOINT_K"] = map(float, independent)
-    drives["EASE"] = _ease(weights, N)
-    return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run)
+        return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
+    (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
+    run = {"PAIR_P1": p1, "PAIR_P2": p2, "PAIR_D1": d1, "PAIR_D2": d2,
+           "HYSTERESIS": float(getattr(law, "hysteresis", 1.0))}
+    independent = getattr(law, "independent", None)
+    if independent is not None:
+        if max(independent) >= 2 * N:
+            raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
+        run |= {"JOINT_J": float(independent[0]), "JOINT_K": float(independent[1])}
+    return code, {}, run
 
 
 def _per(name: str, value, size: int) -> np.ndarray:
@@ -93,11 +100,6 @@ def _per(name: str, value, size: int) -> np.ndarray:
     if value.shape not in ((), (size,)):
         raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
     return np.broadcast_to(value, (size,))
-
-
-def _ease(weights, N: int) -> np.ndarray:
-    """Inverse weights of the drives."""
-    return np.ones(N) if weights is None else 1 / _per("W", weights, N)
 
 
 def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
@@ -169,8 +171,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         runs[getattr(rows, name)] = [code.run[name] for code in codes]
     blocks[rows.OFFSET, :N] = offsets.T
     blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
-    for row in (rows.X, rows.PX, rows.PX1, rows.PX2):
-        runs[row : row + 2] = trajectory.x[0][:, None]
+    for place in (rows.X, rows.PX, rows.PX1, rows.PX2):
+        runs[place : place + 2] = trajectory.x[0][:, None]
     runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)

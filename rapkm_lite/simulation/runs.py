@@ -171,7 +171,7 @@ def complete(setup: Setup, law, faults=()) -> Run:
         outcome, cause = closed_loop(setup, law)
     run = _run(setup, law, faults, outcome)
     if cause is not None and not isinstance(cause, Exception):
-        cause.partial, time = run, setup.trajectory.t[outcome.sample]
+        vars(cause)["partial"], time = run, setup.trajectory.t[outcome.sample]
         cause.add_note(f"The run up to t = {time:.4f} s is the `partial` of this exception.")
         raise cause
     if outcome.status != DONE:
