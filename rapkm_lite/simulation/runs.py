@@ -190,6 +190,12 @@ def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
                states[:, 2:], q_a, qd_a, c, pairs)
 
 
+def hand_over(error, partial, note: str) -> None:
+    """Give an exception of whatever kind what is finished, and a note that says so."""
+    error.partial = partial
+    error.add_note(note)
+
+
 def _picklable(error) -> bool:
     """Can the cause travel?  An exception of a class from a notebook may not; its words are in `reason`."""
     try:

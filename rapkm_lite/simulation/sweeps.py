@@ -23,7 +23,7 @@ from .explain import REASONS
 from .faults import FaultsLike, check_faults
 from .loop import LAW_FAILED, own_copy
 from .patience import progress_bar
-from .runs import SimulationError, complete
+from .runs import SimulationError, complete, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
 
@@ -113,8 +113,8 @@ def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Traj
             finished = np.count_nonzero(table.status == DONE)
             if finished:
                 partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
-                _hand_over(error, partial, f"{finished} of {len(laws)} runs were finished; they are in the `partial` "
-                                           "of this exception, a Sweep whose other rows are masked.")
+                hand_over(error, partial, f"{finished} of {len(laws)} runs were finished; they are in the `partial` of "
+                                          "this exception, a Sweep whose other rows are masked.")
             raise
     broken = bool(table.failed.any())
     result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
@@ -164,16 +164,10 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
-        _hand_over(error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its "
-                                  "`partial`.")
+        hand_over(error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its "
+                                 "`partial`.")
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
-
-
-def _hand_over(error, partial: Sweep, note: str) -> None:
-    """Give an exception of whatever kind what is finished, and a note that says so."""
-    error.partial = partial
-    error.add_note(note)
 
 
 @contextmanager
