@@ -8,8 +8,8 @@
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
-``NN_name.ipynb``.  Notebooks without a solution are executed as they are.  ``rapkm_lite/plotting.py``, the list of
-all figures, is written anew each time.
+``NN_name.ipynb``, and links ``(../page)`` become ``(page)``.  Notebooks without a solution are executed as they are.
+``rapkm_lite/plotting.py``, the list of all figures, is written anew each time.
 """
 
 from __future__ import annotations
@@ -43,12 +43,14 @@ def blank(source: str) -> str:
 
 
 def student(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """The student's copy of a solved lesson, without outputs."""
+    """The student's copy of a solved lesson, without outputs; links are meant from its folder, one level up."""
     copy = nbformat.from_dict(notebook)
     copy = nbformat.reads(nbformat.writes(copy), as_version=4)
     for cell in copy.cells:
         if cell.cell_type == "code":
             cell.source, cell.outputs, cell.execution_count = blank(cell.source), [], None
+        else:
+            cell.source = cell.source.replace("](../", "](")
     return copy
 
 

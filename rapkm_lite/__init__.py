@@ -1,7 +1,6 @@
 """Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel."""
 
-from types import ModuleType as _Module
-
+from .control.compiled_law import CompiledLaw, compiled
 from .control.computed_torque import (
     APD,
     CTC,
@@ -90,7 +89,27 @@ from .simulation.sweeps import Sweep, sweep
 
 __version__ = "0.1.0"
 
-__all__ = [name for name, thing in globals().items() if not name.startswith("_") and not isinstance(thing, _Module)]
+# Spelled out, because editors read it.
+__all__ = [
+    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "CommandFilter", "CompiledLaw", "Controller",
+    "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator", "OffsetJump",
+    "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
+    "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter", "antagonism_form",
+    "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "circle", "close_loops",
+    "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian",
+    "constraint_jacobian_dot",
+    "constraint_rank", "control_matrix", "control_vector_fields", "copper_loss", "coriolis_matrix", "data_path",
+    "degree_of_actuation", "degree_of_freedom", "distal_cross_products", "drive_pairs", "effective_gain",
+    "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow", "force_polygon",
+    "forward_dynamics", "forward_kinematics", "generalized_forces", "hold", "inverse_dynamics",
+    "inverse_kinematics", "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix",
+    "measured_energies", "mechanical_work", "minimal_dynamics", "mystery_run", "null_basis", "null_vector",
+    "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement", "orthogonal_complement_dot",
+    "polygon", "potential_energy", "prestress_projector", "reachable", "redundant_control_matrix",
+    "redundant_dynamics", "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate",
+    "singular_values", "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips",
+    "triangle", "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",
+]  # fmt: skip
 
 
 def __dir__():

@@ -7,6 +7,8 @@ import matplotlib
 import pytest
 from test_rooms import ARROWS, DOORS, ROOMS, room
 
+import rapkm_lite as rk
+
 matplotlib.use("agg")
 
 ROOT = Path(__file__).parents[1]
@@ -49,3 +51,8 @@ def test_how_to_add_pages_are_linked_from_the_front_door():
     front = text(ROOT / "CONTRIBUTING.md")
     for page in (ROOT / "docs").glob("*.md"):
         assert f"docs/{page.name}" in front
+
+
+@pytest.mark.parametrize("name", [name for name in rk.__all__ if callable(getattr(rk, name))])
+def test_help_shows_an_example(name):
+    assert ">>> " in (getattr(rk, name).__doc__ or "")

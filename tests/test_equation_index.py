@@ -213,10 +213,22 @@ def test_marks_of_the_index_lead_to_rows_of_the_errata():
     assert {a for a in anchors if a.startswith("eq-")} == {a for _, a in marks if a.startswith("eq-")}
 
 
+PAGES = [*NOTEBOOKS.glob("*.ipynb"), *NOTEBOOKS.glob("solutions/*.ipynb"), *NOTEBOOKS.glob("*.md")]
+
+
+@pytest.mark.parametrize("path", sorted(PAGES), ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_links_resolve_from_the_folder_of_the_page(path):
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        text = "\n".join("".join(c["source"]) for c in json.loads(text)["cells"] if c["cell_type"] == "markdown")
+    for page, anchor in re.findall(r"\]\((?!\w+:)([^)#\s]*)(?:#([\w-]+))?\)", text):
+        target = path.parent / page if page else path
+        assert target.exists(), f"{path.name} leads to {page}, which is not there"
+        assert not anchor or f'<a id="{anchor}"></a>' in target.read_text(encoding="utf-8"), f"{page}#{anchor}"
+
+
 @pytest.mark.parametrize("name", sorted(LESSONS))
-def test_links_of_a_lesson_into_both_pages_resolve(name):
-    for page, anchor in re.findall(r"\((?:\.\./)?(equations|errata)\.md#([\w-]+)\)", lesson(name)[0]):
-        assert f'<a id="{anchor}"></a>' in (NOTEBOOKS / f"{page}.md").read_text(encoding="utf-8"), f"{page}.md#{anchor}"
+def test_at_most_six_boxes_on_the_print(name):
     boxes = lesson(name)[0].count("**In the print.**")
     assert boxes <= 6, f"{name} has {boxes} boxes on the print; at most six belong into a lesson"
 

@@ -75,3 +75,11 @@ def test_the_drawing_fits_on_a_page():
 @pytest.mark.parametrize("name", MODULES)
 def test_no_module_is_longer_than_280_lines(name):
     assert len(MODULES[name].read_text(encoding="utf-8").splitlines()) <= 280
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_no_function_has_more_than_12_parameters(name):
+    for node in ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            given = node.args
+            assert len([*given.posonlyargs, *given.args, *given.kwonlyargs]) <= 12, ast.unparse(node)[:80]

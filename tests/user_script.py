@@ -32,6 +32,31 @@ run = rk.simulate(testbed, lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q
 run = rk.simulate(testbed, rk.CTC(400, 40, independent=(0, 1)), path, model=testbed.replace(lengths=0.201))
 total: float = float(run.energy.sum())
 
+gentle = rk.AntagonismFilter(lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a), W=[1.0, 2.0, 1.0])
+broken = rk.simulate(testbed, gentle, rk.circle(testbed, 0.05, 0.2, centre=[0, 0]), encoder=np.float64(2000),
+                     faults=[rk.TorqueLimit([0.3, 0.3, np.inf]), rk.DeadDrive(1, 0.1), rk.OffsetJump(0, 0, 1e-3)])
+summing = rk.PID(7, 20, [0.2, 0.2, 0.2], limit=0.5)
+in_pairs = [rk.CTC(400, 40, [0, 1]), rk.APD(7, 0.2, (1, 2), W=2), rk.CTC(400, 40, None), rk.SwitchedCTC(400, 40, 1)]
+pose = rk.at(testbed, path.q[0], path.qd[0])
+inertia = pose.minimal[0] @ np.ones(2) + pose.using([0, 1]).F_dot[0] + pose.G.trace() + broken.c.max()
+
+
+class Damped(rk.Law):
+    pose = None
+
+    def start(self, model, dt):
+        return np.zeros(model.n_arms)
+
+    def step(self, memory, sample):
+        e, ed = sample.errors()
+        memory = memory + sample.dt * e
+        return -7.0 * e - 0.2 * ed - memory, memory
+
+
+run = rk.simulate(testbed, Damped(), stay, offset=np.full(3, 1e-3), sensors=None)
+several = rk.sweep(testbed, [rk.PD(7, 0.2), summing, Damped()], stay, 0.0, failed="mask")
+grid = rk.workspace_grid(testbed, 10, box=[-0.1, 0.1, -0.1, 0.1])
+values = rk.actuation_map(testbed, mode=rk.working_modes(testbed), n=10, pair=[0, 1])[2].max()
 with ThreadPoolExecutor() as pool:
     study = rk.sweep(testbed, rk.PD(7.05, 0.225), path, [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], executor=pool)
 print(study.energies.mean(axis=0), rk.table1().measured)

@@ -18,6 +18,7 @@ from ..machine.arguments import (
     real_array,
 )
 from ..machine.manipulator import Manipulator
+from ..machine.values import Array, OptionalArray, OptionalPair, default
 from ..mechanics.actuation import (
     control_matrix,
     distal_cross_products,
@@ -45,12 +46,18 @@ class APD(LawValue):
     K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
     independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
     Raises ValueError at run time where the independent coordinates are singular.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
+    >>> law = rk.APD(K_P=7.0, K_D=0.2, independent=(0, 1))
+    >>> c = law.torque(robot, d.q, d.qd, d.q_a, d.qd_a, d)
+    >>> np.allclose(c, rk.inverse_dynamics(robot, d.q, d.qd, d.qdd))
+    True
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
-    independent: tuple[int, int] | None = (0, 1)
-    W: np.ndarray | None = None
+    K_P: Array
+    K_D: Array
+    independent: OptionalPair = default((0, 1))
+    W: OptionalArray = default(None)
     pose: str = "measured"
 
     def __post_init__(self):
@@ -88,6 +95,10 @@ class CTC(APD):
     """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
 
     v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; K_P in 1/s^2, K_D in 1/s.
+
+    >>> import rapkm_lite as rk
+    >>> rk.CTC(K_P=400, K_D=40, independent=(0, 1))
+    CTC(K_P=400.0, K_D=40.0, independent=(0, 1), pose='measured')
     """
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
@@ -104,10 +115,14 @@ class SwitchedCTC(LawValue):
 
     It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1; the pair in use is
     its memory.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.SwitchedCTC(K_P=400, K_D=40, hysteresis=1.2).choose(robot, q)
+    (0, 2)
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
+    K_P: Array
+    K_D: Array
     hysteresis: float = 1.2
     pose: str = "measured"
 
@@ -131,7 +146,8 @@ class SwitchedCTC(LawValue):
         measure = np.abs(distal_cross_products(model, exact_array("q", q, model.n_joints)))
         pairs, best = drive_pairs(model), int(np.argmax(measure))
         if current is not None:
-            current = tuple(sorted(joint_indices("current", current, model.n_arms)))
+            j, k = sorted(joint_indices("current", current, model.n_arms))
+            current = j, k
             if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
                 return current
         return pairs[best]
@@ -177,10 +193,14 @@ class RedundantAPD(LawValue):
     K_P, K_D : in N m/rad, N m s/rad.  (m,) = (N,) are the chapter's gains (29), K = diag(0, ..., 0, K_1, ..., K_m) on
         the driven joints (which come first in our q); one number, (2N,) or (2N, 2N) act on all joints.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
+
+    >>> import rapkm_lite as rk
+    >>> rk.RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2])
+    RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2], rule='sigma_min', pose='measured')
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
+    K_P: Array
+    K_D: Array
     rule: str = "sigma_min"
     pose: str = "measured"
 
@@ -214,6 +234,11 @@ class RedundantCTC(RedundantAPD):
 
     Line 1 leads to G~ (edd + K_D ed + K_P e) = 0, which the chapter splits into (33) and (34); in independent
     coordinates that is (35), corrected: see `effective_gain`.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
+    >>> c = rk.RedundantCTC(K_P=400, K_D=40).torque(robot, d.q, d.qd, d.q_a, d.qd_a, d)
+    >>> np.allclose(c, rk.inverse_dynamics(robot, d.q, d.qd, d.qdd))
+    True
     """
 
     projected: bool = True

@@ -14,6 +14,8 @@ Errors are measured minus desired.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +63,9 @@ class Law:
 
     def _check_pose(self) -> None:
         one_of("pose", self.pose, ("measured", "true"))
+
+
+LawLike = Law | Callable[..., Any]
 
 
 class Function(Law):
@@ -125,7 +130,7 @@ class LawValue(Law, Value):
         for name, value in self._fields().items():
             if name == "law":
                 parts.append(repr(value))
-            elif not (value is None and name == "W") and not (np.ndim(value) == 0 and value == math.inf):
+            elif not (name == "W" if value is None else np.ndim(value) == 0 and value == math.inf):
                 parts.append(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value!r}")
         return f"{type(self).__name__}({', '.join(parts)})"
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..machine.arguments import bounded, matvec, positive_definite, real_array
+from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
-from .grammar import Law, LawValue, as_law, ask, coordinates, gain, measured
+from .grammar import LawLike, LawValue, as_law, ask, coordinates, gain, measured
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,8 +25,8 @@ class PD(LawValue):
     PD(K_P=7.05, K_D=0.225)
     """
 
-    K_P: np.ndarray
-    K_D: np.ndarray
+    K_P: Array
+    K_D: Array
     pose = None
 
     def __post_init__(self):
@@ -62,10 +63,10 @@ class PID(LawValue):
     PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
     """
 
-    K_P: np.ndarray
-    K_I: np.ndarray
-    K_D: np.ndarray
-    limit: np.ndarray = math.inf
+    K_P: Array
+    K_I: Array
+    K_D: Array
+    limit: Array = default(math.inf)
     pose = None
 
     def __post_init__(self):
@@ -115,9 +116,9 @@ class AntagonismFilter(LawValue):
     AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
     """
 
-    law: Law
+    law: LawLike
     pose: str = "measured"
-    W: np.ndarray | None = None
+    W: OptionalArray = default(None)
 
     def __post_init__(self):
         self._check_pose()
@@ -152,6 +153,10 @@ class CommandFilter(LawValue):
 
     c = -K_P R_P e - K_D R_D ed, R_P = (A^T K_P)^+ A^T K_P and R_D alike.  The end-effector force is that of (16), the
     torques only for K = k_P I.
+
+    >>> import rapkm_lite as rk
+    >>> rk.CommandFilter(rk.PD(7.05, 0.225))
+    CommandFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
     """
 
     law: PD

@@ -22,6 +22,13 @@ class Sample:
 
     t, dt : time and sampling time, s.  model : the controller's own manipulator.
     q_a, qd_a : measured base angles and rates (N,), rad and rad/s, read-only.  desired : the desired motion.
+
+    >>> import rapkm_lite as rk
+    >>> class Push(rk.Law):
+    ...     def step(self, memory, sample):
+    ...         return -7.0 * sample.errors()[0], memory
+    >>> rk.simulate(rk.load(), Push(), rk.hold(rk.load(), [0.0, 0.0], 0.1), offset=1e-3).c[0].round(4)
+    array([-0.007, -0.007, -0.007])
     """
 
     __slots__ = ("_found", "_keeper", "_truth", "desired", "dt", "model", "q_a", "qd_a", "t")
@@ -86,7 +93,8 @@ class Controller:
     """
 
     def __init__(self, law, model: Manipulator, dt: float = 1e-3):
-        self.law, self.model, self.dt, self.x = law, model, positive_number("dt", dt), None
+        self.law, self.model, self.dt = law, model, positive_number("dt", dt)
+        self.x: np.ndarray | None = None
         self.memory = as_law(law).start(model, self.dt)
 
     @property

@@ -25,6 +25,11 @@ def closed_loop_projector(A_tilde) -> np.ndarray:
     """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta.
 
     A_tilde : (..., m, 2N).  Raises ValueError at input singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> D = rk.closed_loop_projector(rk.redundant_control_matrix(robot, q))
+    >>> np.allclose(D, rk.nullspace_projector(robot, q))
+    True
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
     return A_tilde.mT @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
@@ -35,6 +40,10 @@ def effective_gain(F, K) -> np.ndarray:
 
     F : (..., 2N, 2).  K : one number, or a matrix (..., 2N, 2N), which may be singular (drives only: diag(k, 0)).
     Raises ValueError where F has lost rank.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> np.allclose(rk.effective_gain(rk.orthogonal_complement(robot, q), 400.0), 400.0 * np.eye(2))
+    True
     """
     F = tall_matrix("F", F)
     n = F.shape[-2]
@@ -53,6 +62,10 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     With eps > 0 it falls there too, at the rate -eps e^T D K_P e / 2; that a small eps makes the tracking exponential
     is what the chapter states.
     Raises ValueError for arguments that do not fit.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))
+    0.0021
     """
     q, e, ed = joint_vectors(robot.n_joints, q=q, e=e, ed=ed)
     eps = float(bounded("eps", exact_array("eps", eps), 0.0, strict=False))
@@ -67,6 +80,10 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
 
     pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
     (A~^T)^+ G~.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> float(rk.feedback_norm(robot, q).round(4))
+    0.0056
     """
     still = np.zeros(robot.n_joints)
     if pair is None:

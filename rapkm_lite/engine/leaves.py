@@ -34,11 +34,17 @@ def small_angle(s):
 
 @leaf
 def smooth_sign(z):
-    """tanh(z) without branches, by halving the argument: t = e^u - 1 at u = -2 |z| / 256, doubled eight times."""
-    u = max(-2.0 * abs(z), -40.0) * 0.00390625
-    t = u * (1.0 + u * (1 / 2 + u * (1 / 6 + u * (1 / 24 + u * (1 / 120 + u * (1 / 720 + u * (1 / 5040 + u * (
-        1 / 40320 + u * (1 / 362880)))))))))
-    for _ in range(8):
+    """tanh(z) without branches, by halving the argument: t = e^u - 1 at u = -2 |z| / 64, doubled six times."""
+    u = max(-2.0 * abs(z), -40.0) * 0.015625
+    u2 = u * u
+    u4 = u2 * u2
+    # The series in pairs of pairs, so that less waits for each other: its last term is below 1e-17 of the first.
+    low = (1.0 + u * (1 / 2)) + u2 * (1 / 6 + u * (1 / 24)) + u4 * ((1 / 120 + u * (1 / 720)) + u2 * (
+        1 / 5040 + u * (1 / 40320)))
+    high = (1 / 362880 + u * (1 / 3628800)) + u2 * (1 / 39916800 + u * (1 / 479001600)) + u4 * (
+        (1 / 6227020800 + u * (1 / 87178291200)) + u2 * (1 / 1307674368000))
+    t = u * (low + u4 * u4 * high)
+    for _ in range(6):
         t = t * (2.0 + t)
     t = t / (2.0 + t)
     return -t if z > 0.0 else t
@@ -100,3 +106,22 @@ def share(s1, s2, l1sq, l2sq, place, vx, vy):
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
     return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv * (base + back)
+
+
+@leaf
+def pose_terms(l2sq, scale, place, ux, uy, e):
+    """An arm in the least-squares pose of the measured base angles: Hessian and gradient of half the squared error,
+    its row of A, and a number that is negative where the series does not hold or the arm does not reach.
+
+    u : unit vector of the desired proximal link.  e : measured minus desired base angle, rad.
+    """
+    ax, ay, dx, dy, ad, inv, area2 = place
+    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
+    s = (ux * ay - uy * ax) * scale
+    near = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
+    r = e - small_angle(s)
+    # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
+    h = r * inv
+    g1, g2 = 1.0 - h * ad, h * l2sq
+    return (g1 * bx * bx - g2 * lx * lx, g1 * bx * by - g2 * lx * ly, g1 * by * by - g2 * ly * ly, bx * r, by * r,
+            bx, by, near)

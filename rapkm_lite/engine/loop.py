@@ -16,6 +16,7 @@ from .leaves import solve2
 from .pose import measured_pose, measured_rate, true_pose
 from .rows import *
 from .tables import *
+from .user import fill
 
 
 @outlined
@@ -50,7 +51,7 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
             w[at(ED, i, j, W, L)] -= want(table, o, RATE, i, W)
 
 
-@leaf
+@outlined
 def proportional(lanes, arms, w):
     """PD (12)."""
     P = len(arms) * len(lanes)
@@ -108,6 +109,14 @@ def command_filter(lanes, drives, arms, w):
 
 
 @leaf
+def take_answer(drives, arms, w, buffer):
+    """The torques that a user's law left at the end of the buffer."""
+    N, W = len(drives), len(arms)
+    for i in range(N):
+        w[C * W + i] = buffer[len(buffer) - N + i]
+
+
+@leaf
 def break_drives(lanes, arms, faults, w, k):
     """What is left of the torques C in drives that are dead or at their limit."""
     L, W = len(lanes), len(arms)
@@ -149,7 +158,7 @@ def add_up(lanes, drives, arms, w):
         w[of(ANTAGONISM, j, W, L)] += null
 
 
-@leaf
+@outlined
 def add_work(lanes, arms, w):
     """Work of the hold that ends at this sample."""
     P = len(arms) * len(lanes)
@@ -160,13 +169,14 @@ def add_work(lanes, arms, w):
 
 
 @kernel
-def closed_loops(kind, modelled, sensor, law, dt, table, faults, w, history):
+def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, history, buffer):
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     modelled : None for laws without a model, whose kernel is smaller; else the `extra` of the model.
+    user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     """
     lanes, drives, arms, study, faulty, extra = kind
-    columns = 6 + 9 * len(arms)
+    columns = 6 + 10 * len(arms)
     samples = len(table) // columns
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
     for k in range(samples):
@@ -175,18 +185,19 @@ def closed_loops(kind, modelled, sensor, law, dt, table, faults, w, history):
         # Sense: the machine as it is, and what the hold will start from.
         if len(study) > 0:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
-            add_work(lanes, arms, w)
         else:
             far = single.sense(arms, extra, table, o, w, dt)
         if far > 0:
             plant.mend(lanes, arms, table, o, w)
+        if len(study) > 0:
+            add_work(lanes, arms, w)
 
         # Measure: ideal encoders have their errors from `sense`.
         if real:
             read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k)
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
-        if law.form > PID or law.filter != NO_FILTER:
+        if law.posed:
             if law.pose == MEASURED:
                 measured_pose(lanes, drives, arms, table, o, w, k, not sensor.quantized)
                 measured_rate(lanes, drives, arms, table, o, w)
@@ -202,6 +213,10 @@ def closed_loops(kind, modelled, sensor, law, dt, table, faults, w, history):
             integral(lanes, arms, w, dt)
         elif modelled is not None:
             computed_torque(lanes, drives, arms, modelled, law, table, o, w)
+        elif user is not None:
+            fill(drives, arms, law, k * dt, table, o, w, buffer)
+            user(buffer)
+            take_answer(drives, arms, w, buffer)
         if law.filter == FORCE_FILTER:
             force_filter(lanes, drives, arms, w)
         elif law.filter == COMMAND_FILTER:

@@ -14,7 +14,7 @@ from .rows import *
 from .tables import *
 
 # Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
-STIFF, FAST, MOST_STEPS = 1.2, 0.8, 4000.0
+STIFF, FAST, MOST_STEPS = 1.0, 0.6, 4000.0
 
 
 @outlined
@@ -137,7 +137,7 @@ def count_steps(lanes, arms, w, dt):
                                 w[at(B2, i, j, W, L)], w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)],
                                 w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = max(1.0, near * math.ceil(max(stiff / STIFF, fast / FAST)))
+        n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = n
         w[of(STEP, j, W, L)] = dt / n if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.
@@ -208,7 +208,7 @@ def hold(lanes, arms, extra, w, dt):
         step(lanes, arms, extra, w)
 
 
-@leaf
+@outlined
 def judge(lanes, arms, w, k):
     """Mark the runs lost in the hold after sample k, or before it by their law; returns how many have ended."""
     L, W = len(lanes), len(arms)

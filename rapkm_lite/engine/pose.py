@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from .jit import outlined
-from .leaves import geometry, small_angle, solve2
+from .leaves import geometry, pose_terms, solve2
 from .rows import *
+from .single import fetch
 from .tables import *
 
 
@@ -45,23 +46,14 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
     for i in range(N):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            l2sq = w[at(MODEL + L2SQ, i, j, W, L)]
-            ax, ay, dx, dy, ad, inv, area2 = geometry(
+            place = geometry(
                 w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
                 w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)])
-            bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
-            s = (ux * ay - uy * ax) * w[at(MODEL + SCALE, i, j, W, L)]
-            # Negative where the series does not hold or the arm does not reach.
-            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
-            r = w[at(E, i, j, W, L)] - small_angle(s)
-            # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
-            h = r * inv
-            g1, g2 = 1.0 - h * ad, h * l2sq
-            w[at(P11, i, j, W, L)] = g1 * bx * bx - g2 * lx * lx
-            w[at(P12, i, j, W, L)] = g1 * bx * by - g2 * lx * ly
-            w[at(P22, i, j, W, L)] = g1 * by * by - g2 * ly * ly
-            w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = bx * r, by * r
+            p11, p12, p22, gx, gy, bx, by, near = pose_terms(
+                w[at(MODEL + L2SQ, i, j, W, L)], w[at(MODEL + SCALE, i, j, W, L)], place, ux, uy, w[at(E, i, j, W, L)])
+            w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = p11, p12, p22
+            w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)], w[at(NEAR, i, j, W, L)] = gx, gy, near
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
     count = 0
     for j in range(L):
@@ -82,6 +74,44 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
         w[of(TODO, j, W, L)] = more
         count += 1 if more > 0.0 else 0
     return count
+
+
+@leaf
+def single_step(arms, w, x, y):
+    """`newton_step` of one run, its arms side by side: the shares of the arms at (x, y)."""
+    W = len(arms)
+    m = MODEL * W
+    for i in range(W):
+        place = geometry(w[m + BX * W + i], w[m + BY * W + i], w[m + L1SQ * W + i], w[m + HALF * W + i],
+                         w[m + MEAN * W + i], w[m + MODE * W + i], x, y)
+        p11, p12, p22, gx, gy, bx, by, near = pose_terms(w[m + L2SQ * W + i], w[m + SCALE * W + i], place,
+                                                         w[UX * W + i], w[UY * W + i], w[E * W + i])
+        w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
+        w[A1 * W + i], w[A2 * W + i], w[NEAR * W + i] = bx, by, near
+
+
+@outlined
+def single_newton(drives, arms, w, tolerance):
+    """The pose of one run by Newton steps; returns how many more it needs, and whether they lead nowhere."""
+    N, W = len(drives), len(arms)
+    x, y = w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)]
+    w[of(TODO, 0, W, 1)] = 1.0
+    for _ in range(12):
+        single_step(arms, w, x, y)
+        m11, m12, m22, fx, fy = w[P11 * W], w[P12 * W], w[P22 * W], w[GX * W], w[GY * W]
+        near = w[NEAR * W]
+        for i in range(1, N):
+            m11, m12, m22 = m11 + w[P11 * W + i], m12 + w[P12 * W + i], m22 + w[P22 * W + i]
+            fx, fy, near = fx + w[GX * W + i], fy + w[GY * W + i], min(near, w[NEAR * W + i])
+        if not min(min(near, m11), m11 * m22 - m12 * m12) > 0.0:
+            w[of(FAR, 0, W, 1)] = 1.0
+            break
+        sx, sy = solve2(m11, m12, m22, fx, fy)
+        if max(abs(sx), abs(sy)) < tolerance:
+            w[of(TODO, 0, W, 1)] = 0.0
+            break
+        x, y = x + sx, y + sy
+    w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
 
 
 @outlined
@@ -121,10 +151,15 @@ def measured_pose(lanes, drives, arms, table, o, w, k, smooth):
         w[of(PY, j, W, L)] = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
-    count = L
-    for _ in range(12):
-        if count > 0:
-            count = newton_step(lanes, drives, arms, table, o, w, tolerance)
+    if L == 1:
+        fetch(UX, COS, W, table, o, w)
+        fetch(UY, SIN, W, table, o, w)
+        single_newton(drives, arms, w, tolerance)
+    else:
+        count = L
+        for _ in range(12):
+            if count > 0:
+                count = newton_step(lanes, drives, arms, table, o, w, tolerance)
     rough = 0.0
     for j in range(L):
         rough += w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)]

@@ -18,7 +18,7 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
 (Q, QD, AX, AY, AD, INV, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 17)
 # The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
 (E, ED, LAST, SLOW, READ, MEMORY, A1, A2, P11, P12, P22, GX, GY, L1, L2, MAD, MINV, ACC_B, ACC_E, ELBOW_E, ELBOW_ED,
- C, OLD, COPPER, WORK, WANTED, WANTED_RATE, UX, UY) = range(FY + 1, FY + 30)
+ C, PUSH, OLD, COPPER, WORK, WANTED, WANTED_RATE, UX, UY) = range(FY + 1, FY + 31)
 BLOCKS = UY + 1
 
 (X, Y, VX, VY, KX, KY, SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS, PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR,

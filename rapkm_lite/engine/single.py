@@ -69,8 +69,8 @@ def join(arms, w):
 
 
 @leaf
-def acceleration(arms, extra, w, x, y, vx, vy):
-    """End-effector acceleration under the torques C."""
+def acceleration(arms, extra, acting, w, x, y, vx, vy):
+    """End-effector acceleration under the torques in the row `acting`."""
     W = len(arms)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
@@ -81,7 +81,7 @@ def acceleration(arms, extra, w, x, y, vx, vy):
         if len(extra) > 0:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
-        c = w[C * W + i]
+        c = w[acting * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
         w[LOW * W + i] = min(w[LOW * W + i], place[6])
@@ -89,15 +89,15 @@ def acceleration(arms, extra, w, x, y, vx, vy):
 
 
 @leaf
-def step(arms, extra, w, x, y, vx, vy, k1x, k1y, dt):
+def step(arms, extra, acting, w, x, y, vx, vy, k1x, k1y, dt):
     """A Runge-Kutta step (order 4) after its first stage."""
     h = 0.5 * dt
     ux, uy = vx + h * k1x, vy + h * k1y
-    k2x, k2y = acceleration(arms, extra, w, x + h * vx, y + h * vy, ux, uy)
+    k2x, k2y = acceleration(arms, extra, acting, w, x + h * vx, y + h * vy, ux, uy)
     wx, wy = vx + h * k2x, vy + h * k2y
-    k3x, k3y = acceleration(arms, extra, w, x + h * ux, y + h * uy, wx, wy)
+    k3x, k3y = acceleration(arms, extra, acting, w, x + h * ux, y + h * uy, wx, wy)
     zx, zy = vx + dt * k3x, vy + dt * k3y
-    k4x, k4y = acceleration(arms, extra, w, x + dt * wx, y + dt * wy, zx, zy)
+    k4x, k4y = acceleration(arms, extra, acting, w, x + dt * wx, y + dt * wy, zx, zy)
     s = dt / 6.0
     return (x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy),
             vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y))
@@ -114,21 +114,27 @@ def count_steps(arms, w, kx, ky, dt):
         a, b, c = stiffness(w[FRICTION * W + i], sharpness, m11, m12, m22, w[B1 * W + i], w[B2 * W + i], w[QD * W + i],
                             w[ACC * W + i], kx, ky, dt)
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-    return max(1.0, math.ceil(max(stiff / STIFF, fast / FAST))) if near > 0.0 else 0.0
+    return max(1.0, math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS)))) if near > 0.0 else 0.0
 
 
 @outlined
 def friction_hold(arms, extra, w, k1x, k1y, dt):
-    """The state after as many steps as friction needs; zero where it needs too many."""
+    """The state after as many steps as friction needs, or as are allowed."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    n = max(1.0, count_steps(arms, w, k1x, k1y, dt))
-    w[of(STEPS, 0, W, 1)] = n
-    h, most = dt / n, int(min(n, MOST_STEPS))
-    x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, h)
+    n = count_steps(arms, w, k1x, k1y, dt)
+    w[of(STEPS, 0, W, 1)] = max(1.0, n)
+    if n == 0.0 and len(extra) == 1:
+        # Nothing but constant friction: it joins the torques.
+        for i in range(W):
+            w[PUSH * W + i] = w[C * W + i] - math.copysign(w[FRICTION * W + i], w[QD * W + i])
+        return step(arms, (), PUSH, w, x, y, vx, vy, k1x, k1y, dt)
+    most = int(min(max(1.0, n), MOST_STEPS))
+    h = dt / most
+    x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, h)
     for _ in range(1, most):
-        k1x, k1y = acceleration(arms, extra, w, x, y, vx, vy)
-        x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, h)
+        k1x, k1y = acceleration(arms, extra, C, w, x, y, vx, vy)
+        x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, h)
     return x, y, vx, vy
 
 
@@ -145,7 +151,7 @@ def hold(arms, extra, w, dt):
         x, y, vx, vy = friction_hold(arms, extra, w, k1x, k1y, dt)
     else:
         x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-        x, y, vx, vy = step(arms, extra, w, x, y, vx, vy, k1x, k1y, dt)
+        x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, dt)
     w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
 
 

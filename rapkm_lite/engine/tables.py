@@ -6,11 +6,15 @@ from collections import namedtuple
 
 import numpy as np
 
+from . import COMPILED
+
 # What a run ended with; laws; filters; pose sources.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
 PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(8)
 NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
 MEASURED, TRUE = range(2)
+# At which pose a law of a user wants the matrices.
+NOTHING, DESIRED, POSED = range(3)
 
 # Rows per sample of the fault table.
 JUMP, HELD, ALIVE, LIMITED = range(4)
@@ -19,11 +23,11 @@ JUMP, HELD, ALIVE, LIMITED = range(4)
 # friction or gravity.
 Kind = namedtuple("Kind", "lanes drives arms study faulty extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
-Law = namedtuple("Law", "form filter pose same switched")
+Law = namedtuple("Law", "form filter posed pose same switched asks")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
 # What decentralized laws need comes first.
-ANGLE, RATE, COS, SIN, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN = range(9)
+ANGLE, RATE, COS, SIN, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN, ELBOW = range(10)
 
 
 def arm_table(robot, width: int) -> np.ndarray:
@@ -56,11 +60,11 @@ def environment(robot) -> np.ndarray:
 
 
 def motion_table(trajectory, width: int) -> np.ndarray:
-    """Desired motion per sample, (k, 6 + 9 width); arms beyond the machine's are copies of its first one."""
+    """Desired motion per sample, (k, 6 + 10 width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
     q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
     blocks = [q[:, :N], qd[:, :N], np.cos(q[:, :N]), np.sin(q[:, :N]),
-              qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(q[:, N:]), np.sin(q[:, N:])]
+              qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(q[:, N:]), np.sin(q[:, N:]), q[:, N:]]
     arms = _filled(N, width)
     return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks)])
 
@@ -73,3 +77,40 @@ def _filled(N: int, width: int) -> np.ndarray:
 def sizes(count: int) -> tuple:
     """A tuple of `count` nothings: the compiler knows the length of a tuple, but not that of an array."""
     return ((),) * count
+
+
+def extra(robot) -> tuple:
+    """One entry for a machine with friction only, two for one with gravity, none for one with neither."""
+    return sizes(2 if robot.gravity.any() else int(bool(robot.friction.any())))
+
+
+def width(N: int, alone: bool) -> int:
+    """Arms in a row of the work table: in a single compiled run filled up to vector registers of four."""
+    return -(-N // 4) * 4 if alone and COMPILED else N
+
+
+def aligned(size: int) -> np.ndarray:
+    """Zeros that start at a multiple of 64 bytes, as vector registers like it."""
+    room = np.zeros(size + 8)
+    start = -room.ctypes.data // 8 % 8
+    return room[start : start + size]
+
+
+def plain(array: np.ndarray):
+    """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
+    return array if COMPILED else array.tolist()
+
+
+def sensor(sensors, dt: float) -> Sensor:
+    """Counts and velocity filter of the encoders."""
+    count, tau = sensors.count, sensors.velocity_filter
+    return Sensor(count is not None, count or 1.0, tau is not None, dt / ((tau or 0.0) + dt))
+
+
+def faults(table, width: int):
+    """A fault table with a column for every arm of the work table, flat."""
+    if table is None:
+        return plain(np.empty(0))
+    arms = np.minimum(np.arange(width), len(table.limit) - 1)
+    limit = np.broadcast_to(table.limit, table.jump.shape)
+    return plain(np.stack([v[:, arms] for v in (table.jump, table.held, table.alive, limit)], axis=1).ravel())

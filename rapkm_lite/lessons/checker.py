@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +108,7 @@ def examine(name: str, answer) -> tuple[str, str]:
         return word, f"{sentence}. Hint: {known[name].hint}"
 
 
-def check(name: str, answer):
+def check(name: str, answer: Any) -> Any:
     """Check an answer, print one line, and return what the lesson goes on with: the answer if right, or the package's.
 
     Prints OK, TODO or NOT YET RIGHT with the measured number and a hint.  Raises AssertionError instead when the

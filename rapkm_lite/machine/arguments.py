@@ -8,7 +8,15 @@ _FLOAT = np.dtype(float)
 
 
 class ConvergenceError(RuntimeError, ValueError):
-    """An iteration found no solution; the message carries the residual and the pose it stopped at."""
+    """An iteration found no solution; the message carries the residual and the pose it stopped at.
+
+    >>> import rapkm_lite as rk
+    >>> try:
+    ...     rk.estimate_pose(rk.load(), [0.0, 0.0, 0.0], guess=[0.0, 0.0])
+    ... except rk.ConvergenceError as error:
+    ...     print(str(error)[:35])
+    estimate_pose found no pose for q_a
+    """
 
 
 def real_array(name: str, value, *last: int) -> np.ndarray:
@@ -166,11 +174,6 @@ def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     if vector.ndim == 1:
         return matrix.dot(vector) if matrix.ndim == 2 else matrix @ vector
     return np.einsum("...ij,...j->...i", matrix, vector)
-
-
-def transpose(matrix: np.ndarray) -> np.ndarray:
-    """Transpose of the last two axes."""
-    return matrix.mT
 
 
 def _at(index) -> str:

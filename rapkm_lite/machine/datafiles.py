@@ -24,6 +24,10 @@ def data_path(name: str) -> Path:
     """Path of a data file shipped with the package, in an installed copy as well as in a checkout.
 
     Raises ValueError when there is none of this name.
+
+    >>> import rapkm_lite as rk
+    >>> rk.data_path("testbed.toml").name
+    'testbed.toml'
     """
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "data", here.parent / "data"):

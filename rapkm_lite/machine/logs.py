@@ -16,6 +16,10 @@ class Log(Value):
 
     t : (k,) s.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
     q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, with the noise of a current sensor.
+
+    >>> import rapkm_lite as rk
+    >>> rk.mystery_run("offset_a").error.shape
+    (901, 3)
     """
 
     name: str

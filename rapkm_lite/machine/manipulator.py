@@ -6,13 +6,14 @@ import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, real_array
+from .arguments import bounded, exact_array, positive_number, real_array
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
-from .values import Value, frozen
+from .values import Array, FilledArray, Value, default, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,19 +44,19 @@ class Manipulator(Value):
     (2, 4, 2)
     """
 
-    base: np.ndarray
-    lengths: np.ndarray
-    masses: np.ndarray
-    centers: np.ndarray | None = None
-    inertias: np.ndarray | None = None
-    rotor_inertia: np.ndarray = 0.0
-    resistance: np.ndarray = 0.611
-    torque_constant: np.ndarray = 0.0259
-    friction: np.ndarray = 0.0
+    base: Array
+    lengths: Array
+    masses: Array
+    centers: FilledArray = default(None)
+    inertias: FilledArray = default(None)
+    rotor_inertia: Array = default(0.0)
+    resistance: Array = default(0.611)
+    torque_constant: Array = default(0.0259)
+    friction: Array = default(0.0)
     friction_velocity: float = 0.01
-    gravity: np.ndarray = (0.0, 0.0)
+    gravity: Array = default((0.0, 0.0))
     load: float = 0.0
-    mode: np.ndarray = 1
+    mode: Array = default(1)
     name: str = field(default="manipulator")
 
     def __post_init__(self):
@@ -67,24 +68,17 @@ class Manipulator(Value):
             raise ValueError(f"base = {base.tolist()} holds one point twice; allowed: N different points")
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
         masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
-        given = {"base": base, "lengths": lengths, "masses": masses}
+        given: dict[str, Any] = {"base": base, "lengths": lengths, "masses": masses}
+        inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
+        given["inertias"] = bounded("inertias", inertias, 0.0, strict=False)
         given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
-        if self.inertias is None:
-            given["inertias"] = masses * lengths**2 / 12
-        else:
-            given["inertias"] = bounded("inertias", _per_link("inertias", self.inertias, N), 0.0, strict=False)
         for key in ("rotor_inertia", "friction"):
             given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=False)
         for key in ("resistance", "torque_constant"):
             given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=True)
-        given["gravity"] = real_array("gravity", self.gravity, 2)
-        if given["gravity"].shape != (2,):
-            raise ValueError(f"gravity has shape {given['gravity'].shape}; allowed: (2,)")
-        for key, strict in (("friction_velocity", True), ("load", False)):
-            value = real_array(key, getattr(self, key))
-            if value.ndim:
-                raise ValueError(f"{key} has shape {value.shape}; allowed: one number")
-            given[key] = float(bounded(key, value, 0.0, strict=strict))
+        given["gravity"] = exact_array("gravity", self.gravity, 2)
+        given["friction_velocity"] = positive_number("friction_velocity", self.friction_velocity)
+        given["load"] = float(bounded("load", exact_array("load", self.load), 0.0, strict=False))
         given["mode"] = _per_drive("mode", self.mode, N)
         if not np.all(np.abs(given["mode"]) == 1.0):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
@@ -157,7 +151,7 @@ class Manipulator(Value):
             known("argument", key, [f.name for f in dataclasses.fields(self)])
         rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
         middles = np.array_equal(self.centers, self.lengths / 2)
-        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        values = self._fields()
         values |= {"inertias": None} if rods else {}
         values |= {"centers": None} if middles else {}
         return Manipulator(**(values | changes))
@@ -175,9 +169,9 @@ class Manipulator(Value):
         arms = list(arms) if np.iterable(arms) else [arms]
         if len(arms) < 2 or len(set(arms)) < len(arms) or not set(arms) <= set(range(self.n_arms)):
             raise ValueError(f"arms = {arms}; allowed: two or more different arms from 0 to {self.n_arms - 1}")
-        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        per_arm = {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
-        return Manipulator(**(values | per_arm))
+        values = self._fields()
+        values |= {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
+        return Manipulator(**values)
 
     def same_kinematics(self, other: Manipulator) -> bool:
         """True when both machines have the same joint motion for the same end-effector motion."""

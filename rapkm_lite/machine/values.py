@@ -4,8 +4,8 @@ A value is a frozen dataclass on the base `Value`:
 
     @dataclass(frozen=True, eq=False, repr=False)
     class Gains(Value):
-        K_P: np.ndarray
-        K_D: np.ndarray = 0.0
+        K_P: Array
+        K_D: Array = default(0.0)
 
         def __post_init__(self):
             self._set(K_P=real_array("K_P", self.K_P))
@@ -14,13 +14,41 @@ A value is a frozen dataclass on the base `Value`:
 ``eq=False, repr=False`` because `Value` brings both.  A class with its own ``__post_init__`` ends it with the one of
 `Value`, which freezes every array among the fields, in tuples and lists too.  What is computed on demand and kept
 (``functools.cached_property``) is no field: it is neither compared, nor pickled, nor copied.
+
+`Array` and its like tell editors that a field is given as a number or list, and kept as an array.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    Kept = TypeVar("Kept")
+    Given = TypeVar("Given")
+
+    class Field(Generic[Kept, Given]):
+        def __get__(self, value: Any, kind: type | None = None) -> Kept: ...
+
+        def __set__(self, value: Any, given: Given) -> None: ...
+
+    Array = Field[np.ndarray, ArrayLike]
+    FilledArray = Field[np.ndarray, ArrayLike | None]
+    OptionalArray = Field[np.ndarray | None, ArrayLike | None]
+    OptionalPair = Field[tuple[int, int] | None, Sequence[int] | np.ndarray | None]
+else:
+    Array = FilledArray = OptionalArray = OptionalPair = Any
+
+
+def default(value: Any) -> Any:
+    """A default as it is given, of a field that keeps an array."""
+    return value
 
 
 def frozen(array) -> np.ndarray:
@@ -73,6 +101,8 @@ class Value:
     (equal shapes and numbers; NaN equals NaN); equal values have equal hashes, computed once.
     """
 
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
     def __post_init__(self):
         for name, value in self._fields().items():
             kept = _frozen(value)
@@ -84,7 +114,7 @@ class Value:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
 
-    def _fields(self) -> dict:
+    def _fields(self) -> dict[str, Any]:
         return {name: self.__dict__[name] for name in _names(type(self))}
 
     def __getstate__(self) -> dict:

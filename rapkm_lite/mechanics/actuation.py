@@ -30,6 +30,12 @@ def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
 
     independent : two 0-based joint indices, or None for the end-effector position (then A is in rad/m).
     Raises ValueError where the choice is singular.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.control_matrix(robot, q).round(2)
+    array([[ 0.57,  4.97],
+           [-5.09, -0.87],
+           [ 5.77, -2.19]])
     """
     return at(robot, q).using(independent).A.copy()
 
@@ -38,6 +44,10 @@ def redundant_control_matrix(robot: Manipulator, q) -> np.ndarray:
     """A~(q) of (21), the rows of N_J of the driven joints, (..., m, 2N): the control forces in (22), (23) are A~^T c.
 
     Raises ValueError at c-space singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.redundant_control_matrix(robot, q).shape
+    (3, 6)
     """
     return at(robot, q).A_tilde.copy()
 
@@ -47,6 +57,10 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 
     Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
     chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> int(rk.degree_of_actuation(robot, q))
+    2
     """
     tolerance = positive_number("tolerance", tolerance)
     sigma = np.linalg.svd(at(robot, q).A_tilde, compute_uv=False)
@@ -60,6 +74,10 @@ def actuation_type(robot: Manipulator, q):
     redundantly (m > alpha) or non-redundantly actuated (m = alpha).  A pose with alpha < 2 is both underactuated and
     redundantly actuated, since m >= 2: redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.actuation_type(robot, q)
+    'redundantly actuated'
     """
     full = "redundantly actuated" if robot.n_arms > 2 else "fully actuated"
     kind = np.where(degree_of_actuation(robot, q) < 2, "underactuated", full)
@@ -71,13 +89,22 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
 
     The state (q2, q2d) of (8) moves along the drift field f of (9) and the sum of these fields times the torques.
     Raises ValueError where the choice of independent coordinates is singular.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.control_vector_fields(robot, q).shape
+    (2, 3)
     """
     pose = at(robot, q).using(independent)
     return np.linalg.solve(product(pose.F.mT, pose.G, pose.F), pose.A.mT)
 
 
 def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
-    """All pairs of drives, 0-based: for three arms (0, 1), (0, 2), (1, 2)."""
+    """All pairs of drives, 0-based: for three arms (0, 1), (0, 2), (1, 2).
+
+    >>> import rapkm_lite as rk
+    >>> rk.drive_pairs(rk.load())
+    [(0, 1), (0, 2), (1, 2)]
+    """
     return list(itertools.combinations(range(robot.n_arms), 2))
 
 
@@ -85,6 +112,10 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
     """d_j x d_k of the unit distal directions for all `drive_pairs`, (..., pairs).
 
     Zero where the angles of the pair (j, k) are no coordinates (parameterization singularity).
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.distal_cross_products(robot, q).round(3)
+    array([ 0.96 , -0.969,  0.507])
     """
     d = at(robot, q).d / robot.lengths[:, 1:]
     j, k = np.triu_indices(robot.n_arms, 1)
@@ -92,7 +123,12 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 
 
 def singular_values(A) -> np.ndarray:
-    """Both singular values of (..., m, 2), largest first, in closed form with full relative accuracy of the product."""
+    """Both singular values of (..., m, 2), largest first, in closed form with full relative accuracy of the product.
+
+    >>> import rapkm_lite as rk
+    >>> rk.singular_values([[3.0, 0.0], [0.0, 4.0], [0.0, 0.0]])
+    array([4., 3.])
+    """
     A = tall_matrix("A", A)
     if A.shape[-1] != 2:
         raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
@@ -104,6 +140,12 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
 
     W : symmetric positive definite, one number, (m,) or (..., m, m); default the identity.
     Raises ValueError when W is not, or at input singularities.
+
+    >>> import rapkm_lite as rk
+    >>> rk.weighted_pseudoinverse([[2.0, 1.0], [1.0, 2.0], [1.0, 0.5]], W=[1.0, 1.0, 3.0]).round(3)
+    array([[ 0.615, -0.308],
+           [-0.333,  0.667],
+           [ 0.103, -0.051]])
     """
     A = tall_matrix("A", A)
     if W is None:
@@ -114,7 +156,12 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
 
 
 def prestress_projector(A, W=None) -> np.ndarray:
-    """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing."""
+    """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> int(np.linalg.matrix_rank(rk.prestress_projector(rk.control_matrix(robot, q))))
+    1
+    """
     A = tall_matrix("A", A)
     return np.eye(A.shape[-2]) - product(weighted_pseudoinverse(A, W), A.mT)
 
@@ -127,6 +174,10 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
     also the inverse dynamics (25) in redundant coordinates.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1)
+    >>> rk.inverse_dynamics(robot, path.q, path.qd, path.qdd).shape
+    (101, 3)
     """
     pose, wrench = _driven(robot, q, qd, qdd)
     pinv = weighted_pseudoinverse(pose.A, W)
@@ -144,6 +195,10 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 
     As in the first line of (11); on V it is the left-hand side Gbar q2dd + Cbar q2d + Qbar of (6), with the
     end-effector position as q2.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> bool(abs(rk.required_wrench(robot, q, 0 * q, 0 * q)).max() < 1e-12)
+    True
     """
     return _driven(robot, q, qd, qdd)[1]
 
@@ -156,7 +211,12 @@ def _driven(robot: Manipulator, q, qd, qdd):
 
 
 def force_polygon(A, torque: float) -> np.ndarray:
-    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise."""
+    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.force_polygon(rk.control_matrix(robot, q), torque=0.1).shape
+    (6, 2)
+    """
     edges = 2 * torque * real_array("A", A)
     edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
     edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]

@@ -29,6 +29,10 @@ def antagonism_filter(A) -> np.ndarray:
 
     The orthogonal projector onto the range of A, in the space of drive torques.
     Raises ValueError at input singularities.
+
+    >>> import rapkm_lite as rk
+    >>> rk.antagonism_filter([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]) @ [1.0, 2.0, 0.0]
+    array([0.5, 2. , 0.5])
     """
     Q, _ = cores.full_rank("A", tall_matrix("A", A))
     return product(Q, Q.mT)
@@ -38,6 +42,11 @@ def command_filter(A, K) -> np.ndarray:
     """R_K = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
 
     -K R_K e has the same end-effector force as the filtered -R K e, and the same torques only for K = k I.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> A = rk.control_matrix(robot, q)
+    >>> np.allclose(rk.command_filter(A, 7.05), rk.antagonism_filter(A))
+    True
     """
     A = tall_matrix("A", A)
     K = positive_definite("K", K, A.shape[-2])
@@ -88,6 +97,10 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
 
     Its sign is that of the cross product of the two columns of A, as in `null_basis`, which takes any number of drives.
     Raises ValueError for another number of arms, and at input singularities, where the null space has two dimensions.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.null_vector(robot, q).round(3)
+    array([0.384, 0.711, 0.59 ])
     """
     n, levers = null_direction(robot, q), cores.levers(robot.tree, at(robot, q)._v)
     size = np.linalg.norm(n, axis=-1, keepdims=True)
@@ -114,6 +127,10 @@ def common_sign(A) -> np.ndarray:
     A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half plane (Stiemke): where the
     largest gap between their directions is below a half turn.  For three arms: where all n_i have the same sign.
     Raises ValueError at input singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> bool(rk.common_sign(rk.control_matrix(robot, q)))
+    True
     """
     A = tall_matrix("A", A)
     if A.shape[-1] != 2:
@@ -132,6 +149,10 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
     wrench : static control force A^T c (..., 2) that gravity and load demand (Qbar at rest); default none.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.steady_state_error(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(5)
+    array([-0.00341,  0.00109,  0.00091])
     """
     A = tall_matrix("A", A)
     cores.full_rank("A", A)
@@ -147,6 +168,10 @@ def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
     """Torques c = -K_P (e_a + offset) (..., m) in N m at rest, from (12)-(14); all antagonism without wrench.
 
     Arguments and errors: see `steady_state_error`.  The text after (14) prints the opposite sign.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.steady_state_torque(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(4)
+    array([-0.0042, -0.0077, -0.0064])
     """
     e_a = steady_state_error(A, K_P, offset, wrench)
     return -matvec(positive_definite("K_P", K_P, e_a.shape[-1]), e_a + np.asarray(offset, dtype=float))
@@ -160,6 +185,10 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is another question.
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
     Raises ValueError at input singularities, and for values out of range.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)
+    True
     """
     N = robot.n_arms
     desired = exact_array("q", q, robot.n_joints)[:N]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 
@@ -11,30 +13,35 @@ from ..machine.manipulator import Manipulator
 from ..machine.values import Value
 from . import cores
 
+Kept = TypeVar("Kept")
 
-class quantity:
+
+class quantity(Generic[Kept]):
     """A property that is computed when asked for, then kept, with its arrays read-only."""
 
     needs_rates = False
 
-    def __init__(self, function):
+    def __init__(self, function: Callable[[Any], Kept]):
         self.function, self.name, self.__doc__ = function, function.__name__, function.__doc__
+
+    @overload
+    def __get__(self, pose: None, cls: type) -> quantity[Kept]: ...
+    @overload
+    def __get__(self, pose: At, cls: type) -> Kept: ...
 
     def __get__(self, pose, cls):
         if pose is None:
             return self
         if self.needs_rates and pose.qd is None:
             raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
-        value = pose.__dict__[self.name] = self.function(pose)
-        if type(value) is tuple:
-            for array in value:
-                array.setflags(False)
-        else:
-            value.setflags(False)
+        value: Any = self.function(pose)
+        pose.__dict__[self.name] = value
+        for array in value if type(value) is tuple else (value,):
+            array.setflags(write=False)
         return value
 
 
-class rate(quantity):
+class rate(quantity[Kept]):
     """A `quantity` that needs qd."""
 
     needs_rates = True
@@ -48,12 +55,20 @@ class At(Value):
     it: ``at.G.copy()``).  Those that need qd raise ValueError when it was not given, those that do not exist at a
     singular pose raise there.  F, A and what follows from them belong to the end-effector position as independent
     coordinates, or to the two joints chosen by `using`.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.at(robot, q)
+    At('testbed', 1 pose)
+    >>> rk.at(robot, q).using((0, 1)).A.round(3)
+    array([[ 1.   ,  0.   ],
+           [ 0.   ,  1.   ],
+           [-0.651, -1.205]])
     """
 
     robot: Manipulator
     q: np.ndarray
-    qd: np.ndarray | None = None
-    independent: tuple[int, int] | None = None
+    qd: np.ndarray | Any = None  # None where it was not given
+    independent: tuple[int, ...] | None = None
 
     def using(self, independent) -> At:
         """The same pose with two 0-based joint indices (or None: the end-effector) as independent coordinates q2."""
@@ -96,7 +111,7 @@ class At(Value):
         """Distal vectors (..., N, 2), m."""
         return self._links(1)
 
-    def _links(self, k):
+    def _links(self, k: int) -> np.ndarray:
         N = self.robot.n_arms
         return self._v.reshape(*self.q.shape[:-1], 2, 2, N)[..., k, :].mT
 
@@ -246,5 +261,5 @@ def given(qd):
 
 def _copy(name: str, value, n: int) -> np.ndarray:
     array = real_array(name, value, n).copy()
-    array.setflags(False)
+    array.setflags(write=False)
     return array

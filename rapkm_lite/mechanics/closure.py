@@ -29,6 +29,10 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
 
     tolerance : largest closure error relative to the link length, and largest tangential remainder in rad.
     Raises ConvergenceError with the residual and the pose.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> bool(abs(rk.loop_constraints(robot, rk.close_loops(robot, q + 0.01))).max() < 1e-13)
+    True
     """
     q0 = real_array("q", q, robot.n_joints)
     q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
@@ -83,6 +87,10 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     the control matrix A = d q_a / d x from the end-effector position `guess` (..., 2) in m; its working mode is
     ``robot.mode``.  For N = 2 this is the forward kinematics of the five-bar.
     Raises ConvergenceError with the residual and the pose, also where the iteration leaves the workspace.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.forward_kinematics(robot, rk.estimate_pose(robot, q[:3], guess=[0.0, 0.0])).round(12)
+    array([0.02, 0.05])
     """
     q_a, guess = real_array("q_a", q_a, robot.n_arms), real_array("guess", guess, 2)
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])

@@ -13,12 +13,23 @@ from .at import at, given
 
 
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:
-    """Generalized mass matrix G(q) of (2), (..., 2N, 2N) in kg m^2; the cut tree couples only the joints of one arm."""
+    """Generalized mass matrix G(q) of (2), (..., 2N, 2N) in kg m^2; the cut tree couples only the joints of one arm.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> bool(np.all(np.linalg.eigvalsh(rk.mass_matrix(robot, q)) > 0.0))
+    True
+    """
     return at(robot, q).G.copy()
 
 
 def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
-    """C(q, qd) of (2) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric."""
+    """C(q, qd) of (2) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> C = rk.coriolis_matrix(robot, q, 0.1 * q)
+    >>> np.allclose(C, 0.1 * rk.coriolis_matrix(robot, q, q))
+    True
+    """
     return at(robot, q, given(qd)).C.copy()
 
 
@@ -26,6 +37,10 @@ def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
     """Q(q, qd) of (2), (..., 2N) in N m, on the left-hand side: dV/dq of gravity plus drive friction f_c tanh(qd / v0).
 
     Zero for the horizontal plane without friction.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.generalized_forces(robot, q, 10 + 0 * q).round(4)
+    array([0.0042, 0.0042, 0.0042, 0.    , 0.    , 0.    ])
     """
     return at(robot, q, given(qd)).Q.copy()
 
@@ -37,6 +52,11 @@ def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray
     position as q2 (then in rad/m).
     Raises ValueError naming the pair and its measure (smallest singular value of J1 over the largest of J) where the
     choice is singular.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.orthogonal_complement(robot, q, independent=(0, 1))[:2]
+    array([[1., 0.],
+           [0., 1.]])
     """
     return at(robot, q).using(independent).F.copy()
 
@@ -45,6 +65,11 @@ def orthogonal_complement_dot(robot: Manipulator, q, qd, independent=None) -> np
     """dF/dt along qd, (..., 2N, 2), for qdd = F q2dd + Fdot q2d, the text after (5).
 
     From J F = 0 the dependent rows are -J1^-1 Jdot F.  Arguments and errors: see `orthogonal_complement`.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.orthogonal_complement_dot(robot, q, q, independent=(0, 1))[:2]
+    array([[0., 0.],
+           [0., 0.]])
     """
     return at(robot, q, given(qd)).using(independent).F_dot.copy()
 
@@ -54,12 +79,24 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
 
     Gbar = F^T G F, Cbar = F^T (C F + G Fdot), both (..., 2, 2); Qbar = F^T Q, (..., 2).
     Raises ValueError where the choice of independent coordinates is singular.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> Gbar, Cbar, Qbar = rk.minimal_dynamics(robot, q, 0 * q)
+    >>> Gbar.round(2)
+    array([[ 0.42, -0.04],
+           [-0.04,  0.3 ]])
     """
-    return tuple(part.copy() for part in at(robot, q, given(qd)).using(independent).minimal)
+    Gbar, Cbar, Qbar = at(robot, q, given(qd)).using(independent).minimal
+    return Gbar.copy(), Cbar.copy(), Qbar.copy()
 
 
 def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
-    """Rank of J(q) of (1), (...,): how many singular values are above `tolerance` times the longest link."""
+    """Rank of J(q) of (1), (...,): how many singular values are above `tolerance` times the longest link.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> int(rk.constraint_rank(robot, q))
+    4
+    """
     limit = positive_number("tolerance", tolerance) * robot.lengths.max()
     return np.sum(np.linalg.svd(at(robot, q).J, compute_uv=False) > limit, axis=-1)
 
@@ -69,6 +106,10 @@ def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndar
 
     The text after (7) prints delta = n - m.  Larger values than 2 mark c-space singularities, where J loses rank: on
     the testbed the three corners of the workspace, where one arm is folded and turns freely while two are stretched.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> int(rk.degree_of_freedom(robot, q))
+    2
     """
     return robot.n_joints - constraint_rank(robot, q, tolerance)
 
@@ -78,6 +119,11 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
 
     (21) partitions it into the rows of passive and driven joints, `redundant_control_matrix`.
     Raises ValueError at c-space singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> N = rk.nullspace_projector(robot, q)
+    >>> np.allclose(N @ N, N), int(N.trace().round())
+    (True, 2)
     """
     return at(robot, q).N.copy()
 
@@ -86,6 +132,11 @@ def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., 2N, 2N) in 1/s, of the text after (24), which prints B for J.
 
     Raises ValueError at c-space singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> N, N_dot = rk.nullspace_projector(robot, q), rk.nullspace_projector_dot(robot, q, q)
+    >>> np.allclose(N @ N_dot + N_dot @ N, N_dot)
+    True
     """
     return at(robot, q, given(qd)).N_dot.copy()
 
@@ -96,8 +147,14 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
     It is (22), N_J (G qdd + C qd + Q) = A~^T c, with the motion projected to V, N_J qd and N_J qdd + Ndot_J qd:
     G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), both (..., 2N, 2N); Q~ = N_J Q, (..., 2N).
     Raises ValueError at c-space singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> G, C, Q = rk.redundant_dynamics(robot, q, q)
+    >>> np.allclose(rk.nullspace_projector(robot, q) @ G, G)
+    True
     """
-    return tuple(part.copy() for part in at(robot, q, given(qd)).redundant)
+    G, C, Q = at(robot, q, given(qd)).redundant
+    return G.copy(), C.copy(), Q.copy()
 
 
 def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarray]:
@@ -106,6 +163,11 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
     The multipliers are the cut-joint reactions: -lambda_i is the force in N that the end-effector exerts on the tip of
     the cut arm i (1, 3, ..., N; arm 2 is not cut and carries the load).
     Raises ValueError at c-space singularities.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> qdd, reactions = rk.forward_dynamics(robot, q, 0 * q, [0.1, 0.0, 0.0])
+    >>> qdd.round(1)
+    array([ 8.5, -2.9, -2. , -8.6, -5.9,  9.2])
     """
     pose, c = at(robot, q, given(qd)), real_array("c", c, robot.n_arms)
     lead = check_leading(q=pose.q.shape[:-1], qd=pose.qd.shape[:-1], c=c.shape[:-1])
@@ -121,13 +183,23 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
 
 
 def kinetic_energy(robot: Manipulator, q, qd) -> np.ndarray:
-    """qd^T G qd / 2, (...,) in J."""
+    """qd^T G qd / 2, (...,) in J.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> np.allclose(rk.kinetic_energy(robot, q, q), q @ rk.mass_matrix(robot, q) @ q / 2)
+    True
+    """
     pose = at(robot, q, given(qd))
     return np.einsum("...i,...ij,...j->...", pose.qd, pose.G, pose.qd) / 2
 
 
 def potential_energy(robot: Manipulator, q) -> np.ndarray:
-    """Potential energy of gravity relative to the base points, (...,) in J; dV/dq is the gravity part of Q."""
+    """Potential energy of gravity relative to the base points, (...,) in J; dV/dq is the gravity part of Q.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> float(rk.potential_energy(robot.replace(gravity=[0.0, -9.81]), q).round(3))
+    0.172
+    """
     pose = at(robot, q)
     moments = robot.arm_moments / robot.lengths
     return -((moments[:, :1] * pose.a + moments[:, 1:] * pose.d) @ robot.gravity).sum(axis=-1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..machine.arguments import check_leading, real_array
 from ..machine.manipulator import Manipulator
@@ -27,19 +28,34 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def unit_vector(angle: np.ndarray) -> np.ndarray:
+def unit_vector(angle: ArrayLike) -> np.ndarray:
     """(cos, sin) of an angle in rad, on a new last axis."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
-    """Proximal vectors a_i and distal vectors d_i of all arms, each (..., N, 2) in m."""
+    """Proximal vectors a_i and distal vectors d_i of all arms, each (..., N, 2) in m.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> a, d = rk.arm_vectors(robot, q)
+    >>> (robot.base + a + d).round(3)
+    array([[0.02, 0.05],
+           [0.02, 0.05],
+           [0.02, 0.05]])
+    """
     pose = at(robot, q)
     return pose.a.copy(), pose.d.copy()
 
 
 def tips(robot: Manipulator, q) -> np.ndarray:
-    """Tips of the N arms of the cut tree, (..., N, 2) in m."""
+    """Tips of the N arms of the cut tree, (..., N, 2) in m.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.tips(robot, q).round(3)
+    array([[0.02, 0.05],
+           [0.02, 0.05],
+           [0.02, 0.05]])
+    """
     pose = at(robot, q)
     return robot.base + pose.a + pose.d
 
@@ -48,6 +64,10 @@ def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
     """End-effector position (..., 2) in m: the tip of arm 2, from which all others are cut.
 
     On the configuration space V all tips agree; `close_loops` brings a rough q there.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.forward_kinematics(robot, q).round(12)
+    array([0.02, 0.05])
     """
     return at(robot, q).x.copy()
 
@@ -72,17 +92,33 @@ def tip_jacobians(robot: Manipulator, q) -> np.ndarray:
 
 
 def constraint_jacobian(robot: Manipulator, q) -> np.ndarray:
-    """J(q) of the second line of (1), dh/dt = J qd = 0, (..., 2(N-1), 2N) in m/rad."""
+    """J(q) of the second line of (1), dh/dt = J qd = 0, (..., 2(N-1), 2N) in m/rad.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.constraint_jacobian(robot, q).shape
+    (4, 6)
+    """
     return at(robot, q).J.copy()
 
 
 def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
-    """dJ/dt along qd, (..., 2(N-1), 2N) in m/(rad s), so that d2h/dt2 = J qdd + Jdot qd."""
+    """dJ/dt along qd, (..., 2(N-1), 2N) in m/(rad s), so that d2h/dt2 = J qdd + Jdot qd.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> J_dot = rk.constraint_jacobian_dot(robot, q, q)
+    >>> np.allclose(rk.constraint_jacobian_dot(robot, q, 2 * q), 2 * J_dot)
+    True
+    """
     return at(robot, q, given(qd)).J_dot.copy()
 
 
 def reachable(robot: Manipulator, x) -> np.ndarray:
-    """True where all N arms reach the point x, (...,); x is (..., 2) in m."""
+    """True where all N arms reach the point x, (...,); x is (..., 2) in m.
+
+    >>> import rapkm_lite as rk
+    >>> rk.reachable(rk.load(), [[0.0, 0.0], [0.5, 0.0]])
+    array([ True, False])
+    """
     x = real_array("x", x, 2)
     reach = np.linalg.norm(x[..., None, :] - robot.base, axis=-1)
     l1, l2 = robot.lengths.T
@@ -90,12 +126,25 @@ def reachable(robot: Manipulator, x) -> np.ndarray:
 
 
 def working_modes(robot: Manipulator) -> np.ndarray:
-    """All 2^N working modes, (2^N, N), entries +1 or -1, the all-positive one first."""
+    """All 2^N working modes, (2^N, N), entries +1 or -1, the all-positive one first.
+
+    >>> import rapkm_lite as rk
+    >>> rk.working_modes(rk.load("five_bar"))
+    array([[ 1,  1],
+           [ 1, -1],
+           [-1,  1],
+           [-1, -1]])
+    """
     return np.array(list(itertools.product([1, -1], repeat=robot.n_arms)))
 
 
 def working_mode(robot: Manipulator, q) -> np.ndarray:
-    """s_i = sign(sin(elbow angle i)), (..., N); 0 where an arm is stretched or folded."""
+    """s_i = sign(sin(elbow angle i)), (..., N); 0 where an arm is stretched or folded.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.working_mode(robot, q)
+    array([1, 1, 1])
+    """
     q = real_array("q", q, robot.n_joints)
     sine = np.sin(q[..., robot.n_arms :])
     return np.where(np.abs(sine) < 1e-12, 0, np.sign(sine)).astype(int)

@@ -30,9 +30,9 @@ def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _lapack():
-    from scipy.linalg import lapack  # only when needed: importing the package stays light
+    from scipy.linalg import get_lapack_funcs  # only when needed: importing the package stays light
 
-    return lapack.dgeqrf, lapack.dorgqr, lapack.dgesv
+    return get_lapack_funcs(("geqrf", "orgqr", "gesv"), dtype=float)
 
 
 @functools.cache

@@ -16,7 +16,12 @@ from .partition import PARTITION_RULES
 
 
 def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:
-    """The rectangle (x_min, x_max, y_min, y_max) in m inside which all points lie that every arm can reach."""
+    """The rectangle (x_min, x_max, y_min, y_max) in m inside which all points lie that every arm can reach.
+
+    >>> import rapkm_lite as rk
+    >>> np.round(rk.sampling_box(rk.load()), 3)
+    array([-0.2  ,  0.2  , -0.169,  0.285])
+    """
     outer = robot.lengths.sum(axis=1)[:, None]
     low, high = (robot.base - outer).max(axis=0), (robot.base + outer).min(axis=0)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
@@ -27,6 +32,11 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
 
     box : (x_min, x_max, y_min, y_max) in m; default `sampling_box`.
     Raises ValueError for an empty box or fewer than two samples.
+
+    >>> import rapkm_lite as rk
+    >>> x, y, inside = rk.workspace_grid(rk.load(), n=20)
+    >>> x.shape, y.shape, inside.shape
+    ((20,), (20,), (20, 20))
     """
     n = whole_number("n", n, 2)
     left, right, low, high = sampling_box(robot) if box is None else exact_array("box", box, 4)
@@ -74,6 +84,11 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     rule : "cross" takes the largest |d_j x d_k|, as `SwitchedCTC` does; "sigma_min", "condition" and "printed" are the
         partition rules of `select_independent`.
     mode, n, box : see `actuation_map`.
+
+    >>> import rapkm_lite as rk
+    >>> x, y, pair = rk.switching_map(rk.load(), n=20)
+    >>> np.unique(pair.compressed())
+    array([0, 1, 2])
     """
     one_of("rule", rule, ("cross", *PARTITION_RULES))
     x, y, inside = workspace_grid(robot, n, box)

@@ -21,6 +21,11 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     regular A~_1 gives the same result.
     A_tilde : (..., m, n).  rows : the delta = 2 row indices of A~_1, a pair or (..., 2).
     Raises ValueError where A~_1 has lost rank.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> A = rk.redundant_control_matrix(robot, q)
+    >>> np.allclose(rk.explicit_pseudoinverse(A, (0, 1)), np.linalg.pinv(A.T))
+    True
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
     first, others, back = _partition(rows, A_tilde)
@@ -35,7 +40,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
 def _solve_small(B: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(I + B^T B)^-1 right."""
     if B.shape[-1] == 1:
-        return right / (1.0 + np.vecdot(B, B, axis=-2)[..., None])
+        return right / (1.0 + product(B.mT, B))
     return np.linalg.solve(np.eye(B.shape[-1]) + product(B.mT, B), right)
 
 
@@ -96,6 +101,10 @@ def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
 
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> rk.select_independent(rk.redundant_control_matrix(robot, q))
+    array([0, 2])
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
     one_of("rule", rule, PARTITION_RULES)

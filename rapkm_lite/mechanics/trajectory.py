@@ -18,6 +18,10 @@ class Desired(Value):
     """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N), read-only.
 
     Every array is C-contiguous; who writes into one gets NumPy's ValueError, so that no law can shift the path.
+
+    >>> import rapkm_lite as rk
+    >>> rk.triangle(rk.load())[2500].x.round(3)
+    array([0.06 , 0.035])
     """
 
     n_arms: int
@@ -56,6 +60,11 @@ class Trajectory(Desired):
     """A desired motion: `Desired` with one row per sample, and the times t (k,) in s; ``trajectory[k]`` is one sample.
 
     x, xd, xdd : (k, 2) in m, m/s, m/s^2.  q, qd, qdd : (k, 2N) in rad, rad/s, rad/s^2, continuous in time.
+
+    >>> import rapkm_lite as rk
+    >>> path = rk.circle(rk.load(), radius=0.05, duration=1.0)
+    >>> len(path), path.dt, path[0].x
+    (1001, 0.001, array([0.05, 0.  ]))
     """
 
     t: np.ndarray
@@ -100,6 +109,11 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace or the times are not equidistant from zero.
+
+    >>> import rapkm_lite as rk
+    >>> t = np.linspace(0.0, 1.0, 101)
+    >>> rk.follow(rk.load(), t, np.stack([0.05 * t, 0 * t], -1), [[0.05, 0.0]] * 101, np.zeros((101, 2)))
+    Trajectory(101 samples, 1 s, 'testbed')
     """
     t = real_array("t", t)
     if t.ndim != 1 or len(t) < 2:
@@ -120,6 +134,10 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
 
     duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after.
     Raises ValueError when the path leaves the workspace, or a time does not fit.
+
+    >>> import rapkm_lite as rk
+    >>> rk.polygon(rk.load(), [[-0.05, 0.01], [0.05, 0.01], [0.0, 0.05]], duration=3.0).x[1000].round(3)
+    array([0.05, 0.01])
     """
     corners = real_array("corners", corners, 2)
     if corners.ndim != 2 or len(corners) < 2:
@@ -158,7 +176,12 @@ def triangle(robot: Manipulator, side: float = 0.24, duration: float = 5.0, dt: 
 
 def circle(robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3,
            centre=(0.0, 0.0), turns: int = 1) -> Trajectory:
-    """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s."""
+    """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s.
+
+    >>> import rapkm_lite as rk
+    >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]
+    array([0.05, 0.  ])
+    """
     radius = positive_number("radius", radius)
     t = _samples(duration, dt)
     s = t / duration
@@ -174,7 +197,12 @@ def circle(robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: f
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
-    """Stay at the point x (2,) in m."""
+    """Stay at the point x (2,) in m.
+
+    >>> import rapkm_lite as rk
+    >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)
+    Trajectory(501 samples, 0.5 s, 'testbed')
+    """
     t = _samples(duration, dt)
     still = np.zeros((len(t), 2))
     return follow(robot, t, still + exact_array("x", x, 2), still, still)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..engine import COMPILED, tables
@@ -33,15 +34,17 @@ class Code:
     switched: bool
     drives: dict
     run: dict
+    user: CompiledLaw | None = None
 
     @property
     def kind(self) -> tuple:
         """Codes of one kind can run side by side."""
-        return self.form, self.filter, self.true_pose, self.switched
+        return self.form, self.filter, self.true_pose, self.switched, self.user
 
 
 _FORMS = {PD: tables.PD, PID: tables.PID, APD: tables.APD, CTC: tables.CTC, SwitchedCTC: tables.CTC,
           RedundantAPD: tables.REDUNDANT_APD, RedundantCTC: tables.REDUNDANT_CTC}
+NO_JOINTS = {"JOINT_J": -1.0, "JOINT_K": -1.0}
 _FILTERS = {AntagonismFilter: tables.FORCE_FILTER, CommandFilter: tables.COMMAND_FILTER}
 
 
@@ -55,44 +58,53 @@ def encode(law, model) -> Code | None:
         form, weights, law = _FILTERS[type(law)], getattr(law, "W", None), law.law
         if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
             return None
+    if type(law) is CompiledLaw and COMPILED:
+        if np.ndim(weights) > 1:
+            return None
+        return Code(tables.USER, form, pose == "true", False, {"EASE": _ease(weights, N)}, dict(NO_JOINTS), law)
     if type(law) not in _FORMS:
         return None
     weights = getattr(law, "W", weights)
     if any(np.ndim(value) > 1 for value in (weights, law.K_P, law.K_D, getattr(law, "K_I", None))):
         return None
-    code, drives, run = _FORMS[type(law)], {}, {"JOINT_J": -1.0, "JOINT_K": -1.0}
+    code, drives, run = _FORMS[type(law)], {}, dict(NO_JOINTS)
     if code in (tables.PD, tables.PID):
         names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == tables.PID else {})
-        drives = {row: _per("", name, getattr(law, name), N) for row, name in names.items()}
+        drives = {row: _per(name, getattr(law, name), N) for row, name in names.items()}
     elif code in (tables.REDUNDANT_APD, tables.REDUNDANT_CTC):
         for row, name in (("P", "K_P"), ("D", "K_D")):
             drives[f"GAIN_{row}"], drives[f"ELBOW_{row}"] = _joint_gains(name, getattr(law, name), N)
         code = code if getattr(law, "projected", True) else tables.REDUNDANT_CTC_LINE2
     else:
         for row, name in (("PAIR_P", "K_P"), ("PAIR_D", "K_D")):
-            run[f"{row}1"], run[f"{row}2"] = _per("", name, getattr(law, name), 2)
+            run[f"{row}1"], run[f"{row}2"] = _per(name, getattr(law, name), 2)
         run["HYSTERESIS"] = float(getattr(law, "hysteresis", 1.0))
         independent = getattr(law, "independent", None)
         if independent is not None:
             if max(independent) >= 2 * N:
                 raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
             run["JOINT_J"], run["JOINT_K"] = map(float, independent)
-    drives["EASE"] = np.ones(N) if weights is None else 1 / _per("", "W", weights, N)
+    drives["EASE"] = _ease(weights, N)
     return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run)
 
 
-def _per(owner: str, name: str, value, size: int) -> np.ndarray:
+def _per(name: str, value, size: int) -> np.ndarray:
     value = np.asarray(value, dtype=float)
     if value.shape not in ((), (size,)):
         raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
     return np.broadcast_to(value, (size,))
 
 
+def _ease(weights, N: int) -> np.ndarray:
+    """Inverse weights of the drives."""
+    return np.ones(N) if weights is None else 1 / _per("W", weights, N)
+
+
 def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
     """Gains of drives and elbows; (N,) acts on the driven joints only, as in (29)."""
     if K.shape == (N,):
         return K, np.zeros(N)
-    K = _per("", name, K, 2 * N)
+    K = _per(name, K, 2 * N)
     return K[:N], K[N:]
 
 
@@ -114,9 +126,10 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
     for i, code in enumerate(codes):
         kinds.setdefault(code.kind, []).append(i)
     for rows in kinds.values():
-        for first in range(0, len(rows), LANES):
+        width = LANES if codes[rows[0]].user is None else 1
+        for first in range(0, len(rows), width):
             # The last runs fill up with copies of themselves: a lane does not feel its neighbours.
-            lanes = [rows[min(i, len(rows) - 1)] for i in range(first, first + LANES)]
+            lanes = [rows[min(i, len(rows) - 1)] for i in range(first, first + width)]
             part = lanes[: len(rows) - first]
             sums = _sums(setup, _run(setup, [codes[i] for i in lanes], offsets[lanes], None))
             for column, values in zip(columns, sums, strict=True):
@@ -142,8 +155,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     from ..engine.loop import closed_loops
 
     robot, model, trajectory = setup.robot, setup.model, setup.trajectory
-    L, N, W = len(codes), robot.n_arms, _width(robot.n_arms, history is not None)
-    work = _aligned((rows.BLOCKS * W + rows.SINGLES) * L)
+    L, N, W = len(codes), robot.n_arms, tables.width(robot.n_arms, history is not None)
+    work = tables.aligned((rows.BLOCKS * W + rows.SINGLES) * L)
     blocks, runs = work[: rows.BLOCKS * W * L].reshape(-1, W, L), work[rows.BLOCKS * W * L :].reshape(-1, L)
     for i, arms in enumerate((robot, model)):
         table, environment = _made_for(arms, W, _arms)
@@ -160,22 +173,26 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         runs[row : row + 2] = trajectory.x[0][:, None]
     runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
     code, sizes = codes[0], tables.sizes
-    law = tables.Law(code.form, code.filter, tables.TRUE if code.true_pose else tables.MEASURED,
-                     model.same_kinematics(robot), code.switched)
+    user, buffer, asks = _user(code.user, N)
+    law = tables.Law(code.form, code.filter,
+                     code.filter != tables.NO_FILTER or tables.PID < code.form < tables.USER or asks == tables.POSED,
+                     tables.TRUE if code.true_pose else tables.MEASURED, model.same_kinematics(robot), code.switched,
+                     asks)
     kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(history is None)), sizes(int(setup.faults is not None)),
-                       _extra(robot))
-    modelled = _extra(model) if code.form > tables.PID else None
-    w, log = _plain(work), _plain(np.empty(0) if history is None else history.reshape(-1))
-    with patience(kind, modelled), np.errstate(all="ignore"):
+                       tables.extra(robot))
+    modelled = tables.extra(model) if tables.PID < code.form < tables.USER else None
+    w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
+    with patience(kind, modelled, user is None), np.errstate(all="ignore"):
         try:
-            closed_loops(kind, modelled, _sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
-                         _made_for(trajectory, W, _motion), _faults(setup.faults, W), w, log)
+            closed_loops(kind, modelled, user, tables.sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
+                         _made_for(trajectory, W, _motion), tables.faults(setup.faults, W), w, log, buffer)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
-    if history is not None:
-        history[:] = np.reshape(log, history.shape)
-    work[:] = w
+    if not COMPILED:
+        work[:] = w
+        if history is not None:
+            history[:] = np.reshape(log, history.shape)
 
     def row(name: str) -> np.ndarray:
         index = getattr(rows, name)
@@ -184,21 +201,16 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     return row
 
 
-def _width(N: int, alone: bool) -> int:
-    """Arms in a row of the work table: in a single compiled run filled up to vector registers of four."""
-    return -(-N // 4) * 4 if alone and COMPILED else N
+def _user(law: CompiledLaw | None, N: int):
+    """The pointer of a user's compiled law, its buffer, and the pose at which it wants matrices."""
+    if law is None:
+        return None, tables.plain(np.empty(0)), tables.NOTHING
+    from ..engine.pointer import places, pointer
 
-
-def _aligned(size: int) -> np.ndarray:
-    """Zeros that start at a multiple of 64 bytes: vector registers load them twice as fast."""
-    room = np.zeros(size + 8)
-    start = -room.ctypes.data // 8 % 8
-    return room[start : start + size]
-
-
-def _plain(array: np.ndarray):
-    """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
-    return array if COMPILED else array.tolist()
+    matrices = law.at is not None
+    buffer = np.zeros(places(N, matrices, law.memory)[-1])
+    asks = tables.NOTHING if not matrices else tables.DESIRED if law.at == "desired" else tables.POSED
+    return pointer(law.function, N, matrices, law.memory), buffer, asks
 
 
 def _made_for(value, width: int, make):
@@ -213,27 +225,8 @@ def _arms(robot, width: int) -> tuple[np.ndarray, np.ndarray]:
     return tables.arm_table(robot, width), tables.environment(robot)
 
 
-def _extra(robot) -> tuple:
-    """Has an entry when the machine has friction or gravity."""
-    return tables.sizes(int(bool(robot.friction.any() or robot.gravity.any())))
-
-
 def _motion(trajectory, width: int):
-    return _plain(tables.motion_table(trajectory, width).ravel())
-
-
-def _sensor(sensors, dt: float) -> tables.Sensor:
-    count, tau = sensors.count, sensors.velocity_filter
-    return tables.Sensor(count is not None, count or 1.0, tau is not None, dt / ((tau or 0.0) + dt))
-
-
-def _faults(faults, width: int):
-    """The fault table with a column for every arm of the work table, flat."""
-    if faults is None:
-        return _plain(np.empty(0))
-    arms = np.minimum(np.arange(width), len(faults.limit) - 1)
-    limit = np.broadcast_to(faults.limit, faults.jump.shape)
-    return _plain(np.stack([v[:, arms] for v in (faults.jump, faults.held, faults.alive, limit)], axis=1).ravel())
+    return tables.plain(tables.motion_table(trajectory, width).ravel())
 
 
 class Plant:
@@ -244,14 +237,14 @@ class Plant:
         from ..engine.single import advance, observe
 
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
-        W = _width(robot.n_arms, True)
-        work = _aligned(rows.BLOCKS * W + rows.SINGLES)
+        W = tables.width(robot.n_arms, True)
+        work = tables.aligned(rows.BLOCKS * W + rows.SINGLES)
         table, environment = _made_for(robot, W, _arms)
         work[: rows.MODEL * W] = table.ravel()
         start = rows.BLOCKS * W + rows.GRAVITY_X
         work[start : start + rows.ENVIRONMENT] = environment
-        self._w, self._arms = _plain(work), tables.sizes(W)
-        self._extra, table = _extra(robot), _made_for(trajectory, W, _motion)
+        self._w, self._arms = tables.plain(work), tables.sizes(W)
+        self._extra, table = tables.extra(robot), _made_for(trajectory, W, _motion)
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         self.status = DONE

@@ -15,7 +15,12 @@ from ..mechanics.trajectory import Trajectory
 
 
 def copper_loss(robot, c, dt) -> np.ndarray:
-    """Joule heat R (c / k_t)^2 dt of torques c (..., k, N) in N m, each held for dt in s: (..., N) in J per drive."""
+    """Joule heat R (c / k_t)^2 dt of torques c (..., k, N) in N m, each held for dt in s: (..., N) in J per drive.
+
+    >>> import rapkm_lite as rk
+    >>> rk.copper_loss(rk.load(), np.full((1000, 3), 0.0259), dt=1e-3).round(3)
+    array([0.611, 0.611, 0.611])
+    """
     c = real_array("c", c, robot.n_arms)
     if c.ndim < 2:
         raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
@@ -26,6 +31,11 @@ def mechanical_work(run) -> np.ndarray:
     """Work of the drives on the mechanism (N,) in J, over the holds c[k] (q_a[k+1] - q_a[k]).
 
     Without friction it sums to zero over the drives on a closed path from rest to rest.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
+    >>> np.allclose(run.energy, rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
+    True
     """
     return np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=0)
 
@@ -41,12 +51,24 @@ def root_mean_square_torque(run) -> float:
 
 
 def antagonistic_torque(run) -> np.ndarray:
-    """The part N_{A^T} c of the torques (k, N) in N m that moves nothing, at the true pose."""
+    """The part N_{A^T} c of the torques (k, N) in N m that moves nothing, at the true pose.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), [4e-3, 0.0, 0.0])
+    >>> np.allclose(rk.antagonistic_torque(run)[-1], run.c[-1], atol=1e-3)
+    True
+    """
     return matvec(prestress_projector(control_matrix(run.robot, run.q)), run.c)
 
 
 def antagonistic_energy(run) -> float:
-    """(R / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives."""
+    """(R / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
+    >>> round(rk.antagonistic_energy(run), 2)
+    3.49
+    """
     return float(copper_loss(run.robot, antagonistic_torque(run)[:-1], run.dt).sum())
 
 
@@ -55,6 +77,11 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
 
     S = integral of P^T (R / k_t^2) P dt, where P dq are the torques at rest of the corrected (14) at each point of the
     path: quasi-static, to first order in the offsets, without friction.
+
+    >>> import rapkm_lite as rk
+    >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)
+    >>> float(np.round([4e-3, -2e-3, 5e-3] @ S @ [4e-3, -2e-3, 5e-3], 2))
+    3.58
     """
     A = control_matrix(robot, trajectory.q)
     P = np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)

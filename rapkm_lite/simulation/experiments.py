@@ -19,7 +19,12 @@ from .sensors import Sensors
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Experiment(Value):
-    """A machine, a law, a path, sensors and faults that belong together, as read from a data file."""
+    """A machine, a law, a path, sensors and faults that belong together, as read from a data file.
+
+    >>> import rapkm_lite as rk
+    >>> rk.experiment("testbed").law
+    PD(K_P=7.05, K_D=0.225)
+    """
 
     robot: Manipulator
     law: PD
@@ -49,6 +54,10 @@ def experiment(source="testbed") -> Experiment:
     [sensor] holds the arguments of `Sensors`; each [[fault]] holds the `kind` of a fault and its arguments, such as
     ``kind = "DeadDrive"``, ``drive = 1``, ``time = 0.5``.
     Raises ValueError for an unknown key or a value out of range.
+
+    >>> import rapkm_lite as rk
+    >>> rk.experiment("table1_reading").offset.shape
+    (3,)
     """
     robot, tables = load(source), read_toml(source)
     allowed = {"control": ["K_P", "K_D", "dt"], "path": ["side", "duration", "centre", "angle", "rest"],
@@ -79,7 +88,12 @@ class Table1(Value):
 
 
 def measured_energies() -> np.ndarray:
-    """The chapter's Table 1, (2, 3) in J: rows without / with filter, columns drives 1 to 3."""
+    """The chapter's Table 1, (2, 3) in J: rows without / with filter, columns drives 1 to 3.
+
+    >>> import rapkm_lite as rk
+    >>> rk.measured_energies().sum(axis=1).round(2)
+    array([4.56, 2.24])
+    """
     with data_path("table1.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
     return np.array([[float(v) for v in row[1:]] for row in rows[1:]])
@@ -89,6 +103,10 @@ def table1() -> Table1:
     """Table 1 as measured, and as simulated by the one consistent reading in ``data/table1_reading.toml``.
 
     The chapter leaves offsets, path placement and gains open; the reading is a plausible explanation, one of many.
+
+    >>> import rapkm_lite as rk
+    >>> bool(abs(rk.table1().deviation).max() < 0.05)
+    True
     """
     reading = experiment("table1_reading")
     runs = [reading.run(), reading.run(AntagonismFilter(reading.law, pose="true"))]

@@ -28,9 +28,10 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     if status == TOO_STIFF:
         return too_stiff(setup)
     pair = coordinates(law, None) if _ours(law) else None
-    if pair is not None and tuple(sorted(pair)) in drive_pairs(setup.model):
+    pairs = drive_pairs(setup.model)
+    if pair is not None and (min(pair), max(pair)) in pairs:
         crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
-        measure = abs(crossed[drive_pairs(setup.model).index(tuple(sorted(pair)))])
+        measure = abs(crossed[pairs.index((min(pair), max(pair)))])
         if measure < 0.3:
             return (f"{REASONS[status]} (near a parameterization singularity of its independent drives "
                     f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)")

@@ -5,6 +5,7 @@ Drives count from 0, times are in s from the start of the run.  To add a fault, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from ..control.laws import torque_limit
 from ..machine.arguments import bounded, exact_array, whole_number
 from ..machine.datafiles import known
-from ..machine.values import Value
+from ..machine.values import Array, Value
 
 
 class FaultTable(NamedTuple):
@@ -44,11 +45,15 @@ class Fault(Value):
 
     def _check(self) -> None:
         """Drive and times of a fault, each a plain number."""
-        self._set(drive=whole_number("drive", self.drive, 0))
+        given = self._fields()
+        self._set(drive=whole_number("drive", given["drive"], 0))
         for name in ("time", "start", "stop", "jump"):
-            if hasattr(self, name):
-                value = exact_array(name, getattr(self, name))
+            if name in given:
+                value = exact_array(name, given[name])
                 self._set(**{name: float(value if name == "jump" else bounded(name, value, 0.0, strict=False))})
+
+
+FaultsLike = Iterable[Fault] | Fault | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +64,7 @@ class TorqueLimit(Fault):
     TorqueLimit(0.3)
     """
 
-    limit: np.ndarray
+    limit: Array
 
     def __post_init__(self):
         self._set(limit=torque_limit(self.limit))
@@ -73,7 +78,12 @@ class TorqueLimit(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeadDrive(Fault):
-    """A drive gives no torque from `time` on; it goes on measuring."""
+    """A drive gives no torque from `time` on; it goes on measuring.
+
+    >>> import rapkm_lite as rk
+    >>> rk.DeadDrive(drive=1, time=0.5)
+    DeadDrive(1, 0.5)
+    """
 
     drive: int
     time: float
@@ -91,6 +101,10 @@ class EncoderDropout(Fault):
     """An encoder repeats its last reading before `start` for start <= t < stop; at the first sample it reads once.
 
     Its rate is that of the repeated reading: zero where rates are ideal, else what the velocity filter makes of it.
+
+    >>> import rapkm_lite as rk
+    >>> rk.EncoderDropout(drive=0, start=0.5, stop=0.7)
+    EncoderDropout(0, 0.5, 0.7)
     """
 
     drive: int
@@ -109,7 +123,12 @@ class EncoderDropout(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OffsetJump(Fault):
-    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds."""
+    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds.
+
+    >>> import rapkm_lite as rk
+    >>> rk.OffsetJump(drive=2, time=0.5, jump=5e-3)
+    OffsetJump(2, 0.5, 0.005)
+    """
 
     drive: int
     time: float
@@ -123,7 +142,9 @@ class OffsetJump(Fault):
         table.jump[_from(t, self.time), self.drive] += self.jump
 
 
-KINDS = {kind.__name__: kind for kind in (TorqueLimit, DeadDrive, EncoderDropout, OffsetJump)}
+def kinds() -> dict[str, type[Fault]]:
+    """All faults by name, also those that you wrote."""
+    return {kind.__name__: kind for kind in Fault.__subclasses__()}
 
 
 def _from(t: np.ndarray, time: float) -> np.ndarray:
@@ -142,8 +163,9 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     shape = len(t), N
     table = FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
     for fault in faults:
-        if getattr(fault, "drive", 0) >= N:
-            raise ValueError(f"drive = {fault.drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
+        drive = getattr(fault, "drive", 0)
+        if drive >= N:
+            raise ValueError(f"drive = {drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
         fault.mark(table, t)
     return table
 
@@ -153,17 +175,17 @@ def check_faults(faults) -> tuple[Fault, ...]:
     faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
     for fault in faults:
         if not isinstance(fault, Fault):
-            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(KINDS)}")
+            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(kinds())}")
     return faults
 
 
 def read_fault(table) -> Fault:
     """A fault from a table of a TOML file: its `kind` and its arguments."""
     if not isinstance(table, dict) or "kind" not in table:
-        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(KINDS)}")
+        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(kinds())}")
     values = {key: value for key, value in table.items() if key != "kind"}
-    known("kind of fault", table["kind"], list(KINDS))
-    kind = KINDS[table["kind"]]
+    known("kind of fault", table["kind"], list(kinds()))
+    kind = kinds()[table["kind"]]
     names = list(kind.__dataclass_fields__)
     for key in values:
         known(f"entry of {table['kind']}", key, names)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..control.grammar import LawLike
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
@@ -16,7 +18,7 @@ from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, TOO_STIFF, encode, single
 from .energy import electric_energy
 from .explain import explain
-from .faults import Fault, check_faults
+from .faults import Fault, FaultsLike, check_faults
 from .loop import closed_loop, own_copy
 from .sensors import Sensors
 from .setup import Outcome, Setup, prepare
@@ -28,6 +30,13 @@ class SimulationError(RuntimeError):
     time : when, s.  reason : what went wrong.  partial : the `Run` up to there; its rows are samples whose torques are
     known.  The exception that a law raised is the ``__cause__``.
     run, sweep : which row of a sweep, and the `Sweep` with such rows masked; None for single runs.
+
+    >>> import rapkm_lite as rk; robot = rk.load().replace(friction=0.0)
+    >>> try:
+    ...     rk.simulate(robot, rk.PD(K_P=7.05, K_D=30.0), rk.triangle(robot))
+    ... except rk.SimulationError as error:
+    ...     print(error.reason[:30], len(error.partial) < 50)
+    the machine left the workspace True
     """
 
     def __init__(self, time: float, reason: str, partial: Run | None = None, run: int | None = None, sweep=None):
@@ -54,6 +63,11 @@ class Run(Value):
     t : (k,) s.  x, xd : (k, 2) true end-effector motion, m and m/s.  q_a, qd_a : (k, N) true base angles and rates.
     c : (k, N) drive torques in N m that act; c[k] is held from t[k] to t[k+1] (the last row is not applied any more).
     pairs : (k, 2) independent joints in use at each sample, -1 where the law has none.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), offset=[4e-3, 0.0, 0.0])
+    >>> run.c[-1].round(4)
+    array([-0.0094, -0.0094, -0.0094])
     """
 
     robot: Manipulator
@@ -113,9 +127,9 @@ class Run(Value):
         return f"Run({len(self) and self.t[-1]:g} s, {type(self.law).__name__}, energy ({joules}) J)"
 
 
-def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encoder=None,
-             model: Manipulator | None = None, velocity_filter: float | None = None, faults=(),
-             sensors: Sensors | None = None) -> Run:
+def simulate(robot: Manipulator, law: LawLike, trajectory: Trajectory, offset: ArrayLike = 0.0,
+             encoder: float | None = None, model: Manipulator | None = None, velocity_filter: float | None = None,
+             faults: FaultsLike = (), sensors: Sensors | None = None) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
     The run starts at rest at the first point of the path.  The controller measures q_a + offset and the true rates.
@@ -134,6 +148,11 @@ def simulate(robot: Manipulator, law, trajectory: Trajectory, offset=0.0, encode
     the first sample comes through.  Whatever stops the run later raises SimulationError with the run up to there: a
     machine that leaves the workspace, a lost pose, a singularity of the law's coordinates, an error in the law.  A
     Ctrl-C comes through, with the run up to there as its `partial`.
+
+    >>> import rapkm_lite as rk
+    >>> spring = lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
+    >>> rk.simulate(rk.load(), spring, rk.hold(rk.load(), [0.0, 0.0], 0.1), offset=1e-3).c[0].round(4)
+    array([-0.007, -0.007, -0.007])
     """
     given = Sensors(offset, encoder, velocity_filter)
     if sensors is not None and given != Sensors():

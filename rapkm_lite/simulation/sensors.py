@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..machine.arguments import bounded, exact_array, positive_number, real_array
-from ..machine.values import Value
+from ..machine.values import Array, Value, default
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,7 +24,7 @@ class Sensors(Value):
     Sensors(encoder=2000)
     """
 
-    offset: np.ndarray = 0.0
+    offset: Array = default(0.0)
     encoder: float | None = None
     velocity_filter: float | None = None
 

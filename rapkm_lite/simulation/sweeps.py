@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..control.grammar import BadAnswer, as_law
+from ..control.grammar import BadAnswer, LawLike, as_law
 from ..machine.arguments import real_array
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value
@@ -18,7 +20,7 @@ from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import REASONS
-from .faults import check_faults
+from .faults import FaultsLike, check_faults
 from .loop import LAW_FAILED, own_copy
 from .patience import progress_bar
 from .runs import SimulationError, complete
@@ -37,6 +39,11 @@ class Sweep(Value):
     antagonistic_energy : (k,) J, (R / k_t^2) times the integral of ||c_null||^2 at the true pose.
     x_final : (k, 2) end-effector position at the end, m.
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
+
+    >>> import rapkm_lite as rk
+    >>> study = rk.sweep(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), 1e-3 * np.eye(3))
+    >>> len(study), study.energies.shape, int(study.failed.sum())
+    (3, (3, 3), 0)
     """
 
     robot: Manipulator
@@ -69,9 +76,10 @@ class Sweep(Value):
         return f"Sweep({len(self)} runs, {int(self.failed.sum())} failed{ends})"
 
 
-def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None, model: Manipulator | None = None,
-          velocity_filter: float | None = None, executor: Executor | None = None, failed: str = "raise",
-          chunk: int = 64, progress: bool = False, faults=()) -> Sweep:
+def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Trajectory, offsets: ArrayLike,
+          encoder: float | None = None, model: Manipulator | None = None, velocity_filter: float | None = None,
+          executor: Executor | None = None, failed: str = "raise", chunk: int = 64, progress: bool = False,
+          faults: FaultsLike = ()) -> Sweep:
     """Run a law on the machine along a trajectory once per row of `offsets`, many runs at a time.
 
     law : one law for all runs, or a sequence of k laws, such as PD with other gains.
@@ -84,6 +92,11 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     Raises ValueError for bad arguments; SimulationError naming the run and the time, with the run up to there as
     `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
     exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
+
+    >>> import rapkm_lite as rk
+    >>> path = rk.hold(rk.load(), [0.0, 0.0])
+    >>> rk.sweep(rk.load(), [rk.PD(k, 0.2) for k in (3.0, 7.0)], path, [4e-3, 0.0, 0.0]).energies.shape
+    (2, 3)
     """
     _check_options(failed, chunk, executor)
     laws, offsets = _rows(law, offsets, robot.n_arms)
@@ -93,17 +106,17 @@ def sweep(robot: Manipulator, law, trajectory: Trajectory, offsets, encoder=None
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)
-    with _pool(executor, 1 if in_python else os.cpu_count()) as pool:
+    with _pool(executor, 1 if in_python else os.cpu_count() or 1) as pool:
         try:
             errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
             finished = np.count_nonzero(table.status == DONE)
             if finished:
-                error.partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
-                error.add_note(f"{finished} of {len(laws)} runs were finished; they are in the `partial` of this "
-                               "exception, a Sweep whose other rows are masked.")
+                partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
+                _hand_over(error, partial, f"{finished} of {len(laws)} runs were finished; they are in the `partial` "
+                                           "of this exception, a Sweep whose other rows are masked.")
             raise
-    broken = table.failed.any()
+    broken = bool(table.failed.any())
     result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
     if failed == "raise" and broken:
         i = int(np.argmax(result.failed))
@@ -151,10 +164,16 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
-        error.add_note(f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`.")
-        error.partial = result
+        _hand_over(error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its "
+                                  "`partial`.")
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
+
+
+def _hand_over(error, partial: Sweep, note: str) -> None:
+    """Give an exception of whatever kind what is finished, and a note that says so."""
+    error.partial = partial
+    error.add_note(note)
 
 
 @contextmanager
@@ -210,12 +229,14 @@ class Columns(NamedTuple):
         return {first + i: error for i, error in errors.items()}
 
     def sweep(self, robot, law, trajectory, offsets, mask: bool) -> Sweep:
-        numbers, failed = self[:4], self.failed
-        if mask:
-            numbers = [np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape))
-                       for v in numbers]
+        failed = self.failed
+
+        def column(v: np.ndarray) -> np.ndarray:
+            return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
+
         times = np.ma.array(self.failure_time, mask=~failed | (self.status == NOT_RUN))
-        return Sweep(robot, law, trajectory, offsets, *numbers, failed, times)
+        return Sweep(robot, law, trajectory, offsets, column(self.energies), column(self.torque_norm),
+                     column(self.antagonistic_energy), column(self.x_final), failed, times)
 
 
 def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:
@@ -225,11 +246,11 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
     """
     codes = {id(law): encode(law, setup.model) for law in laws}
     rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
-    fast = [i for i, law in enumerate(laws) if codes[id(law)] is not None]
+    fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
     if fast:
-        parts = many(setup, [codes[id(laws[i])] for i in fast], offsets[fast])
-        for column, part in zip(rows, parts, strict=True):
-            column[fast] = part
+        own = list(fast)
+        for column, part in zip(rows, many(setup, list(fast.values()), offsets[own]), strict=True):
+            column[own] = part
     for i in sorted(set(range(len(laws))) - set(fast)):
         try:
             run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])

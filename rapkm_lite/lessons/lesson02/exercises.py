@@ -72,7 +72,7 @@ def _not_the_best(c, A, f, W, c0) -> tuple[float, str]:
     """The force missed, and the slope of the price along the torques that move nothing."""
     free = np.linalg.svd(A.T)[2][2:]
     slope = np.linalg.norm(free @ W @ (c - c0)) / np.linalg.norm(W)
-    return max(slope, np.linalg.norm(A.T @ c - f) / np.linalg.norm(A)), (
+    return max(float(slope), float(np.linalg.norm(A.T @ c - f) / np.linalg.norm(A))), (
         "force missed, or slope of the price along a torque that moves nothing, as a torque in N m")
 
 

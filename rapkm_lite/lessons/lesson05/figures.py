@@ -10,7 +10,6 @@ from ...figures.machine import plot_machine, plot_path, plot_workspace
 from ...figures.maps import curve_crossings, grid_points, on_grid, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.runs import plot_errors, plot_torques
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
-from ...machine.arguments import transpose
 from ...mechanics.actuation import drive_pairs, redundant_control_matrix, singular_values
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics
@@ -138,7 +137,7 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
     A = redundant_control_matrix(robot, inverse_kinematics(robot, points))
     for ax, rule in zip(axes, rules, strict=True):
         block = np.take_along_axis(A, select_independent(A, rule)[..., None], axis=-2)
-        sigma = singular_values(transpose(block))[:, 1]
+        sigma = singular_values(block.mT)[:, 1]
         plot_map(x, y, on_grid(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
         plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
         _frame(ax).label_outer()

@@ -1,0 +1,83 @@
+"""`compiled`: a law that a user wrote, run inside the compiled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..machine.arguments import one_of, whole_number
+from ..mechanics.at import at as at_pose
+from .grammar import LawValue
+
+SOURCES = ("desired", "measured", "true")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledLaw(LawValue):
+    """A function ``(t, q_a, qd_a, d[, at][, memory]) -> c`` as a law; made by `compiled`.
+
+    Where Numba is installed the loop calls it compiled, elsewhere as it is.
+    """
+
+    function: Callable
+    at: str | None = None
+    memory: int = 0
+
+    def __post_init__(self):
+        if not callable(self.function):
+            raise ValueError(f"function = {self.function!r}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
+        if self.at is not None:
+            one_of("at", self.at, SOURCES)
+        self._set(memory=whole_number("memory", self.memory, 0))
+        super().__post_init__()
+
+    @property
+    def pose(self):
+        """The pose that the run has to find for it: "measured", "true" or None."""
+        return None if self.at in (None, "desired") else self.at
+
+    def __call__(self, *arguments):
+        return self.function(*arguments)
+
+    def start(self, model, dt):
+        return np.zeros(self.memory)
+
+    def step(self, memory, sample):
+        desired, given = sample.desired, []
+        if self.at is not None:
+            q, qd = (desired.q, desired.qd) if self.at == "desired" else sample.pose(self.at)
+            given.append(at_pose(sample.model, q, qd))
+        if self.memory:
+            given.append(memory)
+        return self.function(sample.t, sample.q_a, sample.qd_a, desired, *given), memory
+
+    def __repr__(self):
+        return f"compiled({self.function.__name__}, at={self.at!r}, memory={self.memory})"
+
+
+def compiled(function=None, *, at: str | None = None, memory: int = 0):
+    """Decorator: a law that you write runs inside the compiled loop, some hundred times faster than in Python.
+
+    The function takes t in s, the measured base angles q_a and rates qd_a (N,), and d, the desired motion with
+    x, xd, xdd (2,), q, qd, qdd (2N,) and q_a, qd_a, qdd_a (N,); it returns the torques c (N,) in N m.
+
+    at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
+    memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
+    What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants.
+    Without Numba, and inside laws that run in Python, the function is called as it is.
+    Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.
+
+    >>> import rapkm_lite as rk
+    >>> @rk.compiled(memory=3)
+    ... def pi(t, q_a, qd_a, d, memory):
+    ...     e = q_a - d.q_a
+    ...     memory += 1e-3 * e
+    ...     return -7.0 * e - 0.2 * (qd_a - d.qd_a) - 5.0 * memory
+    >>> pi
+    compiled(pi, at=None, memory=3)
+    """
+    if function is None:
+        return lambda f: CompiledLaw(f, at, memory)
+    return CompiledLaw(function, at, memory)

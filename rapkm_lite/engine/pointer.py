@@ -1,0 +1,102 @@
+"""A law that a user wrote, compiled behind a function pointer, so that the loop itself is compiled only once."""
+
+from __future__ import annotations
+
+import functools
+from collections import namedtuple
+
+import numpy as np
+
+Wanted = namedtuple("Wanted", "x xd xdd q qd qdd q_a qd_a qdd_a")
+Matrices = namedtuple("Matrices", "F F_dot A J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv")
+
+
+def matrix_room(N: int) -> int:
+    """How many numbers the matrices of `engine.user` take."""
+    n, r = 2 * N, 2 * N - 2
+    return 4 * n + 2 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n
+
+
+def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
+    """Where the buffer of `engine.user` holds memory and answer, and its length."""
+    start = 7 + 8 * N + 6 * N + (matrix_room(N) if matrices else 0)
+    return start, start + memory, start + memory + N
+
+
+@functools.lru_cache(maxsize=64)
+def pointer(function, N: int, matrices: bool, memory: int):
+    """The law ``function(t, q_a, qd_a, d[, at][, memory]) -> c`` as a C function of the buffer.
+
+    Raises ValueError with the compiler's first words when it does not compile.
+    """
+    from numba import cfunc, njit, types
+    from numba.core.errors import NumbaError
+
+    law = njit(function, error_model="numpy")
+    n, r = 2 * N, 2 * N - 2
+    kept, answer, _ = places(N, matrices, memory)
+    if matrices and memory:
+        ask = law
+    elif matrices:
+        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, at))
+    elif memory:
+        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, own))
+    else:
+        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d))
+
+    @njit
+    def take(buffer, o, rows, columns):
+        size = rows * columns
+        return buffer[o : o + size].reshape((rows, columns)), o + size
+
+    @njit
+    def wanted(buffer):
+        o = 7 + 2 * N
+        q, qd, qdd = buffer[o : o + n], buffer[o + n : o + 2 * n], buffer[o + 2 * n : o + 3 * n]
+        x = buffer[1 + 2 * N : 7 + 2 * N]
+        return Wanted(x[0:2], x[2:4], x[4:6], q, qd, qdd, q[0:N], qd[0:N], qdd[0:N])
+
+    @njit
+    def matrices_of(buffer):
+        F, o = take(buffer, 7 + 2 * N + 3 * n, n, 2)
+        F_dot, o = take(buffer, o, n, 2)
+        A, o = take(buffer, o, N, 2)
+        J, o = take(buffer, o, r, n)
+        J_dot, o = take(buffer, o, r, n)
+        P, o = take(buffer, o, n, n)
+        P_dot, o = take(buffer, o, n, n)
+        G, o = take(buffer, o, n, n)
+        C, o = take(buffer, o, n, n)
+        Q = buffer[o : o + n]
+        G2, o = take(buffer, o + n, 2, 2)
+        C2, o = take(buffer, o, 2, 2)
+        Q2 = buffer[o : o + 2]
+        Gn, o = take(buffer, o + 2, n, n)
+        Cn, o = take(buffer, o, n, n)
+        Qn = buffer[o : o + n]
+        A_tilde, o = take(buffer, o + n, N, n)
+        pinv, o = take(buffer, o, N, n)
+        return Matrices(F, F_dot, A, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv)
+
+    @njit
+    def nothing(buffer):
+        return None
+
+    at_hand = matrices_of if matrices else nothing
+
+    def call(buffer):
+        c = ask(buffer[0], buffer[1 : 1 + N], buffer[1 + N : 1 + 2 * N], wanted(buffer), at_hand(buffer),
+                buffer[kept : kept + memory])
+        for i in range(N):
+            # An answer of another length is none.
+            buffer[answer + i] = c[i] if len(c) == N else np.nan
+
+    try:
+        return cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
+    except NumbaError as error:
+        lines = [line.strip() for line in str(error).splitlines()]
+        words = next((line for line in lines if "Error" in line or "No " in line), lines[0])
+        raise ValueError(
+            f"the law {function.__name__} cannot be compiled ({words}); allowed: a function of numbers and NumPy "
+            f"arrays that returns c ({N},), or the same function without @compiled, which runs in Python"
+        ) from error

@@ -1,0 +1,225 @@
+"""What the loop hands to a law that a user compiled: one buffer with the desired motion and the model's matrices.
+
+It holds, one after the other: t; q_a, qd_a; x, xd, xdd; q, qd, qdd; the matrices of `rapkm_lite.at` in the order of
+`pointer.Matrices`; the law's memory; its answer c.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import leaf, outlined
+from .leaves import geometry, smooth_sign, solve2
+from .rows import *
+from .tables import *
+
+
+@leaf
+def product(out, A, B, rows, inner, columns):
+    """out = A B of matrices with these sizes, which the compiler knows."""
+    for i in range(rows):
+        for j in range(columns):
+            s = 0.0
+            for k in range(inner):
+                s += A[i, k] * B[k, j]
+            out[i, j] = s
+
+
+@leaf
+def transposed(out, A, B, rows, inner, columns):
+    """out = A^T B."""
+    for i in range(rows):
+        for j in range(columns):
+            s = 0.0
+            for k in range(inner):
+                s += A[k, i] * B[k, j]
+            out[i, j] = s
+
+
+@leaf
+def matrix(buffer, start, rows, columns):
+    """A matrix that stands in the buffer, and where the next one starts."""
+    size = rows * columns
+    return buffer[start : start + size].reshape(rows, columns), start + size
+
+
+@outlined
+def fill(drives, arms, law, t, table, o, w, buffer):
+    """What a law may know at a sample; without a pose in `law.asks` only the desired motion."""
+    N, W = len(drives), len(arms)
+    buffer[0] = t
+    for i in range(N):
+        buffer[1 + i] = w[E * W + i] + want(table, o, ANGLE, i, W)
+        buffer[1 + N + i] = w[ED * W + i] + want(table, o, RATE, i, W)
+    p = 1 + 2 * N
+    for i in range(6):
+        buffer[p + i] = table[o + i]
+    p += 6
+    for i in range(N):
+        buffer[p + i], buffer[p + N + i] = want(table, o, ANGLE, i, W), want(table, o, ELBOW, i, W)
+        buffer[p + 2 * N + i], buffer[p + 3 * N + i] = want(table, o, RATE, i, W), want(table, o, ELBOW_RATE, i, W)
+        buffer[p + 4 * N + i] = want(table, o, ACCELERATION, i, W)
+        buffer[p + 5 * N + i] = want(table, o, ELBOW_ACCELERATION, i, W)
+    if law.asks != NOTHING:
+        fill_matrices(drives, arms, law, table, o, w, buffer[p + 6 * N :])
+
+
+@outlined
+def fill_matrices(drives, arms, law, table, o, w, room):
+    """All matrices of `rapkm_lite.at` at the desired, measured or true pose."""
+    N, W = len(drives), len(arms)
+    n, r = 2 * N, 2 * N - 2
+    F, p = matrix(room, 0, n, 2)
+    F_dot, p = matrix(room, p, n, 2)
+    A, p = matrix(room, p, N, 2)
+    J, p = matrix(room, p, r, n)
+    J_dot, p = matrix(room, p, r, n)
+    P, p = matrix(room, p, n, n)
+    P_dot, p = matrix(room, p, n, n)
+    G, p = matrix(room, p, n, n)
+    C_, p = matrix(room, p, n, n)
+    Q_, p = matrix(room, p, n, 1)
+    G2, p = matrix(room, p, 2, 2)
+    C2, p = matrix(room, p, 2, 2)
+    Q2, p = matrix(room, p, 2, 1)
+    Gn, p = matrix(room, p, n, n)
+    Cn, p = matrix(room, p, n, n)
+    Qn, p = matrix(room, p, n, 1)
+    A_tilde, p = matrix(room, p, N, n)
+    pinv, p = matrix(room, p, N, n)
+    scratch = np.empty((7, n, 2))
+    J[:], J_dot[:], G[:], C_[:] = 0.0, 0.0, 0.0, 0.0
+    env = ENVIRONMENT + GRAVITY_X
+    gx, gy = w[of(env, 0, W, 1)], w[of(env + 1, 0, W, 1)]
+    sharpness = w[of(ENVIRONMENT + SHARPNESS, 0, W, 1)]
+    for i in range(N):
+        m = MODEL * W + i
+        l1sq, l2sq = w[m + L1SQ * W], w[m + L2SQ * W]
+        if law.asks == DESIRED:
+            cos, sin = want(table, o, COS, i, W), want(table, o, SIN, i, W)
+            turn_c, turn_s = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
+            l1, l2 = math.sqrt(l1sq), math.sqrt(l2sq)
+            ax, ay, dx, dy = l1 * cos, l1 * sin, l2 * (cos * turn_c - sin * turn_s), l2 * (sin * turn_c + cos * turn_s)
+            base = want(table, o, RATE, i, W)
+            link = base + want(table, o, ELBOW_RATE, i, W)
+            den = ax * dy - ay * dx
+        else:
+            ax, ay, dx, dy, _, inv, _ = geometry(w[m + BX * W], w[m + BY * W], l1sq, w[m + HALF * W], w[m + MEAN * W],
+                                                 w[m + MODE * W], w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
+            den = 1.0 / inv
+            vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
+            base, link = (dx * vx + dy * vy) / den, -(ax * vx + ay * vy) / den
+        ad, tip = ax * dx + ay * dy, w[m + TIP * W]
+        den_dot = (link - base) * ad
+        F[i, 0], F[i, 1], F[N + i, 0], F[N + i, 1] = dx / den, dy / den, -(ax + dx) / den, -(ay + dy) / den
+        bx, by = (-link * dy - dx * den_dot / den) / den, (link * dx - dy * den_dot / den) / den
+        F_dot[i, 0], F_dot[i, 1] = bx, by
+        F_dot[N + i, 0] = (base * ay + ax * den_dot / den) / den - bx
+        F_dot[N + i, 1] = (-base * ax + ay * den_dot / den) / den - by
+        Ja, Jd, coupling = w[m + S1 * W] + tip * l1sq, w[m + S2 * W] + tip * l2sq, tip * ad
+        G[i, i], G[i, N + i], G[N + i, i], G[N + i, N + i] = Ja + Jd + 2.0 * coupling, Jd + coupling, Jd + coupling, Jd
+        bend, elbow = tip * den, link - base
+        C_[i, i], C_[i, N + i], C_[N + i, i] = -bend * elbow, -bend * link, bend * base
+        distal = w[m + W2 * W] * (gx * dy - gy * dx)
+        drag = w[m + FRICTION * W] * smooth_sign(base * sharpness)
+        Q_[i, 0], Q_[N + i, 0] = w[m + W1 * W] * (gx * ay - gy * ax) + distal + drag, distal
+        # Every arm is cut from the second one.
+        for row in range(N - 1):
+            arm = row if row < 1 else row + 1
+            sign = 1.0 if arm == i else -1.0 if i == 1 else 0.0
+            if sign != 0.0:
+                J[2 * row, i], J[2 * row + 1, i] = -sign * (ay + dy), sign * (ax + dx)
+                J[2 * row, N + i], J[2 * row + 1, N + i] = -sign * dy, sign * dx
+                J_dot[2 * row, i] = -sign * (base * ax + link * dx)
+                J_dot[2 * row + 1, i] = -sign * (base * ay + link * dy)
+                J_dot[2 * row, N + i], J_dot[2 * row + 1, N + i] = -sign * link * dx, -sign * link * dy
+    U, V, H, T = scratch[0], scratch[1], scratch[2], scratch[3]
+    for i in range(N):
+        A[i, 0], A[i, 1] = F[i, 0], F[i, 1]
+    # Minimal coordinates: F^T G F, F^T (C F + G Fdot), F^T Q.
+    product(H, G, F, n, n, 2)
+    transposed(G2, F, H, 2, n, 2)
+    product(H, C_, F, n, n, 2)
+    product(T, G, F_dot, n, n, 2)
+    for i in range(n):
+        H[i, 0], H[i, 1] = H[i, 0] + T[i, 0], H[i, 1] + T[i, 1]
+    transposed(C2, F, H, 2, n, 2)
+    transposed(Q2, F, Q_, 2, n, 1)
+    # Redundant coordinates with N = U U^T: U (U^T G U) U^T and so on.
+    project(F, F_dot, U, V, P, P_dot, n)
+    small, wide = scratch[4], scratch[5 : 7].reshape(2, 2 * n)
+    product(H, G, U, n, n, 2)
+    transposed(small, U, H, 2, n, 2)
+    product(T, U, small, n, 2, 2)
+    spread(Gn, T, U, n)
+    for i in range(2):
+        for j in range(n):
+            s = 0.0
+            for k in range(n):
+                s += H[k, i] * P_dot[k, j]
+            wide[i, j] = s
+    product(T, C_, U, n, n, 2)
+    transposed(small, U, T, 2, n, 2)
+    for i in range(2):
+        for j in range(n):
+            wide[i, j] += small[i, 0] * U[j, 0] + small[i, 1] * U[j, 1]
+    product(Cn, U, wide, n, 2, n)
+    transposed(small, U, Q_, 2, n, 1)
+    product(Qn, U, small, n, 2, 1)
+    for i in range(N):
+        for j in range(n):
+            A_tilde[i, j] = P[i, j]
+    m11 = m12 = m22 = 0.0
+    for i in range(N):
+        m11, m12, m22 = m11 + A[i, 0] * A[i, 0], m12 + A[i, 0] * A[i, 1], m22 + A[i, 1] * A[i, 1]
+    for i in range(N):
+        u, v = solve2(m11, m12, m22, A[i, 0], A[i, 1])
+        for j in range(n):
+            pinv[i, j] = u * F[j, 0] + v * F[j, 1]
+
+
+@leaf
+def spread(out, A, B, n):
+    """out = A B^T of two columns each."""
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1]
+
+
+@leaf
+def project(F, F_dot, U, V, P, P_dot, n):
+    """The projector onto the range of F and its rate, from an orthonormal basis U of the two columns."""
+    r11, r12, r22 = 1.0, 0.0, 1.0
+    for i in range(n):
+        U[i, 0], U[i, 1] = F[i, 0], F[i, 1]
+    # Gram-Schmidt twice: the second time removes what rounding left.
+    for _ in range(2):
+        aa = ab = bb = 0.0
+        for i in range(n):
+            aa += U[i, 0] * U[i, 0]
+        a = math.sqrt(aa)
+        for i in range(n):
+            U[i, 0] /= a
+            ab += U[i, 0] * U[i, 1]
+        for i in range(n):
+            U[i, 1] -= ab * U[i, 0]
+            bb += U[i, 1] * U[i, 1]
+        b = math.sqrt(bb)
+        for i in range(n):
+            U[i, 1] /= b
+        r11, r12, r22 = a * r11, a * r12 + ab * r22, b * r22
+    spread(P, U, U, n)
+    # F_dot R^-1, then its part across the range.
+    p11 = p12 = p21 = p22 = 0.0
+    for i in range(n):
+        V[i, 0] = F_dot[i, 0] / r11
+        V[i, 1] = (F_dot[i, 1] - V[i, 0] * r12) / r22
+        p11, p12 = p11 + U[i, 0] * V[i, 0], p12 + U[i, 0] * V[i, 1]
+        p21, p22 = p21 + U[i, 1] * V[i, 0], p22 + U[i, 1] * V[i, 1]
+    for i in range(n):
+        V[i, 0], V[i, 1] = V[i, 0] - U[i, 0] * p11 - U[i, 1] * p21, V[i, 1] - U[i, 0] * p12 - U[i, 1] * p22
+    for i in range(n):
+        for j in range(n):
+            P_dot[i, j] = V[i, 0] * U[j, 0] + V[i, 1] * U[j, 1] + U[i, 0] * V[j, 0] + U[i, 1] * V[j, 1]
