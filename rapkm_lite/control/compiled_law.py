@@ -19,6 +19,9 @@ class CompiledLaw(LawValue):
     """A function ``(t, q_a, qd_a, d[, at][, memory]) -> c`` as a law; made by `compiled`.
 
     Where Numba is installed the loop calls it compiled, elsewhere as it is.
+
+    >>> CompiledLaw(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory
+    0
     """
 
     function: Callable

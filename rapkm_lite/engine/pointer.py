@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -32,16 +33,15 @@ def pointer(function, N: int, matrices: bool, memory: int):
     from numba import cfunc, njit, types
     from numba.core.errors import NumbaError
 
-    law = njit(function, error_model="numpy")
+    law: Any = njit(function, error_model="numpy")
+    ask: Any = law
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)
-    if matrices and memory:
-        ask = law
-    elif matrices:
+    if matrices and not memory:
         ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, at))
-    elif memory:
+    elif memory and not matrices:
         ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, own))
-    else:
+    elif not matrices:
         ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d))
 
     @njit

@@ -171,8 +171,8 @@ def complete(setup: Setup, law, faults=()) -> Run:
         outcome, cause = closed_loop(setup, law)
     run = _run(setup, law, faults, outcome)
     if cause is not None and not isinstance(cause, Exception):
-        vars(cause)["partial"], time = run, setup.trajectory.t[outcome.sample]
-        cause.add_note(f"The run up to t = {time:.4f} s is the `partial` of this exception.")
+        time = setup.trajectory.t[outcome.sample]
+        hand_over(cause, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
         raise cause
     if outcome.status != DONE:
         time, reason = setup.trajectory.t[outcome.sample], explain(setup, law, outcome.status, outcome.sample, cause)
