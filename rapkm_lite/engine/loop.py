@@ -169,13 +169,14 @@ def add_work(lanes, arms, w):
 
 
 @kernel
-def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, history, buffer):
+def closed_loops(kind, study, modelled, user, sensor, law, dt, table, faults, w, history, buffer):
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
-    modelled : None for laws without a model, whose kernel is smaller; else the `extra` of the model.
+    None for what is not there leaves it out of the kernel, which is then sooner compiled.
+    study : None for a single run.  modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     """
-    lanes, drives, arms, study, faulty, extra = kind
+    lanes, drives, arms, faulty, extra = kind
     columns = 6 + 10 * len(arms)
     samples = len(table) // columns
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
@@ -183,13 +184,13 @@ def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, histor
         o = k * columns
 
         # Sense: the machine as it is, and what the hold will start from.
-        if len(study) > 0:
+        if study is not None:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
         else:
             far = single.sense(arms, extra, table, o, w, dt)
         if far > 0:
             plant.mend(lanes, arms, table, o, w)
-        if len(study) > 0:
+        if study is not None:
             add_work(lanes, arms, w)
 
         # Measure: ideal encoders have their errors from `sense`.
@@ -199,12 +200,13 @@ def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, histor
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         if law.posed:
             if law.pose == MEASURED:
-                measured_pose(lanes, drives, arms, table, o, w, k, not sensor.quantized)
+                measured_pose(lanes, drives, arms, study, table, o, w, k, not sensor.quantized)
                 measured_rate(lanes, drives, arms, table, o, w)
             else:
                 true_pose(lanes, drives, arms, law, w)
-        if len(study) > 0 and k + 1 == samples:
-            return
+        if study is not None:
+            if k + 1 == samples:
+                return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
         if law.form == PD:
@@ -225,7 +227,7 @@ def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, histor
             break_drives(lanes, arms, faults, w, k)
 
         # Record.
-        if len(study) > 0:
+        if study is not None:
             add_up(lanes, drives, arms, w)
         else:
             record(drives, arms, history, w, k)
@@ -234,7 +236,7 @@ def closed_loops(kind, modelled, user, sensor, law, dt, table, faults, w, histor
             return
 
         # Hold.
-        if len(study) > 0:
+        if study is not None:
             plant.hold(lanes, arms, extra, w, dt)
         else:
             single.hold(arms, extra, w, dt)

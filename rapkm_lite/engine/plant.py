@@ -32,7 +32,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
             m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
                 w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
                 w[of(VX, j, W, L)], w[of(VY, j, W, L)])
-            if len(extra) > 0:
+            if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
                 gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
                               place, rate)
@@ -84,7 +84,7 @@ def pull(lanes, arms, extra, w):
             m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
                 w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
                 w[of(SVX, j, W, L)], w[of(SVY, j, W, L)])
-            if len(extra) > 0:
+            if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
                 gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
                               place, rate)
@@ -194,7 +194,7 @@ def hold(lanes, arms, extra, w, dt):
     most = 1.0
     for j in range(L):
         w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
-    if len(extra) > 0:
+    if extra is not None:
         most = count_steps(lanes, arms, w, dt)
     step(lanes, arms, extra, w)
     for s in range(1, int(most)):

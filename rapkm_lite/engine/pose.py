@@ -139,7 +139,7 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
 
 
 @outlined
-def measured_pose(lanes, drives, arms, table, o, w, k, smooth):
+def measured_pose(lanes, drives, arms, study, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
     tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
@@ -151,7 +151,7 @@ def measured_pose(lanes, drives, arms, table, o, w, k, smooth):
         w[of(PY, j, W, L)] = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
-    if L == 1:
+    if study is None:
         fetch(UX, COS, W, table, o, w)
         fetch(UY, SIN, W, table, o, w)
         single_newton(drives, arms, w, tolerance)

@@ -39,7 +39,7 @@ def sense(arms, extra, table, o, w, dt):
                          w[MODE * W + i], x, y)
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
             w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
-        if len(extra) > 0:
+        if extra is not None:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
         ax, ay, ux, uy = place[0], place[1], w[UX * W + i], w[UY * W + i]
@@ -78,7 +78,7 @@ def acceleration(arms, extra, acting, w, x, y, vx, vy):
                          w[MODE * W + i], x, y)
         m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
             w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
-        if len(extra) > 0:
+        if extra is not None:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
         c = w[acting * W + i]
@@ -124,11 +124,11 @@ def friction_hold(arms, extra, w, k1x, k1y, dt):
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
     n = count_steps(arms, w, k1x, k1y, dt)
     w[of(STEPS, 0, W, 1)] = max(1.0, n)
-    if n == 0.0 and len(extra) == 1:
+    if n == 0.0 and len(extra) == 0:
         # Nothing but constant friction: it joins the torques.
         for i in range(W):
             w[PUSH * W + i] = w[C * W + i] - math.copysign(w[FRICTION * W + i], w[QD * W + i])
-        return step(arms, (), PUSH, w, x, y, vx, vy, k1x, k1y, dt)
+        return step(arms, None, PUSH, w, x, y, vx, vy, k1x, k1y, dt)
     most = int(min(max(1.0, n), MOST_STEPS))
     h = dt / most
     x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, h)
@@ -147,7 +147,7 @@ def hold(arms, extra, w, dt):
         w[FX * W + i] += w[B1 * W + i] * c
         w[FY * W + i] += w[B2 * W + i] * c
     k1x, k1y = join(arms, w)
-    if len(extra) > 0:
+    if extra is not None:
         x, y, vx, vy = friction_hold(arms, extra, w, k1x, k1y, dt)
     else:
         x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]

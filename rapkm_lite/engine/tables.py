@@ -19,9 +19,8 @@ NOTHING, DESIRED, POSED = range(3)
 # Rows per sample of the fault table.
 JUMP, HELD, ALIVE, LIMITED = range(4)
 
-# Sizes as `sizes` makes them: runs, drives, arms of a row; one entry for sums instead of a history, for faults, for
-# friction or gravity.
-Kind = namedtuple("Kind", "lanes drives arms study faulty extra")
+# Sizes as `sizes` makes them: runs, drives, arms of a row; an entry for faults; `extra`.
+Kind = namedtuple("Kind", "lanes drives arms faulty extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 Law = namedtuple("Law", "form filter posed pose same switched asks")
 
@@ -79,9 +78,9 @@ def sizes(count: int) -> tuple:
     return ((),) * count
 
 
-def extra(robot) -> tuple:
-    """One entry for a machine with friction only, two for one with gravity, none for one with neither."""
-    return sizes(2 if robot.gravity.any() else int(bool(robot.friction.any())))
+def extra(robot) -> tuple | None:
+    """None for a machine without friction and gravity; an entry where there is gravity."""
+    return sizes(1) if robot.gravity.any() else () if robot.friction.any() else None
 
 
 def width(N: int, alone: bool) -> int:

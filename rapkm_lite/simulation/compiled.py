@@ -180,13 +180,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
                      code.filter != tables.NO_FILTER or tables.PID < code.form < tables.USER or asks == tables.POSED,
                      tables.TRUE if code.true_pose else tables.MEASURED, model.same_kinematics(robot), code.switched,
                      asks)
-    kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(history is None)), sizes(int(setup.faults is not None)),
-                       tables.extra(robot))
-    modelled = tables.extra(model) if tables.PID < code.form < tables.USER else None
+    kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
+    study = () if history is None else None
+    modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < code.form < tables.USER else None
     w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
-    with patience(kind, modelled, user is None), np.errstate(all="ignore"):
+    with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
         try:
-            closed_loops(kind, modelled, user, tables.sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
+            closed_loops(kind, study, modelled, user, tables.sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
                          _made_for(trajectory, W, _motion), tables.faults(setup.faults, W), w, log, buffer)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
@@ -251,7 +251,7 @@ class Plant:
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         self.status = DONE
         start = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
-        with patience("plant", W, len(self._extra)):
+        with patience("plant", W, self._extra):
             self.observe(0, start)
             self.hold(start, np.zeros(robot.n_arms), self._dt)
 
