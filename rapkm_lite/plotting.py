@@ -54,8 +54,6 @@ from .lessons.lesson01.figures import (
 )
 from .lessons.lesson02.figures import (
     plot_available_forces,
-    plot_control_fields,
-    plot_grid_search,
     plot_mode_maps,
     plot_pair_measures,
     plot_parameterization_singularities,
@@ -128,7 +126,6 @@ __all__ = [
     "plot_chatter",
     "plot_complement_size",
     "plot_configuration_space",
-    "plot_control_fields",
     "plot_cut_tree",
     "plot_disagreement",
     "plot_ee_paths",
@@ -140,7 +137,6 @@ __all__ = [
     "plot_fight_map",
     "plot_gain_curve",
     "plot_gain_ratio",
-    "plot_grid_search",
     "plot_joint_angles",
     "plot_joint_moves",
     "plot_landscape",

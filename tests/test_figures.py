@@ -24,7 +24,6 @@ PURE_NUMBERS = {
     "largest singular value of F",
     "effective / nominal gain",
     "gain of drive 3 / gain of drives 1 and 2",
-    "smallest σ_min(Ã) on the grid",
     "σ_min(Ã), all drives",
     "σ_min(Ã₁)",
     "share |η_i| of the prestress",
@@ -52,10 +51,8 @@ def values_first(xyv):
 
 
 CALLS = {
-    "plot_control_fields": lambda w: (w["robot"],),
     "plot_mode_maps": lambda w: (w["robot"], *values_first(rk.actuation_map(
         w["robot"], mode=rk.working_modes(w["robot"]), n=41))),
-    "plot_grid_search": lambda w: (scatter(4), {"mode": scatter(4)}),
     "plot_parameterization_singularities": lambda w: (w["path"], np.array([0.0, 0.12])),
     "plot_prestress_maps": lambda w: (w["robot"],),
     "plot_available_forces": lambda w: (w["robot"], w["q"]),

@@ -1,4 +1,4 @@
-"""Figures of lesson 02: control fields, mode maps, parameterization singularities, prestress, weighted torques."""
+"""Figures of lesson 02: mode maps, parameterization singularities, prestress, weighted torques."""
 
 from __future__ import annotations
 
@@ -21,31 +21,11 @@ from ...figures.maps import (
 from ...figures.style import ALARM, NEUTRAL, arm_line, axes_or_new
 from ...mechanics.actuation import (
     control_matrix,
-    control_vector_fields,
     drive_pairs,
     force_polygon,
     singular_values,
 )
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
-
-
-def plot_control_fields(robot, axes=None, n: int = 15):
-    """Control vector fields (8)-(9), one panel per drive: end-effector acceleration per torque, m/s^2 per N m."""
-    if axes is None:
-        axes = plt.subplots(1, robot.n_arms, figsize=(3.2 * robot.n_arms, 3.3), sharey=True, squeeze=False)[1][0]
-    # Near the boundary an arm is almost stretched and its field grows without bound: stay a little inside.
-    *_, points = grid_points(robot.replace(lengths=0.985 * robot.lengths), n)
-    field = control_vector_fields(robot, inverse_kinematics(robot, points))
-    for i, ax in enumerate(axes):
-        plot_workspace(robot, ax)
-        arrows = ax.quiver(*points.T, *field[:, :, i].T, color=arm_line(i)["color"], angles="xy", pivot="tail",
-                           scale=200, scale_units="width", width=0.007, zorder=3)
-        ax.plot(*robot.base[i], "o", color=arm_line(i)["color"], ms=8, zorder=4)
-        ax.quiverkey(arrows, 0.74, 0.90, 30, "30 m/s² per N m", labelpos="N", coordinates="axes")
-        ax.set(title=f"drive {i + 1}", xlim=(-0.25, 0.25), ylim=(-0.21, 0.29))
-        if i:
-            ax.set_ylabel("")
-    return axes
 
 
 def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
@@ -66,18 +46,6 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
     mesh = np.ravel(axes)[0].collections[0]
     np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min(Ã), all drives", shrink=0.8)
     return axes
-
-
-def plot_grid_search(spacings, minima, ax=None):
-    """Smallest measure found on grids against their spacings in m; `minima` maps a label to one value per grid."""
-    ax = axes_or_new(ax, figsize=(6.4, 3.4))
-    for k, (label, values) in enumerate(minima.items()):
-        ax.loglog(1e3 * np.asarray(spacings), values, "os^D"[k % 4], ls="-", color=(NEUTRAL, ALARM)[k % 2], label=label)
-    ax.set(xlabel="grid spacing in mm", ylabel="smallest σ_min(Ã) on the grid")
-    ax.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
-    ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
-    ax.legend(loc="center left", title="mode")
-    return ax
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
