@@ -177,7 +177,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, dt, table, faults, w,
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     """
     lanes, drives, arms, faulty, extra = kind
-    columns = 6 + 10 * len(arms)
+    columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     samples = len(table) // columns
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
     for k in range(samples):

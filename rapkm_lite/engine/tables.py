@@ -58,14 +58,18 @@ def environment(robot) -> np.ndarray:
     return np.array([*robot.gravity, 1 / robot.friction_velocity, _tip_masses(robot).sum()])
 
 
-def motion_table(trajectory, width: int) -> np.ndarray:
-    """Desired motion per sample, (k, 6 + 10 width); arms beyond the machine's are copies of its first one."""
+# Blocks for laws without a model, which then read half as much, and for all others.
+FEW, ALL = 4, 10
+
+
+def motion_table(trajectory, width: int, count: int = ALL) -> np.ndarray:
+    """Desired motion per sample, (k, 6 + count width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
     q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
     blocks = [q[:, :N], qd[:, :N], np.cos(q[:, :N]), np.sin(q[:, :N]),
               qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(q[:, N:]), np.sin(q[:, N:]), q[:, N:]]
     arms = _filled(N, width)
-    return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks)])
+    return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks[:count])])
 
 
 def _filled(N: int, width: int) -> np.ndarray:

@@ -183,11 +183,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
     modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < code.form < tables.USER else None
+    desired = _short_motion if modelled is None and user is None else _motion
     w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
     with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
         try:
             closed_loops(kind, study, modelled, user, tables.sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
-                         _made_for(trajectory, W, _motion), tables.faults(setup.faults, W), w, log, buffer)
+                         _made_for(trajectory, W, desired),
+                         tables.faults(setup.faults, W), w, log, buffer)
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
@@ -227,6 +229,10 @@ def _arms(robot, width: int) -> tuple[np.ndarray, np.ndarray]:
     return tables.arm_table(robot, width), tables.environment(robot)
 
 
+def _short_motion(trajectory, width: int):
+    return tables.plain(tables.motion_table(trajectory, width, tables.FEW).ravel())
+
+
 def _motion(trajectory, width: int):
     return tables.plain(tables.motion_table(trajectory, width).ravel())
 
@@ -246,7 +252,7 @@ class Plant:
         start = rows.BLOCKS * W + rows.GRAVITY_X
         work[start : start + rows.ENVIRONMENT] = environment
         self._w, self._arms = tables.plain(work), tables.sizes(W)
-        self._extra, table = tables.extra(robot), _made_for(trajectory, W, _motion)
+        self._extra, table = tables.extra(robot), _made_for(trajectory, W, _short_motion)
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         self.status = DONE
