@@ -110,7 +110,7 @@ class AntagonismFilter(LawValue):
     law : a law, or a callable ``(t, q_a, qd_a, desired) -> c'``; its memory is handed on.
     pose : "measured" or "true", where R is formed; the law inside keeps its own.
     W : positive definite number, (m,) or (m, m); then R = (A^T)_W^+ A^T, and of all torques with the same end-effector
-        force c has the smallest c^T W c.  W = diag(R / k_t^2) makes the least heat; default the identity.
+        force c has the smallest c^T W c.  W = diag(R_el / k_t^2) makes the least heat; default the identity.
 
     >>> AntagonismFilter(PD(7.05, 0.225))
     AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
@@ -151,7 +151,7 @@ class AntagonismFilter(LawValue):
 class CommandFilter(LawValue):
     """Command form: PD drives that get the commands (18), whose errors are filtered as in (17):
 
-    c = -K_P R_P e - K_D R_D ed, R_P = (A^T K_P)^+ A^T K_P and R_D alike.  The end-effector force is that of (16), the
+    c = -K_P R_{A^T K_P} e - K_D R_{A^T K_D} ed, see `command_filter`.  The end-effector force is that of (16), the
     torques only for K = k_P I.
 
     >>> import rapkm_lite as rk

@@ -39,9 +39,9 @@ def antagonism_filter(A) -> np.ndarray:
 
 
 def command_filter(A, K) -> np.ndarray:
-    """R_K = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
+    """R_{A^T K} = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
 
-    -K R_K e has the same end-effector force as the filtered -R K e, and the same torques only for K = k I.
+    -K R_{A^T K} e has the end-effector force of the filtered -R K e, and the same torques only for K = k_P I.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.control_matrix(robot, q)

@@ -62,7 +62,7 @@ def antagonistic_torque(run) -> np.ndarray:
 
 
 def antagonistic_energy(run) -> float:
-    """(R / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives.
+    """(R_el / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives.
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
@@ -75,8 +75,8 @@ def antagonistic_energy(run) -> float:
 def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarray:
     """Symmetric S (N, N) in J/rad^2: offsets dq (N,) in rad cost about dq^T S dq of antagonistic energy along the path.
 
-    S = integral of P^T (R / k_t^2) P dt, where P dq are the torques at rest of the corrected (14) at each point of the
-    path: quasi-static, to first order in the offsets, without friction.
+    S = integral of K_0^T (R_el / k_t^2) K_0 dt, where -K_0 dq are the torques at rest of the corrected (14) at each
+    point of the path: quasi-static, to first order in the offsets, without friction.
 
     >>> import rapkm_lite as rk
     >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)
@@ -84,6 +84,6 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     3.58
     """
     A = control_matrix(robot, trajectory.q)
-    P = np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
+    K_0 = -np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
     weight = robot.resistance / robot.torque_constant**2
-    return np.einsum("kij,i,kil->jl", P[:-1], weight, P[:-1]) * trajectory.dt
+    return np.einsum("kij,i,kil->jl", K_0[:-1], weight, K_0[:-1]) * trajectory.dt

@@ -36,7 +36,7 @@ class Sweep(Value):
 
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.
-    antagonistic_energy : (k,) J, (R / k_t^2) times the integral of ||c_null||^2 at the true pose.
+    antagonistic_energy : (k,) J, (R_el / k_t^2) times the integral of ||c_null||^2 at the true pose.
     x_final : (k, 2) end-effector position at the end, m.
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
 
