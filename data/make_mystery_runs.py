@@ -36,11 +36,17 @@ def record(name: str) -> np.ndarray:
     offset, gains = hidden(name, rng)
     run = rk.simulate(robot, rk.PD(gains, K_D), path, offset)
     torque = run.c + rng.normal(0.0, 1e-3, run.c.shape)
-    return np.column_stack([run.t - SETTLING, run.q_a + offset, path.q_a, torque])[round(SETTLING / run.dt)::10]
+    return np.column_stack([run.t - SETTLING, run.q_a + offset, path.q_a, torque])[round(SETTLING / run.dt) :: 10]
 
 
 if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
     for name in SIDES:
-        np.savetxt(HERE / f"{name}.csv", record(name), delimiter=",", header=",".join(COLUMNS), comments="",
-                   fmt=["%.2f"] + 6 * ["%.5f"] + 3 * ["%.4f"])
+        np.savetxt(
+            HERE / f"{name}.csv",
+            record(name),
+            delimiter=",",
+            header=",".join(COLUMNS),
+            comments="",
+            fmt=["%.2f"] + 6 * ["%.5f"] + 3 * ["%.4f"],
+        )

@@ -62,10 +62,12 @@ def bare_widget(output: nbformat.NotebookNode) -> bool:
 
 def tidy(notebook: nbformat.NotebookNode) -> None:
     """Keep what a reader sees: no widget state, no time stamps, no versions of this machine."""
-    notebook.metadata = nbformat.from_dict({
-        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
-        "language_info": {"name": "python"},
-    })
+    notebook.metadata = nbformat.from_dict(
+        {
+            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+        }
+    )
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number:02d}"
         cell.metadata = nbformat.from_dict({"tags": cell.metadata["tags"]} if cell.metadata.get("tags") else {})
@@ -130,13 +132,16 @@ def defined(path: Path) -> list[str]:
 def figure_list() -> str:
     """The text of ``rapkm_lite/plotting.py``: every figure of the shared room and of every lesson, by name."""
     rooms = sorted(PACKAGE.glob("figures/[!_]*.py")) + sorted(PACKAGE.glob("lessons/lesson*/figures.py"))
-    owner, text = {}, [
-        '"""Every figure under one name: ``plotting.plot_x(..., ax=None) -> ax``; one colour per arm everywhere.',
-        "",
-        "Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.",
-        '"""',
-        "",
-    ]
+    owner, text = (
+        {},
+        [
+            '"""Every figure under one name: ``plotting.plot_x(..., ax=None) -> ax``; one colour per arm everywhere.',
+            "",
+            "Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.",
+            '"""',
+            "",
+        ],
+    )
     for path in rooms:
         module = "." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         names = [n for n in defined(path) if module.startswith(".figures") or n.startswith("plot_")]

@@ -12,8 +12,17 @@ from pathlib import Path
 import pytest
 
 GROUPS = {
-    "slow": ["test_compiled_law", "test_docs", "test_engine", "test_explore", "test_figures", "test_lanes",
-             "test_skeleton", "test_sweep", "test_types"],
+    "slow": [
+        "test_compiled_law",
+        "test_docs",
+        "test_engine",
+        "test_explore",
+        "test_figures",
+        "test_lanes",
+        "test_skeleton",
+        "test_sweep",
+        "test_types",
+    ],
     "oracle": ["test_oracles", "test_symbolic"],
     "browser": ["test_lab"],
 }

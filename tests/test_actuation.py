@@ -28,10 +28,15 @@ def singular_points(mode):
         return np.linalg.svd(A_tilde, compute_uv=False)[1]
 
     inner = sigma.filled(9.0)
-    dips = [(i, j) for i in range(1, 49) for j in range(1, 49)
-            if inner[i, j] < 0.2 and inner[i, j] <= inner[i - 1 : i + 2, j - 1 : j + 2].min()]
-    found = [minimize(value, [x[j], y[i]], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12})
-             for i, j in dips]
+    dips = [
+        (i, j)
+        for i in range(1, 49)
+        for j in range(1, 49)
+        if inner[i, j] < 0.2 and inner[i, j] <= inner[i - 1 : i + 2, j - 1 : j + 2].min()
+    ]
+    found = [
+        minimize(value, [x[j], y[i]], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}) for i, j in dips
+    ]
     return [f.x for f in found if f.fun < 1e-6]
 
 
@@ -216,7 +221,8 @@ def test_clearance_of_the_pair_singularities_and_crossings_of_the_triangle():
     assert smallest(0.05) > 0
     assert_allclose(brentq(smallest, 0.09, 0.12, xtol=1e-8), 0.1012, atol=5e-5)
     changes = lambda path: np.sum(  # noqa: E731
-        np.diff(np.sign(rk.distal_cross_products(TESTBED, path.q)), axis=0) != 0, axis=0)
+        np.diff(np.sign(rk.distal_cross_products(TESTBED, path.q)), axis=0) != 0, axis=0
+    )
     assert np.array_equal(changes(rk.triangle(TESTBED)), [2, 2, 2])
     assert np.array_equal(changes(rk.circle(TESTBED, 0.1)), [0, 0, 0])
 
@@ -359,10 +365,12 @@ def test_partition_rules_choose_what_they_say():
     sigma = np.linalg.svd(parts, compute_uv=False)
     index = lambda rows: [PAIRS.index(tuple(r)) for r in rows.tolist()]  # noqa: E731
     assert np.array_equal(index(rk.select_independent(A_tilde)), sigma[..., 1].argmax(axis=1))
-    assert np.array_equal(index(rk.select_independent(A_tilde, "condition")),
-                          (sigma[..., 0] / sigma[..., 1]).argmin(axis=1))
-    assert np.array_equal(index(rk.select_independent(A_tilde, "printed")),
-                          np.abs(parts).sum(-1).max(-1).argmin(axis=1))
+    assert np.array_equal(
+        index(rk.select_independent(A_tilde, "condition")), (sigma[..., 0] / sigma[..., 1]).argmin(axis=1)
+    )
+    assert np.array_equal(
+        index(rk.select_independent(A_tilde, "printed")), np.abs(parts).sum(-1).max(-1).argmin(axis=1)
+    )
 
 
 # (13)-(14)
@@ -454,8 +462,12 @@ def test_maps_mask_the_boundary_where_an_arm_is_stretched():
 
 
 def test_map_masks_the_input_singularity_of_a_mixed_mode():
-    mode, box = next((m, p) for m in MIXED for p in MIDPOINTS
-                     if rk.degree_of_actuation(TESTBED, rk.inverse_kinematics(TESTBED, p, m)) == 1)
+    mode, box = next(
+        (m, p)
+        for m in MIXED
+        for p in MIDPOINTS
+        if rk.degree_of_actuation(TESTBED, rk.inverse_kinematics(TESTBED, p, m)) == 1
+    )
     px, py = box
     x, y, n = rk.actuation_map(TESTBED, "prestress", mode, n=3, box=(px - 0.01, px + 0.01, py - 0.01, py + 0.01))
     assert n.mask[:, 1, 1].all() and np.all(np.isfinite(n.data))
@@ -496,14 +508,24 @@ def test_one_pose_and_a_trajectory_are_the_same_call(name):
     rng = np.random.default_rng(3)
     offset, W = rng.normal(0, 0.01, (12, robot.n_arms)), rng.uniform(1, 2, robot.n_arms)
     of = lambda f: lambda *a: f(robot, *a)  # noqa: E731
-    calls = [(of(rk.control_matrix), q), (of(rk.redundant_control_matrix), q), (of(rk.degree_of_actuation), q),
-             (of(rk.control_vector_fields), q), (of(rk.distal_cross_products), q), (rk.singular_values, A),
-             (lambda M: rk.weighted_pseudoinverse(M, W), A), (lambda M: rk.prestress_projector(M, W), A),
-             (rk.antagonism_filter, A), (lambda M: rk.command_filter(M, W), A),
-             (lambda *a: rk.inverse_dynamics(robot, *a, W, offset[0]), q, qd, qdd),
-             (of(rk.required_wrench), q, qd, qdd), (lambda M, o: rk.steady_state_error(M, W, o), A, offset),
-             (lambda M, o: rk.steady_state_torque(M, W, o), A, offset), (rk.select_independent, A_tilde),
-             (rk.explicit_pseudoinverse, A_tilde, rk.select_independent(A_tilde))]
+    calls = [
+        (of(rk.control_matrix), q),
+        (of(rk.redundant_control_matrix), q),
+        (of(rk.degree_of_actuation), q),
+        (of(rk.control_vector_fields), q),
+        (of(rk.distal_cross_products), q),
+        (rk.singular_values, A),
+        (lambda M: rk.weighted_pseudoinverse(M, W), A),
+        (lambda M: rk.prestress_projector(M, W), A),
+        (rk.antagonism_filter, A),
+        (lambda M: rk.command_filter(M, W), A),
+        (lambda *a: rk.inverse_dynamics(robot, *a, W, offset[0]), q, qd, qdd),
+        (of(rk.required_wrench), q, qd, qdd),
+        (lambda M, o: rk.steady_state_error(M, W, o), A, offset),
+        (lambda M, o: rk.steady_state_torque(M, W, o), A, offset),
+        (rk.select_independent, A_tilde),
+        (rk.explicit_pseudoinverse, A_tilde, rk.select_independent(A_tilde)),
+    ]
     if robot.n_arms == 3:
         calls.append((of(rk.null_vector), q))
     for f, *args in calls:

@@ -44,8 +44,13 @@ def rest_by_linear_programming(robot, q, K_P, offset, quantum, friction, reach=2
         counts = quantum * (middle + step)
         c = -K_P * (counts - q[:N])
         slabs = ((A / scale, (counts - q[:N] - offset) / quantum, 0.5), (Z, c / friction, 1.0))
-        if all(linprog(np.zeros(M.shape[1]), np.vstack([M, -M]), np.concatenate([b + h, h - b]),
-                       bounds=(None, None)).status == 0 for M, b, h in slabs):
+        if all(
+            linprog(
+                np.zeros(M.shape[1]), np.vstack([M, -M]), np.concatenate([b + h, h - b]), bounds=(None, None)
+            ).status
+            == 0
+            for M, b, h in slabs
+        ):
             return True
     return False
 

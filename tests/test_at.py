@@ -108,17 +108,22 @@ def test_public_functions_and_attributes_agree_to_the_bit_and_give_arrays_to_wri
     q, qd, _, _ = random_motion(robot, 5)
     for pose in (0, slice(None)):
         at = rk.at(robot, q[pose], qd[pose])
-        pairs = [(rk.constraint_jacobian(robot, q[pose]), at.J), (rk.mass_matrix(robot, q[pose]), at.G),
-                 (rk.constraint_jacobian_dot(robot, q[pose], qd[pose]), at.J_dot),
-                 (rk.coriolis_matrix(robot, q[pose], qd[pose]), at.C), (rk.forward_kinematics(robot, q[pose]), at.x),
-                 (rk.generalized_forces(robot, q[pose], qd[pose]), at.Q),
-                 (rk.nullspace_projector(robot, q[pose]), at.N),
-                 (rk.nullspace_projector_dot(robot, q[pose], qd[pose]), at.N_dot),
-                 (rk.orthogonal_complement(robot, q[pose]), at.F), (rk.control_matrix(robot, q[pose]), at.A),
-                 (rk.orthogonal_complement_dot(robot, q[pose], qd[pose], (0, 2)), at.using((0, 2)).F_dot),
-                 (rk.redundant_control_matrix(robot, q[pose]), at.A_tilde),
-                 *zip(rk.minimal_dynamics(robot, q[pose], qd[pose]), at.minimal, strict=True),
-                 *zip(rk.redundant_dynamics(robot, q[pose], qd[pose]), at.redundant, strict=True)]
+        pairs = [
+            (rk.constraint_jacobian(robot, q[pose]), at.J),
+            (rk.mass_matrix(robot, q[pose]), at.G),
+            (rk.constraint_jacobian_dot(robot, q[pose], qd[pose]), at.J_dot),
+            (rk.coriolis_matrix(robot, q[pose], qd[pose]), at.C),
+            (rk.forward_kinematics(robot, q[pose]), at.x),
+            (rk.generalized_forces(robot, q[pose], qd[pose]), at.Q),
+            (rk.nullspace_projector(robot, q[pose]), at.N),
+            (rk.nullspace_projector_dot(robot, q[pose], qd[pose]), at.N_dot),
+            (rk.orthogonal_complement(robot, q[pose]), at.F),
+            (rk.control_matrix(robot, q[pose]), at.A),
+            (rk.orthogonal_complement_dot(robot, q[pose], qd[pose], (0, 2)), at.using((0, 2)).F_dot),
+            (rk.redundant_control_matrix(robot, q[pose]), at.A_tilde),
+            *zip(rk.minimal_dynamics(robot, q[pose], qd[pose]), at.minimal, strict=True),
+            *zip(rk.redundant_dynamics(robot, q[pose], qd[pose]), at.redundant, strict=True),
+        ]
         for function, attribute in pairs:
             assert np.array_equal(function, attribute)
             function[...] = 0.0
@@ -147,8 +152,9 @@ def test_one_pose_many_rates_and_the_other_way_round():
         for k in range(4):
             one = rk.at(TESTBED, a if a.ndim == 1 else a[k % len(a)], b if b.ndim == 1 else b[k])
             for name in MOVING:
-                assert_allclose(getattr(at, name)[k], getattr(one, name), rtol=0,
-                                atol=1e-12 * np.abs(getattr(one, name)).max())
+                assert_allclose(
+                    getattr(at, name)[k], getattr(one, name), rtol=0, atol=1e-12 * np.abs(getattr(one, name)).max()
+                )
 
 
 def test_attributes_are_kept_and_read_only():
@@ -195,9 +201,14 @@ def test_what_needs_rates_says_so():
 
 def test_bad_poses_are_refused_at_once():
     q, qd, _, _ = random_motion(TESTBED, 3)
-    for args, name in (((q[:, :5],), "q has shape"), ((q * np.nan,), r"q\[0, 0\] = nan"), ((None,), "q = None"),
-                       ((q, qd[:, :4]), "qd has shape"), ((q, "fast"), "qd = 'fast'"),
-                       ((q, qd[:2]), "the leading axes do not fit together")):
+    for args, name in (
+        ((q[:, :5],), "q has shape"),
+        ((q * np.nan,), r"q\[0, 0\] = nan"),
+        ((None,), "q = None"),
+        ((q, qd[:, :4]), "qd has shape"),
+        ((q, "fast"), "qd = 'fast'"),
+        ((q, qd[:2]), "the leading axes do not fit together"),
+    ):
         with pytest.raises(ValueError, match=name):
             rk.at(TESTBED, *args)
     for bad in ((0, 0), (0, 6), (0,), "01"):

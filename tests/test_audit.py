@@ -55,8 +55,11 @@ def test_eq_10_rank_of_the_control_vector_fields():
     r"""(10): $\alpha(q) := \mathrm{rank}\overline{M}(q)$; M is defined nowhere; the mass matrix it cannot be."""
     # At the midpoint of a base side a mixed mode loses a direction; the rank of the mass matrix does not notice.
     modes = [m for m in rk.working_modes(TESTBED) if abs(m.sum()) == 1]
-    poses = [(TESTBED.replace(mode=m), rk.inverse_kinematics(TESTBED, (TESTBED.base[i] + TESTBED.base[i - 1]) / 2, m))
-             for m in modes for i in range(3)]
+    poses = [
+        (TESTBED.replace(mode=m), rk.inverse_kinematics(TESTBED, (TESTBED.base[i] + TESTBED.base[i - 1]) / 2, m))
+        for m in modes
+        for i in range(3)
+    ]
     robot, q = next((robot, q) for robot, q in poses if np.abs(rk.distal_cross_products(robot, q)).max() < 1e-12)
     mass, _, _ = rk.minimal_dynamics(robot, q, 0 * q)
     assert np.linalg.matrix_rank(mass) == 2
@@ -92,8 +95,10 @@ def test_section_3_1_antagonism_is_of_the_pd_scheme_12_and_does_not_exist_under_
     assert (norm(mv(prestress, model_based)) / norm(model_based)).max() < 1e-12
     target = rk.Desired(3, X, np.zeros(2), np.zeros(2), Q, 0 * Q, 0 * Q)
     pd, ctc = rk.PD(7.05, 0.225), rk.CTC(400.0, 40.0, None)
-    left = [np.abs(rk.prestress_projector(A) @ law.torque(TESTBED, Q, 0 * Q, Q[:3] + OFFSET, np.zeros(3), target)).max()
-            for law in (pd, ctc)]
+    left = [
+        np.abs(rk.prestress_projector(A) @ law.torque(TESTBED, Q, 0 * Q, Q[:3] + OFFSET, np.zeros(3), target)).max()
+        for law in (pd, ctc)
+    ]
     assert left[0] > 1e-2 and left[1] < 1e-15
 
 
@@ -263,8 +268,10 @@ def redundant_apd_lines(e_x):
     F = rk.orthogonal_complement(FRICTIONLESS, q_d)
     qd_d = F @ xd
     qdd_d = F @ xdd + rk.orthogonal_complement_dot(FRICTIONLESS, q_d, qd_d) @ xd
-    N, G, C = (f(FRICTIONLESS, Q) for f in (rk.nullspace_projector, rk.mass_matrix, lambda robot, q:
-                                            rk.coriolis_matrix(robot, q, qd)))
+    N, G, C = (
+        f(FRICTIONLESS, Q)
+        for f in (rk.nullspace_projector, rk.mass_matrix, lambda robot, q: rk.coriolis_matrix(robot, q, qd))
+    )
     Gt, Ct, _ = rk.redundant_dynamics(FRICTIONLESS, Q, qd)
     pinv = rk.explicit_pseudoinverse(A_TILDE, (0, 1))
     desired = rk.Desired(3, X - e_x, xd, xdd, q_d, qd_d, qdd_d)
@@ -458,8 +465,12 @@ def test_fig_9_text_model_based_laws_leave_no_torque_at_rest_either():
     # nothing is left, with any offsets and any model.
     wrong = FRICTIONLESS.replace(lengths=0.202, base=FRICTIONLESS.base + [[1e-3, 0], [0, 1e-3], [-1e-3, 0]])
     path = rk.hold(FRICTIONLESS, X, duration=3.0)
-    laws = [rk.RedundantCTC(400.0, 40.0), rk.RedundantCTC([400.0] * 3, [40.0] * 3), rk.RedundantAPD(5.0, 0.2),
-            rk.CTC(400.0, 40.0, None)]
+    laws = [
+        rk.RedundantCTC(400.0, 40.0),
+        rk.RedundantCTC([400.0] * 3, [40.0] * 3),
+        rk.RedundantAPD(5.0, 0.2),
+        rk.CTC(400.0, 40.0, None),
+    ]
     for law in laws:
         for model in (None, wrong):
             run = rk.simulate(FRICTIONLESS, law, path, OFFSET, model=model)
@@ -489,9 +500,14 @@ def test_fig_3_straight_lines_in_joint_space_disagree_without_any_offset():
         n = rk.null_vector(FRICTIONLESS, closed)
         worst.append(np.abs(np.sum(n * (angles - closed[:, :3]), axis=1)).max())
     # One piece: the distance from the nearest angles of a closed machine, found by a minimization.
-    far = [least_squares(lambda x, q_a=q_a: base_angles(x) - q_a, point, xtol=1e-12).cost
-           for q_a, point in zip((1 - s[:, None]) * base_angles(start) + s[:, None] * base_angles(end),
-                                 start + s[:, None] * (end - start), strict=True)]
+    far = [
+        least_squares(lambda x, q_a=q_a: base_angles(x) - q_a, point, xtol=1e-12).cost
+        for q_a, point in zip(
+            (1 - s[:, None]) * base_angles(start) + s[:, None] * base_angles(end),
+            start + s[:, None] * (end - start),
+            strict=True,
+        )
+    ]
     assert_allclose(worst[0], np.sqrt(2 * max(far)), rtol=1e-6)
     assert_allclose(1e3 * worst[0], 128.6, atol=0.1)  # what errata and lesson 04 print
     # Short pieces: a chord misses its curve by h^2 / 8 times the second derivative, here along n.
@@ -513,8 +529,9 @@ def test_section_3_1_inherent_antagonism_of_synchronous_set_points_is_small():
 def test_after_table_1_mechanical_work_is_unaltered_in_sum_only():
     path = rk.triangle(TESTBED)
     law = rk.PD(7.05, 0.225)
-    plain, filtered = (rk.mechanical_work(rk.simulate(TESTBED, one, path, OFFSET))
-                       for one in (law, rk.AntagonismFilter(law)))
+    plain, filtered = (
+        rk.mechanical_work(rk.simulate(TESTBED, one, path, OFFSET)) for one in (law, rk.AntagonismFilter(law))
+    )
     assert abs(plain.sum() - filtered.sum()) < 0.01 * filtered.sum()
     assert np.abs(plain - filtered).max() > 0.1 * filtered.sum()  # per drive it is another work
 

@@ -39,20 +39,42 @@ def on(f, **good):
     return pytest.param(lambda **kw: f(TESTBED, **kw), good, id=f.__name__)
 
 
-
 motion = {"q": Q, "qd": QD}
 CALLS = [
-    on(rk.arm_vectors, q=Q), on(rk.tips, q=Q), on(rk.forward_kinematics, q=Q), on(rk.loop_constraints, q=Q),
-    on(rk.constraint_jacobian, q=Q), on(rk.constraint_jacobian_dot, **motion), on(rk.reachable, x=X),
-    on(rk.working_mode, q=Q), on(rk.inverse_kinematics, x=X, mode=np.ones((5, 3))), on(rk.close_loops, q=Q),
-    on(rk.estimate_pose, q_a=Q[:, :3], guess=X), on(rk.mass_matrix, q=Q), on(rk.coriolis_matrix, **motion),
-    on(rk.generalized_forces, **motion), on(rk.orthogonal_complement, q=Q), on(rk.orthogonal_complement_dot, **motion),
-    on(rk.minimal_dynamics, **motion), on(rk.constraint_rank, q=Q), on(rk.degree_of_freedom, q=Q),
-    on(rk.nullspace_projector, q=Q), on(rk.nullspace_projector_dot, **motion), on(rk.redundant_dynamics, **motion),
-    on(rk.forward_dynamics, **motion, c=C), on(rk.kinetic_energy, **motion), on(rk.potential_energy, q=Q),
-    on(rk.at, q=Q), on(rk.control_matrix, q=Q), on(rk.redundant_control_matrix, q=Q), on(rk.degree_of_actuation, q=Q),
-    on(rk.actuation_type, q=Q), on(rk.control_vector_fields, q=Q), on(rk.distal_cross_products, q=Q),
-    on(rk.null_vector, q=Q), on(rk.inverse_dynamics, **motion, qdd=QDD, prestress=C),
+    on(rk.arm_vectors, q=Q),
+    on(rk.tips, q=Q),
+    on(rk.forward_kinematics, q=Q),
+    on(rk.loop_constraints, q=Q),
+    on(rk.constraint_jacobian, q=Q),
+    on(rk.constraint_jacobian_dot, **motion),
+    on(rk.reachable, x=X),
+    on(rk.working_mode, q=Q),
+    on(rk.inverse_kinematics, x=X, mode=np.ones((5, 3))),
+    on(rk.close_loops, q=Q),
+    on(rk.estimate_pose, q_a=Q[:, :3], guess=X),
+    on(rk.mass_matrix, q=Q),
+    on(rk.coriolis_matrix, **motion),
+    on(rk.generalized_forces, **motion),
+    on(rk.orthogonal_complement, q=Q),
+    on(rk.orthogonal_complement_dot, **motion),
+    on(rk.minimal_dynamics, **motion),
+    on(rk.constraint_rank, q=Q),
+    on(rk.degree_of_freedom, q=Q),
+    on(rk.nullspace_projector, q=Q),
+    on(rk.nullspace_projector_dot, **motion),
+    on(rk.redundant_dynamics, **motion),
+    on(rk.forward_dynamics, **motion, c=C),
+    on(rk.kinetic_energy, **motion),
+    on(rk.potential_energy, q=Q),
+    on(rk.at, q=Q),
+    on(rk.control_matrix, q=Q),
+    on(rk.redundant_control_matrix, q=Q),
+    on(rk.degree_of_actuation, q=Q),
+    on(rk.actuation_type, q=Q),
+    on(rk.control_vector_fields, q=Q),
+    on(rk.distal_cross_products, q=Q),
+    on(rk.null_vector, q=Q),
+    on(rk.inverse_dynamics, **motion, qdd=QDD, prestress=C),
     on(rk.required_wrench, **motion, qdd=QDD),
     pytest.param(lambda **kw: rk.lyapunov_function(TESTBED, **kw, K_P=1.0), {"q": Q, "e": Q, "ed": QD}, id="lyapunov"),
     pytest.param(lambda **kw: rk.steady_state_error(A, 1.0, **kw), {"offset": C, "wrench": X}, id="steady_error"),
@@ -60,15 +82,19 @@ CALLS = [
     pytest.param(lambda c: rk.copper_loss(TESTBED, c, 1e-3), {"c": C}, id="copper_loss"),
 ]
 TALL = {
-    "singular_values": rk.singular_values, "null_basis": rk.null_basis, "common_sign": rk.common_sign,
+    "singular_values": rk.singular_values,
+    "null_basis": rk.null_basis,
+    "common_sign": rk.common_sign,
     "weighted_pseudoinverse": rk.weighted_pseudoinverse,
-    "prestress_projector": rk.prestress_projector, "antagonism_filter": rk.antagonism_filter,
+    "prestress_projector": rk.prestress_projector,
+    "antagonism_filter": rk.antagonism_filter,
     "command_filter": lambda A: rk.command_filter(A, 1.0),
     "steady_state_error": lambda A: rk.steady_state_error(A, 1.0, [0.1, 0.1, 0.1]),
     "steady_state_torque": lambda A: rk.steady_state_torque(A, 1.0, [0.1, 0.1, 0.1]),
 }
 WIDE = {
-    "select_independent": rk.select_independent, "closed_loop_projector": rk.closed_loop_projector,
+    "select_independent": rk.select_independent,
+    "closed_loop_projector": rk.closed_loop_projector,
     "explicit_pseudoinverse": lambda A_tilde: rk.explicit_pseudoinverse(A_tilde, (0, 1)),
 }
 
@@ -98,8 +124,10 @@ def test_arrays(call, good):
 @pytest.mark.parametrize("name", [*TALL, *WIDE, "effective_gain"])
 def test_matrices(name):
     call, good, argument = {
-        **{k: (f, A, "A") for k, f in TALL.items()}, **{k: (f, A_TILDE, "A_tilde") for k, f in WIDE.items()},
-        "effective_gain": (lambda F: rk.effective_gain(F, np.eye(F.shape[-2] if np.ndim(F) > 1 else 6)), F, "F")}[name]
+        **{k: (f, A, "A") for k, f in TALL.items()},
+        **{k: (f, A_TILDE, "A_tilde") for k, f in WIDE.items()},
+        "effective_gain": (lambda F: rk.effective_gain(F, np.eye(F.shape[-2] if np.ndim(F) > 1 else 6)), F, "F"),
+    }[name]
     call(good)
     odd = [good * np.nan, good + 0j, good.astype(str), good > 0, None, "A", 1.0, np.zeros(3), np.swapaxes(good, -1, -2)]
     for bad in odd:
@@ -119,8 +147,11 @@ def test_leading_axes_of_matrices():
         refused(rk.effective_gain, "K", F, bad)
 
 
-@pytest.mark.parametrize("independent", [(0, 0), (0,), (0, 1, 2), (0, 6), (-1, 2), (0.5, 1), "01", 3, (True, False), [],
-                                         (None, 1), ((0, 1), (1, 2))], ids=str)
+@pytest.mark.parametrize(
+    "independent",
+    [(0, 0), (0,), (0, 1, 2), (0, 6), (-1, 2), (0.5, 1), "01", 3, (True, False), [], (None, 1), ((0, 1), (1, 2))],
+    ids=str,
+)
 def test_choice_of_coordinates(independent):
     for f in (rk.orthogonal_complement, rk.control_matrix, rk.control_vector_fields):
         refused(f, "independent", TESTBED, Q, independent)
@@ -130,8 +161,14 @@ def test_choice_of_coordinates(independent):
     refused(rk.explicit_pseudoinverse, "rows", A_TILDE, independent)
 
 
-ROWS = [np.zeros((5, 2), int), np.full((5, 2), 3), np.array([[0, 1]] * 4), np.zeros((5, 3), int),
-        np.array([[0.0, 1.0]] * 5), np.array([[-1, 1]] * 5)]
+ROWS = [
+    np.zeros((5, 2), int),
+    np.full((5, 2), 3),
+    np.array([[0, 1]] * 4),
+    np.zeros((5, 3), int),
+    np.array([[0.0, 1.0]] * 5),
+    np.array([[-1, 1]] * 5),
+]
 
 
 @pytest.mark.parametrize("rows", ROWS, ids=range(len(ROWS)))
@@ -139,9 +176,23 @@ def test_row_choices(rows):
     refused(rk.explicit_pseudoinverse, "rows", A_TILDE, rows)
 
 
-NOT_SPD = [0.0, -1.0, np.nan, [1.0, 2.0], [1.0, -1.0, 1.0], -np.eye(3), np.zeros((3, 3)), np.ones((3, 3)), np.eye(4),
-           np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]]), np.array([[1.0, 2, 0], [2, 1, 0], [0, 0, 1]]), "I", [],
-           True, 1j]
+NOT_SPD = [
+    0.0,
+    -1.0,
+    np.nan,
+    [1.0, 2.0],
+    [1.0, -1.0, 1.0],
+    -np.eye(3),
+    np.zeros((3, 3)),
+    np.ones((3, 3)),
+    np.eye(4),
+    np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[1.0, 2, 0], [2, 1, 0], [0, 0, 1]]),
+    "I",
+    [],
+    True,
+    1j,
+]
 
 
 @pytest.mark.parametrize("bad", NOT_SPD, ids=range(len(NOT_SPD)))
@@ -152,11 +203,14 @@ def test_weights_and_gains(bad):
     refused(rk.command_filter, "K", A, bad)
     refused(rk.steady_state_error, "K_P", A, bad, 0.01 * C)
     refused(rk.steady_state_torque, "K_P", A, bad, 0.01 * C)
-    for law, name in itertools.product((rk.PD, rk.APD, rk.CTC, rk.SwitchedCTC, rk.RedundantAPD, rk.RedundantCTC),
-                                       ("K_P", "K_D")):
+    for law, name in itertools.product(
+        (rk.PD, rk.APD, rk.CTC, rk.SwitchedCTC, rk.RedundantAPD, rk.RedundantCTC), ("K_P", "K_D")
+    ):
+
         def use(law=law, name=name):
             made = law(**({"K_P": 1.0, "K_D": 1.0} | {name: bad}))
             made.torque(TESTBED, Q, QD, Q[:, :3], QD[:, :3], SAMPLE)
+
         if not (np.shape(bad) == (2,) and law in (rk.APD, rk.CTC, rk.SwitchedCTC)):
             refused(use, name)
     refused(lambda: rk.CTC(1.0, 1.0, W=bad).torque(TESTBED, Q, QD, Q[:, :3], QD[:, :3], SAMPLE), "W")
@@ -175,8 +229,16 @@ def test_options_of_the_laws():
     refused(switched.choose, "current", TESTBED, Q[0], (0, 5))
     refused(switched.pairs, "q", TESTBED, Q[0])
     assert switched.pairs(TESTBED, Q[:0]).shape == (0, 2)
-    laws = (pd, rk.AntagonismFilter(pd), rk.CommandFilter(pd), rk.APD(1.0, 1.0), rk.CTC(1.0, 1.0, None), switched,
-            rk.RedundantAPD(1.0, 1.0), rk.RedundantCTC(1.0, 1.0))
+    laws = (
+        pd,
+        rk.AntagonismFilter(pd),
+        rk.CommandFilter(pd),
+        rk.APD(1.0, 1.0),
+        rk.CTC(1.0, 1.0, None),
+        switched,
+        rk.RedundantAPD(1.0, 1.0),
+        rk.RedundantCTC(1.0, 1.0),
+    )
     for law in laws:
         refused(law.torque, "q_a", TESTBED, Q, QD, Q[:, :2], QD[:, :3], SAMPLE)
         refused(law.torque, "qd_a", TESTBED, Q, QD, Q[:, :3], QD[:, :3] * np.nan, SAMPLE)
@@ -284,8 +346,18 @@ def test_arguments_of_the_paths():
 def test_question_for_a_place_of_rest():
     good = {"q": Q[0], "K_P": 7.0, "offset": C[0], "quantum": 3e-3, "friction": 4e-3}
     rk.rest_exists(TESTBED, **good)
-    bad_values = (("q", Q), ("q", Q[0] * np.nan), ("K_P", -1.0), ("K_P", [1.0, 2.0]), ("offset", C), ("offset", 0.0),
-                  ("quantum", 0.0), ("quantum", None), ("friction", -1.0), ("friction", [0.1, 0.1, 0.1]))
+    bad_values = (
+        ("q", Q),
+        ("q", Q[0] * np.nan),
+        ("K_P", -1.0),
+        ("K_P", [1.0, 2.0]),
+        ("offset", C),
+        ("offset", 0.0),
+        ("quantum", 0.0),
+        ("quantum", None),
+        ("friction", -1.0),
+        ("friction", [0.1, 0.1, 0.1]),
+    )
     for name, bad in bad_values:
         refused(rk.rest_exists, name, TESTBED, **(good | {name: bad}))
     refused(rk.antagonism_form, "K_P", TESTBED, PATH, [1.0, 2.0])

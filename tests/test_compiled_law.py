@@ -64,8 +64,23 @@ def test_every_matrix_of_at(name):
     @rk.compiled(at="desired")
     def weigh(t, q_a, qd_a, d, at):
         total, k = 0.0, 0
-        for M in (at.F, at.F_dot, at.A, at.J, at.J_dot, at.N, at.N_dot, at.G, at.C, at.A_tilde, at.A_tilde_T_pinv,
-                  at.minimal[0], at.minimal[1], at.redundant[0], at.redundant[1]):
+        for M in (
+            at.F,
+            at.F_dot,
+            at.A,
+            at.J,
+            at.J_dot,
+            at.N,
+            at.N_dot,
+            at.G,
+            at.C,
+            at.A_tilde,
+            at.A_tilde_T_pinv,
+            at.minimal[0],
+            at.minimal[1],
+            at.redundant[0],
+            at.redundant[1],
+        ):
             for i in range(M.shape[0]):
                 for j in range(M.shape[1]):
                     k += 1

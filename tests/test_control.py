@@ -58,8 +58,10 @@ def test_force_filter_removes_antagonism_and_nothing_else():
 def test_command_filter_equals_the_force_filter_only_for_equal_gains():
     q, qd, desired = state_and_target(TESTBED)
     A, offset = rk.control_matrix(TESTBED, q), np.array([0.004, -0.002, 0.005])
-    pair = lambda pd: [torque(f(pd), TESTBED, q, qd, desired, offset)  # noqa: E731
-                       for f in (rk.AntagonismFilter, rk.CommandFilter)]
+    pair = lambda pd: [
+        torque(f(pd), TESTBED, q, qd, desired, offset)  # noqa: E731
+        for f in (rk.AntagonismFilter, rk.CommandFilter)
+    ]
     force, command = pair(rk.PD(7.05, 0.225))
     assert_allclose(force, command, atol=1e-14)
     force, command = pair(rk.PD([4.0, 7.0, 10.0], [0.2, 0.2, 0.3]))
@@ -87,10 +89,15 @@ def test_energy_saved_by_the_filter_is_that_of_the_null_torque():
 
 # (19)-(20), (28), (32): perfect tracking without errors.
 LAWS = {
-    "APD": rk.APD(50.0, 5.0), "APD in x": rk.APD(50.0, 5.0, None), "CTC": rk.CTC(400.0, 40.0, (0, 2)),
-    "CTC in x": rk.CTC(400.0, 40.0, None, W=[1.0, 2.0, 3.0]), "CTC, elbows": rk.CTC(400.0, 40.0, (3, 5)),
-    "switched": rk.SwitchedCTC(400.0, 40.0), "redundant APD": rk.RedundantAPD(50.0, 5.0),
-    "redundant CTC": rk.RedundantCTC(400.0, 40.0), "line 2": rk.RedundantCTC(400.0, 40.0, projected=False),
+    "APD": rk.APD(50.0, 5.0),
+    "APD in x": rk.APD(50.0, 5.0, None),
+    "CTC": rk.CTC(400.0, 40.0, (0, 2)),
+    "CTC in x": rk.CTC(400.0, 40.0, None, W=[1.0, 2.0, 3.0]),
+    "CTC, elbows": rk.CTC(400.0, 40.0, (3, 5)),
+    "switched": rk.SwitchedCTC(400.0, 40.0),
+    "redundant APD": rk.RedundantAPD(50.0, 5.0),
+    "redundant CTC": rk.RedundantCTC(400.0, 40.0),
+    "line 2": rk.RedundantCTC(400.0, 40.0, projected=False),
     "printed rule": rk.RedundantCTC(400.0, 40.0, rule="printed"),
 }
 
@@ -209,8 +216,15 @@ def test_fixed_pair_feedback_grows_at_its_singularity_and_the_redundant_one_does
     assert redundant.max() < 2 * np.median(redundant) < 0.1 * fixed.max()
     away = q[np.argsort(cross)[-50:]]
     none, ones = np.zeros((50, 2)), np.ones((50, 2))
-    still = rk.Desired(3, rk.forward_kinematics(FRICTIONLESS, away), none, ones, away, 0 * away,
-                       mv(rk.orthogonal_complement(FRICTIONLESS, away), ones))
+    still = rk.Desired(
+        3,
+        rk.forward_kinematics(FRICTIONLESS, away),
+        none,
+        ones,
+        away,
+        0 * away,
+        mv(rk.orthogonal_complement(FRICTIONLESS, away), ones),
+    )
     one = torque(rk.CTC(400, 40, (1, 2)), FRICTIONLESS, away, 0 * away, still)
     two = torque(rk.RedundantCTC(400, 40), FRICTIONLESS, away, 0 * away, still)
     assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
@@ -257,8 +271,11 @@ def test_lyapunov_function_falls_at_the_rate_of_the_damping():
     assert np.all(np.diff(V) <= 1e-12)
     assert_allclose(V[0] - V, run.y[4], atol=1e-7 * V[0])
     # Without elbow gains too: the damping of the drives alone.
-    assert_allclose(rk.lyapunov_function(ROBOT, q, q - target, qd, [40.0] * 3),
-                    rk.kinetic_energy(ROBOT, q, qd) + 20 * ((q - target)[:, :3] ** 2).sum(-1), rtol=1e-9)
+    assert_allclose(
+        rk.lyapunov_function(ROBOT, q, q - target, qd, [40.0] * 3),
+        rk.kinetic_energy(ROBOT, q, qd) + 20 * ((q - target)[:, :3] ** 2).sum(-1),
+        rtol=1e-9,
+    )
 
 
 @pytest.mark.parametrize("gains", [(40.0, 1.5), (np.full(3, 40.0), np.full(3, 1.5))], ids=["all joints", "(29)"])
@@ -290,8 +307,10 @@ def test_gains_29_on_the_driven_joints():
     feedback = K_P * (q - desired.q) + K_D * (qd - desired.qd)
     G, C, Q = rk.redundant_dynamics(ROBOT, q, qd)
     pinv = np.linalg.pinv(T(rk.redundant_control_matrix(ROBOT, q)), rcond=1e-9)
-    for law, expected in ((rk.RedundantAPD, mv(G, desired.qdd) + mv(C, desired.qd) + Q - feedback),
-                          (rk.RedundantCTC, mv(G, desired.qdd - feedback) + mv(C, qd) + Q)):
+    for law, expected in (
+        (rk.RedundantAPD, mv(G, desired.qdd) + mv(C, desired.qd) + Q - feedback),
+        (rk.RedundantCTC, mv(G, desired.qdd - feedback) + mv(C, qd) + Q),
+    ):
         found = torque(law(K_P[:3], K_D[:3]), ROBOT, q, qd, desired)
         assert_allclose(found, mv(pinv, expected), rtol=0, atol=1e-9 * np.abs(found).max())
 
@@ -301,8 +320,14 @@ def test_the_two_lines_of_28_are_two_laws():
     q, qd, desired = state_and_target(ROBOT)
     pinv = np.linalg.pinv(T(rk.redundant_control_matrix(ROBOT, q)), rcond=1e-9)
     G, C, Q = rk.mass_matrix(ROBOT, q), rk.coriolis_matrix(ROBOT, q, qd), rk.generalized_forces(ROBOT, q, qd)
-    line_2 = lambda desired: mv(pinv, mv(G, desired.qdd) + mv(C, desired.qd) + Q  # noqa: E731
-                                - 50.0 * (q - desired.q) - 5.0 * (qd - desired.qd))
+    line_2 = lambda desired: mv(
+        pinv,
+        mv(G, desired.qdd)
+        + mv(C, desired.qd)
+        + Q  # noqa: E731
+        - 50.0 * (q - desired.q)
+        - 5.0 * (qd - desired.qd),
+    )
     law = rk.RedundantAPD(50.0, 5.0)
     apart = norm(torque(law, ROBOT, q, qd, desired) - line_2(desired)) / norm(line_2(desired))
     assert np.median(apart) > 1e-4
@@ -339,8 +364,13 @@ def stiffness(law, robot, x):
 
     h = 1e-4
     weights = {1: 2 / 3, 2: -1 / 12}
-    slope = lambda e: sum(w * (acceleration(x + k * h * e) - acceleration(x - k * h * e))  # noqa: E731
-                          for k, w in weights.items()) / h
+    slope = lambda e: (
+        sum(
+            w * (acceleration(x + k * h * e) - acceleration(x - k * h * e))  # noqa: E731
+            for k, w in weights.items()
+        )
+        / h
+    )
     return -np.stack([slope(e) for e in np.eye(2)], axis=-1)
 
 

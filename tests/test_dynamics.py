@@ -83,15 +83,23 @@ def test_minimal_redundant_and_multiplier_form_agree(mode):
             assert worst(accelerations(robot, q[k], qd[k], c[k], pair), qdd[k]) < 1e-10
         # (23): G~ is singular by construction; its residual on the scale of its terms.
         G, C, Q = rk.redundant_dynamics(robot, q, qd)
-        terms = [np.einsum("kij,kj->ki", G, qdd), np.einsum("kij,kj->ki", C, qd), Q,
-                 -np.einsum("kji,kj->ki", rk.redundant_control_matrix(robot, q), c)]
+        terms = [
+            np.einsum("kij,kj->ki", G, qdd),
+            np.einsum("kij,kj->ki", C, qd),
+            Q,
+            -np.einsum("kji,kj->ki", rk.redundant_control_matrix(robot, q), c),
+        ]
         assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
         # (2) itself, and the constraints on acceleration level.
         J, J_dot = rk.constraint_jacobian(robot, q), rk.constraint_jacobian_dot(robot, q, qd)
         u = np.concatenate([c, 0 * c], axis=-1)
-        left = [np.einsum("kij,kj->ki", rk.mass_matrix(robot, q), qdd),
-                np.einsum("kij,kj->ki", rk.coriolis_matrix(robot, q, qd), qd), rk.generalized_forces(robot, q, qd),
-                np.einsum("kji,kj->ki", J, reaction), -u]
+        left = [
+            np.einsum("kij,kj->ki", rk.mass_matrix(robot, q), qdd),
+            np.einsum("kij,kj->ki", rk.coriolis_matrix(robot, q, qd), qd),
+            rk.generalized_forces(robot, q, qd),
+            np.einsum("kji,kj->ki", J, reaction),
+            -u,
+        ]
         assert (norm(sum(left)) / sum(map(norm, left))).max() < 1e-12
         closed = [np.einsum("kij,kj->ki", J, qdd), np.einsum("kij,kj->ki", J_dot, qd)]
         assert (norm(sum(closed)) / sum(map(norm, closed))).max() < 1e-11
@@ -165,6 +173,7 @@ def test_masses_of_a_single_moving_arm_by_hand():
 # Energy.
 def swing(robot, duration, torque):
     """x, xd and the work done, integrated by DOP853 from a moving start near the centroid."""
+
     def rate(t, state):
         x, xd = state[:2], state[2:4]
         q = rk.inverse_kinematics(robot, x)
@@ -267,14 +276,23 @@ def test_one_pose_and_a_trajectory_are_the_same_call():
         q, qd, _, _ = random_motion(robot, 12)
         c = np.random.default_rng(0).normal(0, 0.1, (12, robot.n_arms))
         pair = lambda f: lambda *v: f(*v, (0, 2))  # noqa: E731
-        calls = [(rk.mass_matrix, q), (rk.coriolis_matrix, q, qd), (rk.generalized_forces, q, qd),
-                 (rk.orthogonal_complement, q), (pair(rk.orthogonal_complement), q), (rk.nullspace_projector, q),
-                 (rk.orthogonal_complement_dot, q, qd), (pair(rk.orthogonal_complement_dot), q, qd),
-                 (rk.nullspace_projector_dot, q, qd), (rk.kinetic_energy, q, qd), (rk.potential_energy, q),
-                 *[(lambda *a, i=i: rk.minimal_dynamics(*a)[i], q, qd) for i in range(3)],
-                 *[(lambda *a, i=i: rk.minimal_dynamics(*a, (0, 2))[i], q, qd) for i in range(3)],
-                 *[(lambda *a, i=i: rk.redundant_dynamics(*a)[i], q, qd) for i in range(3)],
-                 *[(lambda *a, i=i: rk.forward_dynamics(*a)[i], q, qd, c) for i in range(2)]]
+        calls = [
+            (rk.mass_matrix, q),
+            (rk.coriolis_matrix, q, qd),
+            (rk.generalized_forces, q, qd),
+            (rk.orthogonal_complement, q),
+            (pair(rk.orthogonal_complement), q),
+            (rk.nullspace_projector, q),
+            (rk.orthogonal_complement_dot, q, qd),
+            (pair(rk.orthogonal_complement_dot), q, qd),
+            (rk.nullspace_projector_dot, q, qd),
+            (rk.kinetic_energy, q, qd),
+            (rk.potential_energy, q),
+            *[(lambda *a, i=i: rk.minimal_dynamics(*a)[i], q, qd) for i in range(3)],
+            *[(lambda *a, i=i: rk.minimal_dynamics(*a, (0, 2))[i], q, qd) for i in range(3)],
+            *[(lambda *a, i=i: rk.redundant_dynamics(*a)[i], q, qd) for i in range(3)],
+            *[(lambda *a, i=i: rk.forward_dynamics(*a)[i], q, qd, c) for i in range(2)],
+        ]
         for f, *args in calls:
             whole = f(robot, *args)
             scale = np.abs(whole).max()

@@ -102,8 +102,9 @@ print(" ".join(float(v).hex() for v in np.concatenate([study.energies.ravel(), s
 
 
 def numbers(**environment):
-    done = subprocess.run([sys.executable, "-c", SHORT], env={**os.environ, **environment}, capture_output=True,
-                          text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", SHORT], env={**os.environ, **environment}, capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
     return np.array([float.fromhex(v) for v in done.stdout.split()])
 

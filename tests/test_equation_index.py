@@ -53,8 +53,9 @@ def numbers(text):
 
 def names(tree):
     """What a piece of code uses: names and attributes."""
-    return ({node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-            | {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)})
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} | {
+        node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)
+    }
 
 
 @cache
@@ -63,8 +64,10 @@ def lesson(name):
     solved = NOTEBOOKS / "solutions" / f"{name}.ipynb"
     path = solved if solved.exists() else NOTEBOOKS / f"{name}.ipynb"
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    text = {kind: "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == kind)
-            for kind in ("markdown", "code")}
+    text = {
+        kind: "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == kind)
+        for kind in ("markdown", "code")
+    }
     code = "\n".join(line for line in text["code"].splitlines() if not line.lstrip().startswith(("%", "!")))
     return text["markdown"], names(ast.parse(code))
 
@@ -131,8 +134,11 @@ ALSO = {
 @pytest.mark.parametrize("name", [name for name in vars(rk) if callable(getattr(rk, name)) and name[0] != "_"])
 def test_docstrings_name_no_other_number(name):
     """A number in a docstring without its row is how a wrong number comes in: add the row, or say above what for."""
-    listed = {int(number_of(row).strip("()")) for row in NUMBERED
-              if name in {function.split(".")[0] for function in functions_of(row)}}
+    listed = {
+        int(number_of(row).strip("()"))
+        for row in NUMBERED
+        if name in {function.split(".")[0] for function in functions_of(row)}
+    }
     docstring = (getattr(rk, name).__doc__ or "").split(">>>")[0]  # an example may print (8, 20)
     assert numbers(docstring) <= listed | ALSO.get(name, set())
 
@@ -156,8 +162,10 @@ def letters(formula):
     """The letters of a formula with their accents, without words, fonts and layout."""
     formula = re.sub(r"\\(?:begin|end)\{\w+\}|\\(?:mathbf|mathrm|text|quad|cr|left|right)\b", " ", formula)
     formula = formula.replace(r"\overline", r"\bar").replace(r"\widetilde", r"\tilde")
-    return {"".join(sorted(re.findall("bar|tilde|ddot|dot|mathcal", accent))) + letter
-            for accent, letter in re.findall(LETTER, formula)}
+    return {
+        "".join(sorted(re.findall("bar|tilde|ddot|dot|mathcal", accent))) + letter
+        for accent, letter in re.findall(LETTER, formula)
+    }
 
 
 PRINTED = {int(number_of(row).strip("()")): letters(row[1]) for row in NUMBERED}
@@ -178,8 +186,9 @@ def test_named_test_evaluates_the_printed_formula(row):
     assert name in test_functions(file), f"{file} has no {name}"
     test = test_functions(file)[name]
     # Helpers of the same file that the test calls belong to it.
-    used = names(test) | {used for helper in names(test) & set(test_functions(file))
-                          for used in names(test_functions(file)[helper])}
+    used = names(test) | {
+        used for helper in names(test) & set(test_functions(file)) for used in names(test_functions(file)[helper])
+    }
     assert any(part.split(".")[-1] in used for part in functions_of(row)), f"{name} calls none of {functions_of(row)}"
     if row in NUMBERED:
         docstring = ast.get_docstring(test) or ""
@@ -258,10 +267,28 @@ def test_notation_table_gives_the_shapes_that_functions_return():
     A, A_tilde = rk.control_matrix(TESTBED, q), rk.redundant_control_matrix(TESTBED, q)
     per_drive = np.ones(m)
     values = vars(rk) | {
-        "np": np, "robot": TESTBED, "q": q, "qd": qd, "qdd": qdd, "q_a": q[:m], "offset": per_drive, "c": per_drive,
-        "prestress": per_drive, "x": np.zeros(2), "A": A, "A_tilde": A_tilde, "W": per_drive, "K_P": per_drive,
-        "K_D": per_drive, "independent": (0, 1), "rows": (0, 1), "e": q, "ed": qd,
-        "eta": rk.null_vector(TESTBED, q), "path": rk.triangle(TESTBED, dt=0.05)}
+        "np": np,
+        "robot": TESTBED,
+        "q": q,
+        "qd": qd,
+        "qdd": qdd,
+        "q_a": q[:m],
+        "offset": per_drive,
+        "c": per_drive,
+        "prestress": per_drive,
+        "x": np.zeros(2),
+        "A": A,
+        "A_tilde": A_tilde,
+        "W": per_drive,
+        "K_P": per_drive,
+        "K_D": per_drive,
+        "independent": (0, 1),
+        "rows": (0, 1),
+        "e": q,
+        "ed": qd,
+        "eta": rk.null_vector(TESTBED, q),
+        "path": rk.triangle(TESTBED, dt=0.05),
+    }
     for printed, identifier, unit, shape, meaning in NOTATION:
         value = eval(identifier.strip("`"), values)
         written = shape.replace("δ", "delta").replace("m(m − 1)/2", "m * (m - 1) // 2").replace(")", ",)")

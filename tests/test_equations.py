@@ -70,8 +70,12 @@ def test_eq_01():
 def test_eq_02():
     r"""(2): $G(q)\ddot{q} + C(q,\dot{q})\dot{q} + Q(q,\dot{q},t) + J^{T}(q)\lambda = u$."""
     qdd, reaction = rk.forward_dynamics(ROBOT, q, qd, c)
-    left = [mv(rk.mass_matrix(ROBOT, q), qdd), mv(rk.coriolis_matrix(ROBOT, q, qd), qd),
-            rk.generalized_forces(ROBOT, q, qd), mv(T(J), reaction)]
+    left = [
+        mv(rk.mass_matrix(ROBOT, q), qdd),
+        mv(rk.coriolis_matrix(ROBOT, q, qd), qd),
+        rk.generalized_forces(ROBOT, q, qd),
+        mv(T(J), reaction),
+    ]
     assert zero(*left, -u) < 1e-11
 
 
@@ -236,8 +240,9 @@ def test_eq_20():
     chosen = [k for k in range(len(pose)) if tuple(switched.choose(ROBOT, pose[k])) == (0, 1)]
     assert len(chosen) > 3
     for k in chosen:
-        assert_allclose(torque(switched, pose[k], rate[k], sample(d, k)), printed[k],
-                        atol=1e-10 * np.abs(printed[k]).max())
+        assert_allclose(
+            torque(switched, pose[k], rate[k], sample(d, k)), printed[k], atol=1e-10 * np.abs(printed[k]).max()
+        )
 
 
 def test_eq_21():
@@ -357,8 +362,16 @@ def test_eq_30():
     for law, k in ((on_all, [60] * 6), (on_drives, [60, 70, 80, 0, 0, 0])):
         K_P, K_D = np.diag(k), np.diag(k) / 10
         qdd, _ = rk.forward_dynamics(ROBOT, pose, rate, torque(law, pose, rate, d))
-        terms = [mv(Gt, qdd), -mv(D @ Gt, d.qdd), mv(Ct, rate), -mv(D @ Ct, d.qd), Qt, -mv(D, Qt),
-                 mv(D @ K_D, rate - d.qd), mv(D @ K_P, pose - d.q)]
+        terms = [
+            mv(Gt, qdd),
+            -mv(D @ Gt, d.qdd),
+            mv(Ct, rate),
+            -mv(D @ Ct, d.qd),
+            Qt,
+            -mv(D, Qt),
+            mv(D @ K_D, rate - d.qd),
+            mv(D @ K_P, pose - d.q),
+        ]
         assert zero(*terms) < 1e-10
 
 

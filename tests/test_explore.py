@@ -24,8 +24,11 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
 # Every public function that makes an explorer of a machine.
-NAMES = sorted(name for name, made in vars(explore).items()
-               if inspect.isfunction(made) and list(inspect.signature(made).parameters) == ["robot"])
+NAMES = sorted(
+    name
+    for name, made in vars(explore).items()
+    if inspect.isfunction(made) and list(inspect.signature(made).parameters) == ["robot"]
+)
 _made = {}
 
 
@@ -132,8 +135,10 @@ def test_theory_and_simulation_meet_in_the_steady_state_explorer():
     explorer.set(**{f"offset_{i}": 0.0 for i in (1, 2, 3)})
     assert explorer.numbers["rest torque"].startswith("0.0 / 0.0 / 0.0")
     explorer.set(offset_1=5.0)
-    theory, simulated = (np.array([float(v) for v in explorer.numbers[k].removesuffix(" mrad").split(" / ")])
-                         for k in ("error at rest, theory", "simulated"))
+    theory, simulated = (
+        np.array([float(v) for v in explorer.numbers[k].removesuffix(" mrad").split(" / ")])
+        for k in ("error at rest, theory", "simulated")
+    )
     assert np.abs(theory - simulated).max() < 0.05
 
 
@@ -186,8 +191,10 @@ def line(picture, slope, power=1.0):
 
 
 def light(**others):
-    controls = {"slope": explore.slider("slope in m/s", -3.0, 3.0, 0.1, 1.0),
-                "power": explore.slider("power", 1, 3, 1, 1)}
+    controls = {
+        "slope": explore.slider("slope in m/s", -3.0, 3.0, 0.1, 1.0),
+        "power": explore.slider("power", 1, 3, 1, 1),
+    }
     return explore.explorer(line, controls | others, {"a": {"xlabel": "time in s"}}, size=(3, 2))
 
 

@@ -64,8 +64,10 @@ def test_torque_limit(limit):
     assert_allclose(run.c, np.clip(wanted, -np.array(limit), np.array(limit)), rtol=0, atol=1e-14)
     assert (np.abs(wanted) > limit).any() and not (np.abs(wanted) > limit).all()
     # Two limits: the lower one counts.
-    assert_array_equal(observed([rk.TorqueLimit(limit), rk.TorqueLimit(1.0), rk.TorqueLimit(limit)])[0].c,
-                       observed([rk.TorqueLimit(np.minimum(limit, 1.0))])[0].c)
+    assert_array_equal(
+        observed([rk.TorqueLimit(limit), rk.TorqueLimit(1.0), rk.TorqueLimit(limit)])[0].c,
+        observed([rk.TorqueLimit(np.minimum(limit, 1.0))])[0].c,
+    )
 
 
 def test_dead_drive():
@@ -79,8 +81,9 @@ def test_dead_drive():
 
 @pytest.mark.parametrize("encoder", [None, 2000], ids=["ideal", "counts"])
 def test_offset_jump(encoder):
-    run, q, qd = observed([rk.OffsetJump(2, 0.1, -3e-3), rk.OffsetJump(2, 0.2, 1e-3), rk.OffsetJump(0, 0.0, 2e-3)],
-                          encoder=encoder)
+    run, q, qd = observed(
+        [rk.OffsetJump(2, 0.1, -3e-3), rk.OffsetJump(2, 0.2, 1e-3), rk.OffsetJump(0, 0.0, 2e-3)], encoder=encoder
+    )
     added = np.zeros_like(q)
     added[:, 0] = 2e-3
     added[100:, 2] = -3e-3
@@ -92,8 +95,9 @@ def test_offset_jump(encoder):
     assert_array_equal(qd, run.qd_a)
 
 
-@pytest.mark.parametrize(("start", "stop", "first", "last"), [(0.1, 0.2, 100, 199), (0.0, 0.05, 0, 49),
-                                                            (0.25, 1.0, 250, 300)])
+@pytest.mark.parametrize(
+    ("start", "stop", "first", "last"), [(0.1, 0.2, 100, 199), (0.0, 0.05, 0, 49), (0.25, 1.0, 250, 300)]
+)
 @pytest.mark.parametrize("encoder", [None, 2000], ids=["ideal", "counts"])
 def test_encoder_dropout_with_ideal_rates(start, stop, first, last, encoder):
     run, q, qd = observed([rk.EncoderDropout(1, start, stop)], encoder=encoder)
@@ -125,14 +129,27 @@ def test_a_jump_under_a_dropout_is_read_when_the_encoder_comes_back():
     assert_allclose(q, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.CommandFilter(PD), rk.CTC(900.0, 60.0, None),
-                                 rk.RedundantCTC(900.0, 60.0), rk.SwitchedCTC(900.0, 60.0)],
-                         ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law",
+    [
+        PD,
+        rk.AntagonismFilter(PD),
+        rk.CommandFilter(PD),
+        rk.CTC(900.0, 60.0, None),
+        rk.RedundantCTC(900.0, 60.0),
+        rk.SwitchedCTC(900.0, 60.0),
+    ],
+    ids=lambda law: type(law).__name__,
+)
 def test_laws_of_the_package_meet_the_same_faults(law):
     """The torques of a healthy controller on the readings, then the faults of the drives."""
     path = rk.circle(ROBOT, radius=0.05, duration=0.15)
-    faults = [rk.TorqueLimit(0.35), rk.DeadDrive(0, 0.12), rk.OffsetJump(1, 0.05, 2e-3),
-              rk.EncoderDropout(2, 0.03, 0.06)]
+    faults = [
+        rk.TorqueLimit(0.35),
+        rk.DeadDrive(0, 0.12),
+        rk.OffsetJump(1, 0.05, 2e-3),
+        rk.EncoderDropout(2, 0.03, 0.06),
+    ]
     run = rk.simulate(ROBOT, law, path, OFFSET, faults=faults)
     read, rate = run.q_a + OFFSET, run.qd_a.copy()
     read[50:, 1] += 2e-3
@@ -219,18 +236,28 @@ def test_the_same_in_a_data_file(tmp_path):
     given = rk.experiment(file)
     assert given.faults == (rk.DeadDrive(1, 0.1), rk.TorqueLimit([0.3, 0.3, np.inf]))
     assert given.sensors == rk.Sensors([1e-3, 0.0, 0.0], 2000, 2e-3)
-    run = rk.simulate(given.robot, given.law, given.trajectory, [1e-3, 0, 0], 2000, velocity_filter=2e-3,
-                      faults=[rk.DeadDrive(1, 0.1), rk.TorqueLimit([0.3, 0.3, np.inf])])
+    run = rk.simulate(
+        given.robot,
+        given.law,
+        given.trajectory,
+        [1e-3, 0, 0],
+        2000,
+        velocity_filter=2e-3,
+        faults=[rk.DeadDrive(1, 0.1), rk.TorqueLimit([0.3, 0.3, np.inf])],
+    )
     assert given.run() == run and not run.c[100:, 1].any()
     assert rk.experiment(file) == given == pickle.loads(pickle.dumps(given))
 
 
-@pytest.mark.parametrize(("text", "message"), [
-    ('[[fault]]\ndrive = 1\n', r"allowed: a table with kind = one of TorqueLimit, DeadDrive"),
-    ('[[fault]]\nkind = "DeadDrives"\n', r"unknown kind of fault 'DeadDrives' \(did you mean 'DeadDrive'\?\)"),
-    ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive lacks 'time'; needed: drive, time"),
-    ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\ntimes = 1\n', r"unknown entry of DeadDrive 'times' \(did you mean"),
-])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[fault]]\ndrive = 1\n", r"allowed: a table with kind = one of TorqueLimit, DeadDrive"),
+        ('[[fault]]\nkind = "DeadDrives"\n', r"unknown kind of fault 'DeadDrives' \(did you mean 'DeadDrive'\?\)"),
+        ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive lacks 'time'; needed: drive, time"),
+        ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\ntimes = 1\n', r"unknown entry of DeadDrive 'times' \(did you mean"),
+    ],
+)
 def test_mistakes_in_a_data_file(tmp_path, text, message):
     file = tmp_path / "broken.toml"
     file.write_text(TOML + text)
@@ -238,26 +265,35 @@ def test_mistakes_in_a_data_file(tmp_path, text, message):
         rk.experiment(file)
 
 
-@pytest.mark.parametrize(("make", "message"), [
-    (lambda: rk.TorqueLimit(-0.1), r"limit = -0\.1; allowed: >= 0"),
-    (lambda: rk.TorqueLimit(np.nan), "limit = nan; allowed: finite numbers"),
-    (lambda: rk.TorqueLimit(None), "limit = None is not numeric"),
-    (lambda: rk.TorqueLimit(np.ones((2, 2))), r"limit has shape \(2, 2\)"),
-    (lambda: rk.DeadDrive(-1, 0.1), "drive = -1; allowed: >= 0"),
-    (lambda: rk.DeadDrive(1.5, 0.1), r"drive = 1\.5; allowed: whole numbers"),
-    (lambda: rk.DeadDrive(1, -0.1), r"time = -0\.1; allowed: >= 0"),
-    (lambda: rk.DeadDrive(1, None), "time = None is not numeric"),
-    (lambda: rk.OffsetJump(1, 0.1, np.inf), "jump = inf; allowed: finite numbers"),
-    (lambda: rk.EncoderDropout(1, 0.2, 0.2), r"stop = 0\.2 s; allowed: later than start = 0\.2 s"),
-    (lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.DeadDrive(3, 0.1)]), "drive = 3 in .*; allowed: 0 to 2, drives"),
-    (lambda: rk.sweep(ROBOT, PD, PATH, OFFSET, faults=[rk.DeadDrive(3, 0.1)]), "drive = 3"),
-    (lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.TorqueLimit([1.0, 2.0])]), r"limit has shape \(2,\); .* \(3,\)"),
-    (lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]), "faults holds 'dead'; allowed: TorqueLimit, DeadDrive"),
-    (lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive), "faults holds .*; allowed: TorqueLimit"),
-    (lambda: rk.Sensors(encoder=0), "encoder = 0; allowed: > 0"),
-    (lambda: rk.Sensors(velocity_filter=-1.0), "velocity_filter = -1; allowed: >= 0"),
-    (lambda: rk.simulate(ROBOT, PD, PATH, sensors=2000), "sensors = 2000; allowed: a Sensors"),
-])
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rk.TorqueLimit(-0.1), r"limit = -0\.1; allowed: >= 0"),
+        (lambda: rk.TorqueLimit(np.nan), "limit = nan; allowed: finite numbers"),
+        (lambda: rk.TorqueLimit(None), "limit = None is not numeric"),
+        (lambda: rk.TorqueLimit(np.ones((2, 2))), r"limit has shape \(2, 2\)"),
+        (lambda: rk.DeadDrive(-1, 0.1), "drive = -1; allowed: >= 0"),
+        (lambda: rk.DeadDrive(1.5, 0.1), r"drive = 1\.5; allowed: whole numbers"),
+        (lambda: rk.DeadDrive(1, -0.1), r"time = -0\.1; allowed: >= 0"),
+        (lambda: rk.DeadDrive(1, None), "time = None is not numeric"),
+        (lambda: rk.OffsetJump(1, 0.1, np.inf), "jump = inf; allowed: finite numbers"),
+        (lambda: rk.EncoderDropout(1, 0.2, 0.2), r"stop = 0\.2 s; allowed: later than start = 0\.2 s"),
+        (
+            lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.DeadDrive(3, 0.1)]),
+            "drive = 3 in .*; allowed: 0 to 2, drives",
+        ),
+        (lambda: rk.sweep(ROBOT, PD, PATH, OFFSET, faults=[rk.DeadDrive(3, 0.1)]), "drive = 3"),
+        (
+            lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.TorqueLimit([1.0, 2.0])]),
+            r"limit has shape \(2,\); .* \(3,\)",
+        ),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]), "faults holds 'dead'; allowed: TorqueLimit, DeadDrive"),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive), "faults holds .*; allowed: TorqueLimit"),
+        (lambda: rk.Sensors(encoder=0), "encoder = 0; allowed: > 0"),
+        (lambda: rk.Sensors(velocity_filter=-1.0), "velocity_filter = -1; allowed: >= 0"),
+        (lambda: rk.simulate(ROBOT, PD, PATH, sensors=2000), "sensors = 2000; allowed: a Sensors"),
+    ],
+)
 def test_bad_faults_and_sensors(make, message):
     with pytest.raises(ValueError, match=message):
         make()

@@ -34,11 +34,19 @@ PURE_NUMBERS = {
 def world():
     robot = rk.load().replace(friction=0.0)
     path, law = rk.triangle(robot), rk.PD(7.05, 0.225)
-    runs = {"plain": rk.simulate(robot, law, path, OFFSET),
-            "filter": rk.simulate(robot, rk.AntagonismFilter(law), path, OFFSET)}
-    return {"robot": robot, "path": path, "law": law, "runs": runs, "run": runs["plain"],
-            "q": rk.inverse_kinematics(robot, [0.02, -0.03]),
-            "switched": rk.simulate(robot, rk.SwitchedCTC(900, 60), path)}
+    runs = {
+        "plain": rk.simulate(robot, law, path, OFFSET),
+        "filter": rk.simulate(robot, rk.AntagonismFilter(law), path, OFFSET),
+    }
+    return {
+        "robot": robot,
+        "path": path,
+        "law": law,
+        "runs": runs,
+        "run": runs["plain"],
+        "q": rk.inverse_kinematics(robot, [0.02, -0.03]),
+        "switched": rk.simulate(robot, rk.SwitchedCTC(900, 60), path),
+    }
 
 
 def scatter(k):
@@ -51,8 +59,10 @@ def values_first(xyv):
 
 
 CALLS = {
-    "plot_mode_maps": lambda w: (w["robot"], *values_first(rk.actuation_map(
-        w["robot"], mode=rk.working_modes(w["robot"]), n=41))),
+    "plot_mode_maps": lambda w: (
+        w["robot"],
+        *values_first(rk.actuation_map(w["robot"], mode=rk.working_modes(w["robot"]), n=41)),
+    ),
     "plot_parameterization_singularities": lambda w: (w["path"], np.array([0.0, 0.12])),
     "plot_prestress_maps": lambda w: (w["robot"],),
     "plot_available_forces": lambda w: (w["robot"], w["q"]),
@@ -73,8 +83,14 @@ CALLS = {
     "plot_pin_forces": lambda w: (w["robot"], w["q"], np.ones((3, 2))),
     "plot_working_modes": lambda w: (w["robot"], [0.02, -0.03]),
     "plot_synchronization": lambda w: (w["robot"], [0.0, 0.0], OFFSET),
-    "plot_joint_moves": lambda w: (w["robot"], [-0.1, -0.06], [0.1, -0.06], np.array([0.2, 0.1]), np.array([0.1, 0.03]),
-                                   4e-3),
+    "plot_joint_moves": lambda w: (
+        w["robot"],
+        [-0.1, -0.06],
+        [0.1, -0.06],
+        np.array([0.2, 0.1]),
+        np.array([0.1, 0.03]),
+        4e-3,
+    ),
     "plot_singular_poses": lambda w: (w["path"],),
     "plot_feedback_map": lambda w: (w["robot"], (0, 1)),
     "plot_feedback_along": lambda w: (w["path"],),
@@ -160,8 +176,10 @@ def test_arms_differ_in_lightness():
 def runs():
     robot = rk.load().replace(friction=0.0)
     path, law = rk.triangle(robot), rk.PD(7.05, 0.225)
-    return {"plain": rk.simulate(robot, law, path, OFFSET),
-            "filter": rk.simulate(robot, rk.AntagonismFilter(law, pose="true"), path, OFFSET)}
+    return {
+        "plain": rk.simulate(robot, law, path, OFFSET),
+        "filter": rk.simulate(robot, rk.AntagonismFilter(law, pose="true"), path, OFFSET),
+    }
 
 
 @pytest.fixture(autouse=True)
@@ -200,9 +218,11 @@ def test_distance_from_the_origin_of_the_torque_plane_is_the_torque(runs):
 
 def test_curves_carry_the_numbers_of_the_run_in_the_unit_of_the_axis(runs):
     plain, _ = runs.values()
-    for plot, values, unit in ((plotting.plot_torques, 1e3 * plain.c, "mN m"),
-                               (plotting.plot_errors, 1e3 * plain.error, "mrad"),
-                               (plotting.plot_antagonism, 1e3 * rk.antagonistic_torque(plain), "mN m")):
+    for plot, values, unit in (
+        (plotting.plot_torques, 1e3 * plain.c, "mN m"),
+        (plotting.plot_errors, 1e3 * plain.error, "mrad"),
+        (plotting.plot_antagonism, 1e3 * rk.antagonistic_torque(plain), "mN m"),
+    ):
         ax = plot(plain)
         assert ax.get_ylabel().endswith(f"in {unit}") and ax.get_xlabel() == "time in s"
         np.testing.assert_array_equal(np.stack([line.get_ydata() for line in ax.lines], axis=-1), values)

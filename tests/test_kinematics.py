@@ -25,8 +25,10 @@ def test_inverse_kinematics_closes_the_loops_and_forward_kinematics_inverts_it(r
 def test_constraints_are_ordered_tip1_tip3_minus_tip2():
     q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     length, B = 0.2, TESTBED.base
-    tips = [B[i] + length * np.array([np.cos(q[i]) + np.cos(q[i] + q[3 + i]), np.sin(q[i]) + np.sin(q[i] + q[3 + i])])
-            for i in range(3)]
+    tips = [
+        B[i] + length * np.array([np.cos(q[i]) + np.cos(q[i] + q[3 + i]), np.sin(q[i]) + np.sin(q[i] + q[3 + i])])
+        for i in range(3)
+    ]
     assert_allclose(rk.loop_constraints(TESTBED, q), np.concatenate([tips[0] - tips[1], tips[2] - tips[1]]), atol=1e-16)
     assert_allclose(rk.tips(TESTBED, q), tips, atol=1e-16)
 
@@ -110,8 +112,13 @@ def test_close_loops_finds_the_nearest_configuration(robot):
     # Stationary: the way to the rough pose is normal to V.
     assert np.abs(np.einsum("kij,ki->kj", rk.nullspace_projector(robot, q), q - rough)).max() < 1e-12
     for found, start in zip(q[:5], rough[:5], strict=True):
-        peer = minimize(lambda p, s=start: ((p - s) ** 2).sum(), start, method="SLSQP", tol=1e-14,
-                        constraints={"type": "eq", "fun": lambda p: rk.loop_constraints(robot, p)})
+        peer = minimize(
+            lambda p, s=start: ((p - s) ** 2).sum(),
+            start,
+            method="SLSQP",
+            tol=1e-14,
+            constraints={"type": "eq", "fun": lambda p: rk.loop_constraints(robot, p)},
+        )
         assert_allclose(found, peer.x, atol=1e-6)
 
 
@@ -192,10 +199,20 @@ def test_turning_the_machine_by_a_third_permutes_the_arms():
 # Leading axes.
 def test_one_pose_and_a_trajectory_are_the_same_call():
     q, qd, _, (x, _, _) = random_motion(TESTBED, 12)
-    for f, *args in ((rk.loop_constraints, q), (rk.constraint_jacobian, q), (rk.constraint_jacobian_dot, q, qd),
-                     (rk.forward_kinematics, q), (rk.tips, q), (rk.working_mode, q), (rk.inverse_kinematics, x),
-                     (rk.reachable, x), (rk.constraint_rank, q), (rk.degree_of_freedom, q), (rk.close_loops, q + 0.01),
-                     (rk.estimate_pose, q[:, :3] + [0.01, 0, -0.01], x)):
+    for f, *args in (
+        (rk.loop_constraints, q),
+        (rk.constraint_jacobian, q),
+        (rk.constraint_jacobian_dot, q, qd),
+        (rk.forward_kinematics, q),
+        (rk.tips, q),
+        (rk.working_mode, q),
+        (rk.inverse_kinematics, x),
+        (rk.reachable, x),
+        (rk.constraint_rank, q),
+        (rk.degree_of_freedom, q),
+        (rk.close_loops, q + 0.01),
+        (rk.estimate_pose, q[:, :3] + [0.01, 0, -0.01], x),
+    ):
         whole = f(TESTBED, *args)
         single = np.stack([f(TESTBED, *(a[k] for a in args)) for k in range(12)])
         block = f(TESTBED, *(a.reshape(3, 4, -1) for a in args))

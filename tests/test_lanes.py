@@ -39,23 +39,35 @@ def laws(N):
     pid = rk.PID(7.0, 90.0, 0.2, limit=0.5)
     gains = np.linspace(5.0, 8.0, N)
     mixed = np.linspace(300.0, 900.0, 2 * N)
-    bare = {"PD": rk.PD(gains, 0.225), "PID": pid,
-            "PID per drive": rk.PID(gains, 10 * gains, 0.03 * gains, 0.1 * gains)}
+    bare = {
+        "PD": rk.PD(gains, 0.225),
+        "PID": pid,
+        "PID per drive": rk.PID(gains, 10 * gains, 0.03 * gains, 0.1 * gains),
+    }
     model = {
-        "APD of a pair": rk.APD(7.0, [0.2, 0.3], (0, 1)), "APD of an elbow": rk.APD([7.0, 5.0], 0.2, (1, N)),
-        "APD in x": rk.APD([300.0, 400.0], 20.0, None), "APD weighted": rk.APD(7.0, 0.2, (0, 1), W=gains),
-        "CTC of a pair": rk.CTC(900.0, 60.0, (1, 0)), "CTC of elbows": rk.CTC(900.0, 60.0, (N, N + 1)),
-        "CTC in x": rk.CTC([900.0, 700.0], 60.0, None, pose="true"), "CTC weighted": rk.CTC(900.0, 60.0, None, W=gains),
+        "APD of a pair": rk.APD(7.0, [0.2, 0.3], (0, 1)),
+        "APD of an elbow": rk.APD([7.0, 5.0], 0.2, (1, N)),
+        "APD in x": rk.APD([300.0, 400.0], 20.0, None),
+        "APD weighted": rk.APD(7.0, 0.2, (0, 1), W=gains),
+        "CTC of a pair": rk.CTC(900.0, 60.0, (1, 0)),
+        "CTC of elbows": rk.CTC(900.0, 60.0, (N, N + 1)),
+        "CTC in x": rk.CTC([900.0, 700.0], 60.0, None, pose="true"),
+        "CTC weighted": rk.CTC(900.0, 60.0, None, W=gains),
         "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0, 1.05),
         "SwitchedCTC, true pose": rk.SwitchedCTC(900.0, 60.0, 1.0, "true"),
-        "RedundantAPD": rk.RedundantAPD(5.0, 0.2), "RedundantAPD (29)": rk.RedundantAPD(gains, 0.03 * gains),
-        "RedundantCTC": rk.RedundantCTC(mixed, 60.0), "RedundantCTC (29)": rk.RedundantCTC(100 * gains, 9 * gains),
+        "RedundantAPD": rk.RedundantAPD(5.0, 0.2),
+        "RedundantAPD (29)": rk.RedundantAPD(gains, 0.03 * gains),
+        "RedundantCTC": rk.RedundantCTC(mixed, 60.0),
+        "RedundantCTC (29)": rk.RedundantCTC(100 * gains, 9 * gains),
         "RedundantCTC line 2": rk.RedundantCTC(900.0, 60.0, projected=False, pose="true"),
     }
     around = {
-        "filter": rk.AntagonismFilter(PD), "filter, true pose": rk.AntagonismFilter(PD, "true"),
-        "weighted filter": rk.AntagonismFilter(PD, W=gains), "filter of PID": rk.AntagonismFilter(pid),
-        "command filter": rk.CommandFilter(rk.PD(gains, 0.2)), "filter of APD": rk.AntagonismFilter(model["APD in x"]),
+        "filter": rk.AntagonismFilter(PD),
+        "filter, true pose": rk.AntagonismFilter(PD, "true"),
+        "weighted filter": rk.AntagonismFilter(PD, W=gains),
+        "filter of PID": rk.AntagonismFilter(pid),
+        "command filter": rk.CommandFilter(rk.PD(gains, 0.2)),
+        "filter of APD": rk.AntagonismFilter(model["APD in x"]),
         "filter of CTC": rk.AntagonismFilter(model["CTC of a pair"], W=gains),
         "filter of SwitchedCTC": rk.AntagonismFilter(model["SwitchedCTC"]),
         "filter of RedundantAPD": rk.AntagonismFilter(model["RedundantAPD"]),
@@ -91,9 +103,16 @@ def agree(robot, law, path, model=None, **options):
 
 CIRCLE = cut(rk.circle(MACHINE, radius=0.11, duration=0.8), 180, 121)
 SENSORS = {"encoder": 4000, "velocity_filter": 2e-3}
-FAULTS = [rk.TorqueLimit([0.6, np.inf, 0.5]), rk.DeadDrive(0, 0.09), rk.EncoderDropout(2, 0.02, 0.03),
-          rk.EncoderDropout(2, 0.05, 0.07), rk.EncoderDropout(1, 0.0, 0.01), rk.OffsetJump(1, 0.04, 2e-3),
-          rk.OffsetJump(0, 0.0, -1e-3), rk.OffsetJump(2, 0.12, 1e-3)]  # at the first sample, and at the last
+FAULTS = [
+    rk.TorqueLimit([0.6, np.inf, 0.5]),
+    rk.DeadDrive(0, 0.09),
+    rk.EncoderDropout(2, 0.02, 0.03),
+    rk.EncoderDropout(2, 0.05, 0.07),
+    rk.EncoderDropout(1, 0.0, 0.01),
+    rk.OffsetJump(1, 0.04, 2e-3),
+    rk.OffsetJump(0, 0.0, -1e-3),
+    rk.OffsetJump(2, 0.12, 1e-3),
+]  # at the first sample, and at the last
 
 
 @pytest.mark.parametrize("name", laws(3))
@@ -111,16 +130,41 @@ def test_another_model_and_real_encoders(name):
 
 
 @pytest.mark.parametrize("sensors", [{}, SENSORS], ids=["ideal", "encoder"])
-@pytest.mark.parametrize("name", ["PD", "PID", "filter", "weighted filter", "command filter", "APD of an elbow",
-                                  "CTC in x", "SwitchedCTC", "RedundantAPD (29)", "RedundantCTC", "filter of PID"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "PD",
+        "PID",
+        "filter",
+        "weighted filter",
+        "command filter",
+        "APD of an elbow",
+        "CTC in x",
+        "SwitchedCTC",
+        "RedundantAPD (29)",
+        "RedundantCTC",
+        "filter of PID",
+    ],
+)
 def test_faults(name, sensors):
     run = agree(MACHINE, laws(3)[name], CIRCLE, faults=FAULTS, **sensors)
     assert not run.c[90:, 0].any() and (np.abs(run.c) <= [0.6, np.inf, 0.5]).all()
 
 
 @pytest.mark.parametrize("machine", ["five_bar", "four_arms", "asymmetric"])
-@pytest.mark.parametrize("name", ["PD", "filter", "APD weighted", "CTC of elbows", "SwitchedCTC", "RedundantAPD",
-                                  "RedundantCTC", "RedundantCTC line 2"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "PD",
+        "filter",
+        "APD weighted",
+        "CTC of elbows",
+        "SwitchedCTC",
+        "RedundantAPD",
+        "RedundantCTC",
+        "RedundantCTC line 2",
+    ],
+)
 def test_other_machines(machine, name):
     robot = MACHINES[machine].replace(gravity=(0.0, -2.0))
     agree(robot, laws(robot.n_arms)[name], rk.circle(robot, radius=0.03, duration=0.12))
@@ -132,8 +176,10 @@ def test_laws_of_all_kinds_in_one_sweep():
     every = list(laws(3).values())
     study = rk.sweep(MACHINE, every, CIRCLE, OFFSET[:3], faults=FAULTS, chunk=64)
     with ThreadPoolExecutor(2) as pool:
-        others = [rk.sweep(MACHINE, every, CIRCLE, OFFSET[:3], faults=FAULTS, executor=pool, chunk=3),
-                  rk.sweep(MACHINE, every[::-1], CIRCLE, OFFSET[:3], faults=FAULTS)]
+        others = [
+            rk.sweep(MACHINE, every, CIRCLE, OFFSET[:3], faults=FAULTS, executor=pool, chunk=3),
+            rk.sweep(MACHINE, every[::-1], CIRCLE, OFFSET[:3], faults=FAULTS),
+        ]
     for name in COLUMNS:
         column = getattr(study, name)
         assert_array_equal(getattr(others[0], name), column)
@@ -160,13 +206,17 @@ def test_neighbours_that_fail_change_no_bit(name):
 
 # Friction.
 FAST = rk.circle(MACHINES["testbed"], 0.1, 0.3)
-MOTIONS = {"a drive turns back": cut(FAST, 95, 26), "two turn back": cut(FAST, 160, 26),
-           "at rest": rk.hold(MACHINES["testbed"], (0.02, 0.03), 0.015)}
+MOTIONS = {
+    "a drive turns back": cut(FAST, 95, 26),
+    "two turn back": cut(FAST, 160, 26),
+    "at rest": rk.hold(MACHINES["testbed"], (0.02, 0.03), 0.015),
+}
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize(("friction", "velocity"), [(4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3),
-                                                    (1.0, 0.03), (1.0, 1e-3)])
+@pytest.mark.parametrize(
+    ("friction", "velocity"), [(4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3), (1.0, 0.03), (1.0, 1e-3)]
+)
 def test_friction_as_a_stiff_solver_has_it(friction, velocity, motion):
     """LSODA at its tightest in every hold."""
     robot, path = MACHINES["testbed"].replace(friction=friction, friction_velocity=velocity), MOTIONS[motion]

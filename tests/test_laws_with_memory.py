@@ -78,8 +78,11 @@ def test_equal_rows_of_a_sweep_are_equal_and_are_single_runs():
     assert not law.times
 
 
-@pytest.mark.parametrize("law", [PI(), rk.PID(7.05, 40.0, 0.225), rk.AntagonismFilter(rk.SwitchedCTC(900.0, 60.0))],
-                         ids=["object", "PID", "filtered switching"])
+@pytest.mark.parametrize(
+    "law",
+    [PI(), rk.PID(7.05, 40.0, 0.225), rk.AntagonismFilter(rk.SwitchedCTC(900.0, 60.0))],
+    ids=["object", "PID", "filtered switching"],
+)
 def test_bits_do_not_depend_on_executor_chunk_or_order(law):
     path = rk.circle(ROBOT, radius=0.05, duration=0.05)
     offsets = np.random.default_rng(1).normal(0.0, 3e-3, (5, 3))
@@ -122,8 +125,12 @@ def test_pid_with_anti_windup():
         assert not np.isfinite(limit).all() or (held.any() and not held.all())
     assert_allclose(rk.simulate(ROBOT, rk.PID(7.05, 0.0, 0.225), PATH, OFFSET).c, seen.c, rtol=0, atol=1e-10)
     full = rk.PID(np.diag(gains["K_P"]), 90.0 * np.eye(3), 0.2 * np.eye(3))
-    assert_allclose(rk.simulate(ROBOT, full, PATH, OFFSET).c,
-                    rk.simulate(ROBOT, rk.PID(**gains), PATH, OFFSET).c, rtol=0, atol=1e-10)
+    assert_allclose(
+        rk.simulate(ROBOT, full, PATH, OFFSET).c,
+        rk.simulate(ROBOT, rk.PID(**gains), PATH, OFFSET).c,
+        rtol=0,
+        atol=1e-10,
+    )
 
 
 def test_pid_leaves_no_error_at_rest_where_pd_does():
@@ -203,8 +210,10 @@ def test_filters_around_an_integral_a_callable_and_another_filter():
 def test_weighted_filter_makes_the_least_heat_at_the_same_force():
     robot = ROBOT.replace(resistance=[0.05, 0.05, 3.0])
     heat = robot.resistance / robot.torque_constant**2
-    raw, plain, weighted = (rk.simulate(robot, law, PATH, OFFSET) for law in (
-        PD, rk.AntagonismFilter(PD, pose="true"), rk.AntagonismFilter(PD, pose="true", W=heat)))
+    raw, plain, weighted = (
+        rk.simulate(robot, law, PATH, OFFSET)
+        for law in (PD, rk.AntagonismFilter(PD, pose="true"), rk.AntagonismFilter(PD, pose="true", W=heat))
+    )
     n, A = rk.null_vector(robot, weighted.q), rk.control_matrix(robot, weighted.q)
     # Stationary along the one direction that does not change the force: n^T W c = 0.
     assert_allclose(np.einsum("ki,i,ki->k", n, heat, weighted.c), 0.0, atol=1e-9)
@@ -254,14 +263,16 @@ def test_a_law_cannot_shift_the_path():
 VALUES = {
     "PD(K_P=7.05, K_D=0.225)": PD,
     "AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')": rk.AntagonismFilter(PD),
-    "AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='true', W=[1.0, 2.0, 3.0])":
-        rk.AntagonismFilter(PD, "true", [1, 2, 3]),
+    "AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='true', W=[1.0, 2.0, 3.0])": rk.AntagonismFilter(
+        PD, "true", [1, 2, 3]
+    ),
     "PID(K_P=7.0, K_I=1.0, K_D=0.2)": rk.PID(7.0, 1.0, 0.2),
     "PID(K_P=7.0, K_I=1.0, K_D=0.2, limit=[0.1, inf, 0.2])": rk.PID(7.0, 1.0, 0.2, [0.1, np.inf, 0.2]),
     "CTC(K_P=900.0, K_D=60.0, independent=None, pose='measured')": rk.CTC(900, 60, None),
     "SwitchedCTC(K_P=900.0, K_D=60.0, hysteresis=1.2, pose='measured')": rk.SwitchedCTC(900, 60),
     "Sensors(encoder=2000)": rk.Sensors(encoder=2000),
-    "TorqueLimit(0.3)": rk.TorqueLimit(0.3), "DeadDrive(1, 0.5)": rk.DeadDrive(1, 0.5),
+    "TorqueLimit(0.3)": rk.TorqueLimit(0.3),
+    "DeadDrive(1, 0.5)": rk.DeadDrive(1, 0.5),
     "EncoderDropout(0, 0.1, 0.2)": rk.EncoderDropout(0, 0.1, 0.2),
     "OffsetJump(2, 0.1, -0.002)": rk.OffsetJump(2, 0.1, -2e-3),
 }
@@ -281,8 +292,10 @@ def test_values_compare_print_and_travel(text):
 
 def test_runs_and_sweeps_are_values():
     run, study = rk.simulate(ROBOT, PD, PATH, OFFSET), rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2)
-    for value, other in ((run, rk.simulate(ROBOT, rk.PD(7.05, 0.225), PATH, OFFSET)),
-                         (study, rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2))):
+    for value, other in (
+        (run, rk.simulate(ROBOT, rk.PD(7.05, 0.225), PATH, OFFSET)),
+        (study, rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2)),
+    ):
         assert value == other == pickle.loads(pickle.dumps(value)) == copy.deepcopy(value)
     assert run != rk.simulate(ROBOT, PD, PATH, 1.1 * OFFSET)
     for array in (run.c, run.q_a, run.t, run.q, run.qd, study.energies, pickle.loads(pickle.dumps(run)).c):
@@ -290,15 +303,18 @@ def test_runs_and_sweeps_are_values():
             array[0] = 1.0
 
 
-@pytest.mark.parametrize(("make", "message"), [
-    (lambda: rk.PID(7.0, -1.0, 0.2), "K_I = -1; allowed: >= 0"),
-    (lambda: rk.PID(7.0, 1.0, 0.2, limit=-0.1), r"limit = -0\.1; allowed: >= 0"),
-    (lambda: rk.PID(7.0, 1.0, 0.2, limit="x"), "limit = .* is not numeric"),
-    (lambda: rk.simulate(ROBOT, rk.PID(7.0, [1.0, 2.0], 0.2), PATH), r"K_I has shape \(2,\); allowed: .* \(3,\)"),
-    (lambda: rk.simulate(ROBOT, rk.PID(7.0, 1.0, 0.2, [1.0, 2.0]), PATH), r"limit has shape \(2,\)"),
-    (lambda: rk.CommandFilter(rk.PID(7.0, 1.0, 0.2)), "allowed: PD, whose commands are filtered"),
-    (lambda: rk.Controller(PD, ROBOT, dt=0.0), "dt = 0; allowed: > 0"),
-])
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rk.PID(7.0, -1.0, 0.2), "K_I = -1; allowed: >= 0"),
+        (lambda: rk.PID(7.0, 1.0, 0.2, limit=-0.1), r"limit = -0\.1; allowed: >= 0"),
+        (lambda: rk.PID(7.0, 1.0, 0.2, limit="x"), "limit = .* is not numeric"),
+        (lambda: rk.simulate(ROBOT, rk.PID(7.0, [1.0, 2.0], 0.2), PATH), r"K_I has shape \(2,\); allowed: .* \(3,\)"),
+        (lambda: rk.simulate(ROBOT, rk.PID(7.0, 1.0, 0.2, [1.0, 2.0]), PATH), r"limit has shape \(2,\)"),
+        (lambda: rk.CommandFilter(rk.PID(7.0, 1.0, 0.2)), "allowed: PD, whose commands are filtered"),
+        (lambda: rk.Controller(PD, ROBOT, dt=0.0), "dt = 0; allowed: > 0"),
+    ],
+)
 def test_bad_arguments(make, message):
     with pytest.raises(ValueError, match=message):
         make()

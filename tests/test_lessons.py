@@ -45,7 +45,7 @@ def test_solved_lesson_passes_every_check_in_strict_mode(path, monkeypatch):
     folder = {"metadata": {"path": str(NOTEBOOKS)}}
     NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder).execute()
     said = "".join(o.get("text", "") for c in notebook.cells if c.cell_type == "code" for o in c.outputs)
-    checks = sum(c.source.count("check(\"") for c in notebook.cells if c.cell_type == "code")
+    checks = sum(c.source.count('check("') for c in notebook.cells if c.cell_type == "code")
     assert said.count("OK ") >= checks >= 3
 
 
@@ -143,8 +143,9 @@ def test_readme_asks_the_question_of_the_lesson(path):
 def test_tables_agree_with_the_lesson(path):
     text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
     minutes = re.search(r"\*\*(?:Minutes|Time):?\W*(\d+)", text)
-    row = next(line for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines()
-               if path.name in line).split("|")
+    row = next(
+        line for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines() if path.name in line
+    ).split("|")
     assert minutes and row[3].strip() == minutes[1]
     for name in re.findall(r"`([\w.]+)`", row[5]):
         assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"

@@ -59,8 +59,19 @@ def consistent(error, rows):
     run = error.partial
     assert isinstance(run, rk.Run) and len(run) == rows
     N = run.robot.n_arms
-    shapes = {"t": (rows,), "x": (rows, 2), "xd": (rows, 2), "q_a": (rows, N), "qd_a": (rows, N), "c": (rows, N),
-              "q": (rows, 2 * N), "qd": (rows, 2 * N), "error": (rows, N), "pairs": (rows, 2), "energy": (N,)}
+    shapes = {
+        "t": (rows,),
+        "x": (rows, 2),
+        "xd": (rows, 2),
+        "q_a": (rows, N),
+        "qd_a": (rows, N),
+        "c": (rows, N),
+        "q": (rows, 2 * N),
+        "qd": (rows, 2 * N),
+        "error": (rows, N),
+        "pairs": (rows, 2),
+        "energy": (N,),
+    }
     for name, shape in shapes.items():
         assert getattr(run, name).shape == shape and np.all(np.isfinite(getattr(run, name)))
     assert np.all(run.energy == rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
@@ -79,12 +90,19 @@ def test_an_exception_of_the_law_keeps_the_samples_before_it():
         assert_array_equal(getattr(error.partial, name), getattr(whole, name)[:100])
 
 
-@pytest.mark.parametrize(("answer", "reason"), [
-    (lambda: None, "law returned None"), (lambda: np.array([0.0, np.nan, 0.0]), r"[1] = nan; allowed: finite numbers"),
-    (lambda: [1.0], "law returned the shape (1,); allowed: (3,)"), (lambda: "c", "is not numeric"),
-    (lambda: np.zeros((1, 3)), "law returned the shape (1, 3)"), (lambda: np.zeros(3) + 0j, "is not numeric"),
-    (lambda: (np.zeros(3), None), "is not numeric"), (lambda: (c for c in "123"), "is not numeric"),
-])
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (lambda: None, "law returned None"),
+        (lambda: np.array([0.0, np.nan, 0.0]), r"[1] = nan; allowed: finite numbers"),
+        (lambda: [1.0], "law returned the shape (1,); allowed: (3,)"),
+        (lambda: "c", "is not numeric"),
+        (lambda: np.zeros((1, 3)), "law returned the shape (1, 3)"),
+        (lambda: np.zeros(3) + 0j, "is not numeric"),
+        (lambda: (np.zeros(3), None), "is not numeric"),
+        (lambda: (c for c in "123"), "is not numeric"),
+    ],
+)
 def test_a_bad_answer_later_on(answer, reason):
     error = lost(ROBOT, FailsAt(0.1, answer), PATH)
     assert reason in error.reason and isinstance(error.__cause__, ValueError)
@@ -110,8 +128,11 @@ def test_an_interrupt_comes_through():
     assert "up to t = 0.1000 s" in caught.value.__notes__[-1]
 
 
-@pytest.mark.parametrize("law", [rk.PD(1e4, 0.225), rk.PD(1e4 * np.eye(3), 0.225),
-                                 rk.AntagonismFilter(rk.PD(1e4, 0.225))], ids=["engine", "Python", "filter"])
+@pytest.mark.parametrize(
+    "law",
+    [rk.PD(1e4, 0.225), rk.PD(1e4 * np.eye(3), 0.225), rk.AntagonismFilter(rk.PD(1e4, 0.225))],
+    ids=["engine", "Python", "filter"],
+)
 def test_a_machine_that_leaves_the_workspace(law):
     error = lost(ROBOT, law, PATH, OFFSET)
     k = round(error.time / PATH.dt)

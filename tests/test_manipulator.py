@@ -57,27 +57,41 @@ def test_arms_can_be_left_out():
 # Bad values.
 BAD = [
     ("base", [[0, 0]], r"base has shape \(1, 2\); allowed: \(N, 2\) with at least two arms"),
-    ("base", [0, 0], "base has shape"), ("base", [[0, 0, 0], [1, 0, 0]], "base has shape"),
+    ("base", [0, 0], "base has shape"),
+    ("base", [[0, 0, 0], [1, 0, 0]], "base has shape"),
     ("base", [[0, 0], [0, 0]], "base = .* holds one point twice"),
     ("base", [[np.nan, 0], [1, 0]], r"base\[0, 0\] = nan"),
-    ("base", "two points", "base = 'two points' is not numeric"), ("base", [[0, 0], [1]], "base"),
+    ("base", "two points", "base = 'two points' is not numeric"),
+    ("base", [[0, 0], [1]], "base"),
     ("base", [[-1, 0], [1, 0]], "lengths = .* let no point be reached by all 2 arms"),
-    ("lengths", -0.25, r"lengths\[0, 0\] = -0.25; allowed: > 0"), ("lengths", 0.0, "lengths"),
+    ("lengths", -0.25, r"lengths\[0, 0\] = -0.25; allowed: > 0"),
+    ("lengths", 0.0, "lengths"),
     ("lengths", 1j, "lengths = 1j is not numeric; allowed: real numbers"),
     ("lengths", [0.2, 0.2, 0.2], r"lengths has shape \(3,\); allowed: one number, \(2,\) or \(2, 2\)"),
-    ("masses", -0.1, r"masses\[0, 0\] = -0.1; allowed: > 0"), ("masses", [0.1, np.inf], r"masses\[1\] = inf"),
-    ("masses", "0.1", "masses = '0.1' is not numeric"), ("masses", True, "masses = True is not numeric"),
-    ("masses", None, "masses = None is not numeric"), ("centers", np.nan, "centers"),
+    ("masses", -0.1, r"masses\[0, 0\] = -0.1; allowed: > 0"),
+    ("masses", [0.1, np.inf], r"masses\[1\] = inf"),
+    ("masses", "0.1", "masses = '0.1' is not numeric"),
+    ("masses", True, "masses = True is not numeric"),
+    ("masses", None, "masses = None is not numeric"),
+    ("centers", np.nan, "centers"),
     ("centers", [0.1], "centers has shape"),
-    ("inertias", -1e-5, "inertias"), ("rotor_inertia", -1e-6, "rotor_inertia"),
+    ("inertias", -1e-5, "inertias"),
+    ("rotor_inertia", -1e-6, "rotor_inertia"),
     ("rotor_inertia", [0] * 3, r"rotor_inertia has shape \(3,\); allowed: one number or \(2,\)"),
-    ("resistance", 0.0, "resistance"), ("torque_constant", [0.1, -0.1], r"torque_constant\[1\] = -0.1; allowed: > 0"),
-    ("friction", -1e-3, "friction"), ("friction_velocity", 0.0, "friction_velocity = 0; allowed: > 0"),
-    ("friction_velocity", [0.1, 0.1], "friction_velocity has shape"), ("gravity", 9.81, "gravity has shape"),
-    ("gravity", [0, 0, -9.81], "gravity has shape"), ("gravity", [[0, 0]], "gravity has shape"),
+    ("resistance", 0.0, "resistance"),
+    ("torque_constant", [0.1, -0.1], r"torque_constant\[1\] = -0.1; allowed: > 0"),
+    ("friction", -1e-3, "friction"),
+    ("friction_velocity", 0.0, "friction_velocity = 0; allowed: > 0"),
+    ("friction_velocity", [0.1, 0.1], "friction_velocity has shape"),
+    ("gravity", 9.81, "gravity has shape"),
+    ("gravity", [0, 0, -9.81], "gravity has shape"),
+    ("gravity", [[0, 0]], "gravity has shape"),
     ("load", -1.0, "load = -1; allowed: >= 0"),
-    ("load", [1.0, 2.0], "load has shape"), ("mode", 0, "mode = 0; allowed"), ("mode", [1, 0.5], "mode"),
-    ("mode", [1, 1, 1], "mode has shape"), ("mode", "+", "mode"),
+    ("load", [1.0, 2.0], "load has shape"),
+    ("mode", 0, "mode = 0; allowed"),
+    ("mode", [1, 0.5], "mode"),
+    ("mode", [1, 1, 1], "mode has shape"),
+    ("mode", "+", "mode"),
 ]
 
 
@@ -96,14 +110,17 @@ def test_a_machine_without_inertia_is_refused():
     assert rk.Manipulator(**GOOD, centers=[0.1, 0.1], inertias=0.0).n_arms == 2
 
 
-@pytest.mark.parametrize(("base", "lengths", "meet"), [
-    ([[-0.2, 0], [0.2, 0]], 0.1, True),  # just touching, stretched
-    ([[-0.2, 0], [0.2, 0]], 0.0999, False),
-    ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.04]], False),  # the small arm inside the hole of the large one
-    ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.06]], True),
-    ([[0, 0], [1, 0], [0.5, 5]], 0.3, False),  # two meet, the third does not
-    ([[0, 0], [0.01, 0]], [[0.1, 0.1], [1, 1]], True),  # one annulus inside the other
-])
+@pytest.mark.parametrize(
+    ("base", "lengths", "meet"),
+    [
+        ([[-0.2, 0], [0.2, 0]], 0.1, True),  # just touching, stretched
+        ([[-0.2, 0], [0.2, 0]], 0.0999, False),
+        ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.04]], False),  # the small arm inside the hole of the large one
+        ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.06]], True),
+        ([[0, 0], [1, 0], [0.5, 5]], 0.3, False),  # two meet, the third does not
+        ([[0, 0], [0.01, 0]], [[0.1, 0.1], [1, 1]], True),  # one annulus inside the other
+    ],
+)
 def test_arms_must_be_able_to_meet(base, lengths, meet):
     if meet:
         rk.Manipulator(base=base, lengths=lengths, masses=1.0)
@@ -116,6 +133,7 @@ def test_arms_must_be_able_to_meet(base, lengths, meet):
 @pytest.mark.parametrize("name", MACHINES)
 def test_shipped_machines_load_and_say_where_each_number_comes_from(name):
     import tomllib
+
     robot = rk.load(name)
     q = rk.inverse_kinematics(robot, np.zeros(2))
     assert np.abs(rk.loop_constraints(robot, q)).max() < 1e-15
@@ -143,12 +161,15 @@ FILES = [
     (HEAD + "masss = 1.0\n", r"unknown TOML key 'masss' \(did you mean 'masses'\?\); allowed: base, centers"),
     (HEAD + "[controll]\nK_P = 1.0\n", r"unknown TOML table 'controll' \(did you mean 'control'\?\)"),
     ("[manipulator]\nbase = [[0.0, 0.0], [0.1, 0.0]]\nlengths = 0.2\n", "lacks 'masses'"),
-    ("name = 'empty'\n", "lacks 'base'"), (HEAD.replace("0.1", "-0.1"), "masses"), ("base = [[\n", "is not valid TOML"),
+    ("name = 'empty'\n", "lacks 'base'"),
+    (HEAD.replace("0.1", "-0.1"), "masses"),
+    ("base = [[\n", "is not valid TOML"),
     (HEAD + "load = {value = 1.0, unit = 'g'}\n", "load has the unit 'g'; allowed: 'kg'"),
     (HEAD + "load = {value = 1.0, origin = 'me'}\n", "unknown entry of 'load' 'origin'"),
     ("manipulator = 3\n", r"manipulator = 3 .* allowed: a table"),
     (HEAD + "load = 'heavy'\n", "load = 'heavy' is not numeric"),
-    (HEAD + "load = {unit = 'kg'}\n", "load"), (HEAD + "gravity = [0.0, nan]\n", r"gravity\[1\] = nan"),
+    (HEAD + "load = {unit = 'kg'}\n", "load"),
+    (HEAD + "gravity = [0.0, nan]\n", r"gravity\[1\] = nan"),
 ]
 
 
@@ -183,6 +204,7 @@ def test_plain_values_and_names(tmp_path):
 def test_importing_the_package_stays_light():
     import subprocess
     import sys
+
     code = "import sys, rapkm_lite; print([m for m in ('matplotlib', 'ipywidgets', 'sympy') if m in sys.modules])"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]" and out.stderr == ""
@@ -190,6 +212,7 @@ def test_importing_the_package_stays_light():
 
 def test_the_package_lists_what_people_call_and_no_modules():
     from types import ModuleType
+
     assert "at" in dir(rk) and "null_basis" in dir(rk) and "triangle" in dir(rk)
     assert set(dir(rk)) == {*rk.__all__, "__version__"}
     things = [name for name, thing in vars(rk).items() if not isinstance(thing, ModuleType) and name[0] != "_"]

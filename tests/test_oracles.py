@@ -35,9 +35,17 @@ def pinocchio_twin(pin, robot):
         arms.append((base, elbow))
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     for i in (i for i in range(robot.n_arms) if i != 1):
-        models.append(pin.RigidConstraintModel(
-            pin.ContactType.CONTACT_3D, model, arms[i][1], at(robot.lengths[i, 1], 0.0), arms[1][1],
-            at(robot.lengths[1, 1], 0.0), pin.ReferenceFrame.LOCAL))
+        models.append(
+            pin.RigidConstraintModel(
+                pin.ContactType.CONTACT_3D,
+                model,
+                arms[i][1],
+                at(robot.lengths[i, 1], 0.0),
+                arms[1][1],
+                at(robot.lengths[1, 1], 0.0),
+                pin.ReferenceFrame.LOCAL,
+            )
+        )
         datas.append(models[len(models) - 1].createData())
     order = [model.joints[arm[k]].idx_v for k in (0, 1) for arm in arms]
     return model, models, datas, order
@@ -71,9 +79,11 @@ def test_forward_dynamics_agrees_with_pinocchio(name):
 def mujoco_twin(mujoco, robot, step):
     def body(name, pos, m, c, inertia, armature, inner):
         I = f"{inertia:.17g}"  # noqa: E741
-        return (f'<body pos="{pos[0]:.17g} {pos[1]:.17g} 0">'
-                f'<joint name="{name}" axis="0 0 1" armature="{armature:.17g}"/>'
-                f'<inertial pos="{c:.17g} 0 0" mass="{m:.17g}" diaginertia="{I} {I} {I}"/>{inner}</body>')
+        return (
+            f'<body pos="{pos[0]:.17g} {pos[1]:.17g} 0">'
+            f'<joint name="{name}" axis="0 0 1" armature="{armature:.17g}"/>'
+            f'<inertial pos="{c:.17g} 0 0" mass="{m:.17g}" diaginertia="{I} {I} {I}"/>{inner}</body>'
+        )
 
     bodies, loops = "", ""
     for i in range(robot.n_arms):
@@ -82,8 +92,7 @@ def mujoco_twin(mujoco, robot, step):
         # A point mass at the tip, lumped into the distal link.
         mass, centre = m2 + load, (m2 * c2 + load * l2) / (m2 + load)
         inertia = i2 + m2 * (c2 - centre) ** 2 + load * (l2 - centre) ** 2
-        distal = body(f"elbow{i}", (l1, 0.0), mass, centre, inertia, 0.0,
-                      f'<site name="tip{i}" pos="{l2:.17g} 0 0"/>')
+        distal = body(f"elbow{i}", (l1, 0.0), mass, centre, inertia, 0.0, f'<site name="tip{i}" pos="{l2:.17g} 0 0"/>')
         bodies += body(f"base{i}", robot.base[i], m1, c1, i1, robot.rotor_inertia[i], distal)
         if i != 1:
             loops += f'<connect site1="tip{i}" site2="tip1" solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"/>'
@@ -117,8 +126,9 @@ def test_closed_loop_run_agrees_with_mujoco(name):
         mujoco.mj_kinematics(model, state)
         at = state.site_xpos[tips][:, :2]
         error, gap = max(error, np.abs(at[1] - run.x[k]).max()), max(gap, np.abs(at - at[1]).max())
-        state.qfrc_applied[base] = (-law.K_P * (state.qpos[base] + offset - path.q_a[k])
-                                    - law.K_D * (state.qvel[base] - path.qd_a[k]))
+        state.qfrc_applied[base] = -law.K_P * (state.qpos[base] + offset - path.q_a[k]) - law.K_D * (
+            state.qvel[base] - path.qd_a[k]
+        )
         mujoco.mj_step(model, state, round(path.dt / step))
     assert np.abs(run.error).max() > 1e-3  # the run has something to disagree about
     assert gap < 1e-8

@@ -69,7 +69,7 @@ def test_nothing_is_shown_where_nobody_looks(monkeypatch):
 
 def test_a_notebook_sees_a_widget_without_text(notebook):
     slow("notebook")
-    (bundle, raw), = notebook
+    ((bundle, raw),) = notebook
     assert raw and list(bundle) == ["application/vnd.jupyter.widget-view+json"]
 
 
@@ -84,8 +84,10 @@ def test_progress_counts_the_chunks(terminal, notebook, monkeypatch):
     assert "25 %" in terminal.getvalue() and terminal.getvalue().endswith(" \r")
 
 
-@pytest.mark.parametrize("shell, found", [(None, False), (types.SimpleNamespace(kernel=None), False),
-                                          (types.SimpleNamespace(kernel=1), True)])
+@pytest.mark.parametrize(
+    "shell, found",
+    [(None, False), (types.SimpleNamespace(kernel=None), False), (types.SimpleNamespace(kernel=1), True)],
+)
 def test_a_kernel_is_told_from_a_shell(monkeypatch, shell, found):
     monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
     assert _patience._notebook() is found

@@ -13,8 +13,10 @@ ROOMS = ["machine", "mechanics", "control", "simulation", "figures", "lessons", 
 DOORS = ["__init__", "__main__", "checks", "plotting"]
 # A room that stands apart, and the only modules that open it.
 KEYS = {"engine": {"simulation.compiled"}}
-MODULES = {".".join(p.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): p
-           for p in sorted(PACKAGE.rglob("*.py"))}
+MODULES = {
+    ".".join(p.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): p
+    for p in sorted(PACKAGE.rglob("*.py"))
+}
 
 
 def imported(name):

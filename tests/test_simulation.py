@@ -40,8 +40,11 @@ def test_unstable_damping():
 
 
 @pytest.mark.parametrize("size", [0.05, 0.1, 0.2])
-@pytest.mark.parametrize("law", [PD, rk.AntagonismFilter(PD), rk.CommandFilter(PD), rk.CTC(900.0, 60.0),
-                                 rk.RedundantCTC(900.0, 60.0)], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law",
+    [PD, rk.AntagonismFilter(PD), rk.CommandFilter(PD), rk.CTC(900.0, 60.0), rk.RedundantCTC(900.0, 60.0)],
+    ids=lambda law: type(law).__name__,
+)
 def test_large_offsets(size, law):
     path = rk.circle(ROBOT, radius=0.05, duration=1.0)
     for signs in ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, -1)):
@@ -61,6 +64,7 @@ def test_a_minute():
 
 def test_a_jump_over_the_boundary_is_seen():
     """An arm that passes its stretched pose within one hold comes back mirrored in these coordinates."""
+
     def push(t, q_a, qd_a, desired):
         return np.array([0.3, 0.0, 0.0])
 
@@ -105,19 +109,22 @@ def test_mirrored_machine():
     np.testing.assert_allclose(two.energy, one.energy[[1, 0, 2]], rtol=1e-9)
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ({"offset": [0.0, 0.0]}, r"offset has shape \(2,\); allowed: one number or \(3,\)"),
-    ({"offset": np.nan}, "offset = nan; allowed: finite numbers"),
-    ({"encoder": 0}, "encoder = 0; allowed: > 0"),
-    ({"velocity_filter": -1.0}, "velocity_filter = -1; allowed: >= 0"),
-    ({"model": rk.load("five_bar")}, "model has 2 arms, the machine 3"),
-    ({"law": "PD"}, "law = 'PD'; allowed: a law of this package or a function"),
-    ({"law": lambda *a: None}, "law returned None"),
-    ({"law": lambda *a: [1.0]}, r"law returned the shape \(1,\); allowed: \(3,\)"),
-    ({"law": lambda *a: [1.0, np.inf, 0.0]}, r"\[1\] = inf; allowed: finite numbers"),
-    ({"law": rk.PD([1.0, 2.0], 0.1)}, r"K_P has shape \(2,\); allowed: one number or \(3,\)"),
-    ({"law": rk.CTC(9.0, 6.0, (0, 7))}, r"independent = \(0, 7\); allowed: joint indices from 0 to 5"),
-])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"offset": [0.0, 0.0]}, r"offset has shape \(2,\); allowed: one number or \(3,\)"),
+        ({"offset": np.nan}, "offset = nan; allowed: finite numbers"),
+        ({"encoder": 0}, "encoder = 0; allowed: > 0"),
+        ({"velocity_filter": -1.0}, "velocity_filter = -1; allowed: >= 0"),
+        ({"model": rk.load("five_bar")}, "model has 2 arms, the machine 3"),
+        ({"law": "PD"}, "law = 'PD'; allowed: a law of this package or a function"),
+        ({"law": lambda *a: None}, "law returned None"),
+        ({"law": lambda *a: [1.0]}, r"law returned the shape \(1,\); allowed: \(3,\)"),
+        ({"law": lambda *a: [1.0, np.inf, 0.0]}, r"\[1\] = inf; allowed: finite numbers"),
+        ({"law": rk.PD([1.0, 2.0], 0.1)}, r"K_P has shape \(2,\); allowed: one number or \(3,\)"),
+        ({"law": rk.CTC(9.0, 6.0, (0, 7))}, r"independent = \(0, 7\); allowed: joint indices from 0 to 5"),
+    ],
+)
 def test_bad_arguments(options, message):
     arguments = {"robot": ROBOT, "law": PD, "trajectory": rk.hold(ROBOT, (0.0, 0.0), 0.01)} | options
     with pytest.raises(ValueError, match=message):

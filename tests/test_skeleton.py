@@ -27,5 +27,7 @@ def test_a_lesson_made_from_the_skeleton_is_green(tmp_path):
     tests = ("tests/test_lessons.py", "tests/test_figures.py", "notebooks")
     said = run(tmp_path, "-m", "pytest", "-q", *tests, "-k", "97 or figures_is_generated", "-p", "no:cacheprovider")
     assert "passed" in said and "failed" not in said
-    assert run(tmp_path, "-c", "from rapkm_lite import plotting; print(plotting.plot_turning_97.__module__)").strip() \
+    assert (
+        run(tmp_path, "-c", "from rapkm_lite import plotting; print(plotting.plot_turning_97.__module__)").strip()
         == "rapkm_lite.lessons.lesson97.figures"
+    )

@@ -50,8 +50,11 @@ def printed_18(K_P, K_D):
     return law
 
 
-@pytest.mark.parametrize(("K_P", "K_D", "left", "left_by_17"), [
-    (7.05, 0.225, 1.01, 0.0), ([3.0, 7.05, 14.0], [0.1, 0.225, 0.45], 0.75, 0.16)], ids=["equal", "unequal"])
+@pytest.mark.parametrize(
+    ("K_P", "K_D", "left", "left_by_17"),
+    [(7.05, 0.225, 1.01, 0.0), ([3.0, 7.05, 14.0], [0.1, 0.225, 0.45], 0.75, 0.16)],
+    ids=["equal", "unequal"],
+)
 def test_printed_18_and_unequal_gains_are_two_errors(K_P, K_D, left, left_by_17):
     # The angle in (18) alone leaves all of the antagonism; unequal gains are the limit of (17), and lower that number.
     laws = rk.PD(K_P, K_D), printed_18(K_P, K_D), rk.CommandFilter(rk.PD(K_P, K_D))
@@ -60,8 +63,11 @@ def test_printed_18_and_unequal_gains_are_two_errors(K_P, K_D, left, left_by_17)
     assert_allclose(right / plain, left_by_17, atol=0.005)
 
 
-PLACES = [rk.triangle(FRICTIONLESS, dt=5e-3), rk.circle(FRICTIONLESS, 0.08, dt=5e-3),
-          rk.triangle(FRICTIONLESS, side=0.1, centre=[0.05, 0.05], dt=5e-3)]
+PLACES = [
+    rk.triangle(FRICTIONLESS, dt=5e-3),
+    rk.circle(FRICTIONLESS, 0.08, dt=5e-3),
+    rk.triangle(FRICTIONLESS, side=0.1, centre=[0.05, 0.05], dt=5e-3),
+]
 
 
 def test_trace_of_the_energy_form_needs_equal_gains_and_equal_motors():
@@ -94,8 +100,12 @@ def test_unweighted_filter_adds_copper_loss_for_unequal_motors():
 
 def test_weighted_torques_halve_the_heat_of_unequal_motors():
     W = UNEQUAL_MOTORS.resistance / UNEQUAL_MOTORS.torque_constant**2
-    heat = [rk.copper_loss(UNEQUAL_MOTORS, rk.inverse_dynamics(UNEQUAL_MOTORS, PATH.q, PATH.qd, PATH.qdd, W=w)[:-1],
-                           PATH.dt).sum() for w in (None, W)]
+    heat = [
+        rk.copper_loss(
+            UNEQUAL_MOTORS, rk.inverse_dynamics(UNEQUAL_MOTORS, PATH.q, PATH.qd, PATH.qdd, W=w)[:-1], PATH.dt
+        ).sum()
+        for w in (None, W)
+    ]
     assert_allclose(heat, [2.98, 1.52], atol=0.005)
 
 

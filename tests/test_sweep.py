@@ -20,8 +20,13 @@ def same(a, b):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-LAWS = [PD, rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true"), rk.CommandFilter(PD),
-        rk.RedundantCTC(900.0, 60.0)]
+LAWS = [
+    PD,
+    rk.AntagonismFilter(PD),
+    rk.AntagonismFilter(PD, pose="true"),
+    rk.CommandFilter(PD),
+    rk.RedundantCTC(900.0, 60.0),
+]
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
@@ -71,8 +76,10 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
     assert study.energies.mask[1].all() and not study.energies.mask[[0, 2, 3]].any()
     assert 0.0 < study.failure_time[1] < 0.4
     assert all(np.all(np.isfinite(getattr(study, name).data)) for name in COLUMNS)
-    same(rk.sweep(ROBOT, [gains[i] for i in (0, 2, 3)], PATH, OFFSETS[0]),
-         rk.Sweep(*[None] * 3, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None))
+    same(
+        rk.sweep(ROBOT, [gains[i] for i in (0, 2, 3)], PATH, OFFSETS[0]),
+        rk.Sweep(*[None] * 3, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None),
+    )
     with pytest.raises(ValueError, match="1 runs failed"):
         np.asarray(study)
     with pytest.raises(rk.SimulationError, match=r"run 1: at t = 0\.\d+ s .*unstable gain") as caught:
@@ -108,8 +115,12 @@ def test_a_law_of_a_student():
     def law(t, q_a, qd_a, desired):
         return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
 
-    np.testing.assert_allclose(rk.sweep(ROBOT, law, PATH, OFFSETS[:2]).energies,
-                               rk.sweep(ROBOT, PD, PATH, OFFSETS[:2]).energies, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        rk.sweep(ROBOT, law, PATH, OFFSETS[:2]).energies,
+        rk.sweep(ROBOT, PD, PATH, OFFSETS[:2]).energies,
+        rtol=0,
+        atol=1e-11,
+    )
 
 
 def test_result_is_an_array_of_energies():
@@ -118,17 +129,20 @@ def test_result_is_an_array_of_energies():
     assert repr(study).startswith("Sweep(3 runs, 0 failed, total energy ")
 
 
-@pytest.mark.parametrize(("arguments", "message"), [
-    ({"offsets": np.zeros((4, 2))}, r"offsets has shape \(4, 2\); allowed: \(k, 3\)"),
-    ({"offsets": np.zeros((0, 3))}, "allowed: at least one run"),
-    ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
-    ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
-    ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
-    ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise' or 'mask'"),
-    ({"chunk": 0}, "chunk = 0; allowed: a whole number >= 1"),
-    ({"executor": 3}, "executor = 3; allowed: an executor"),
-    ({"encoder": -5}, "encoder = -5; allowed: > 0"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"offsets": np.zeros((4, 2))}, r"offsets has shape \(4, 2\); allowed: \(k, 3\)"),
+        ({"offsets": np.zeros((0, 3))}, "allowed: at least one run"),
+        ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
+        ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
+        ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
+        ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise' or 'mask'"),
+        ({"chunk": 0}, "chunk = 0; allowed: a whole number >= 1"),
+        ({"executor": 3}, "executor = 3; allowed: an executor"),
+        ({"encoder": -5}, "encoder = -5; allowed: > 0"),
+    ],
+)
 def test_bad_arguments(arguments, message):
     with pytest.raises(ValueError, match=message):
         rk.sweep(**{"robot": ROBOT, "law": PD, "trajectory": PATH, "offsets": np.zeros((2, 3))} | arguments)

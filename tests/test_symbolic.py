@@ -49,8 +49,11 @@ def lagrange(q, qd, kinetic, potential):
     """G, C by Christoffel symbols, and Q of G qdd + C qd + Q = u, from the Lagrangian."""
     n = len(q)
     G = sp.hessian(kinetic, qd)
-    C = sp.Matrix(n, n, lambda i, j: sum((G[i, j].diff(q[k]) + G[i, k].diff(q[j]) - G[j, k].diff(q[i])) * qd[k]
-                                         for k in range(n)) / 2)
+    C = sp.Matrix(
+        n,
+        n,
+        lambda i, j: sum((G[i, j].diff(q[k]) + G[i, k].diff(q[j]) - G[j, k].diff(q[i])) * qd[k] for k in range(n)) / 2,
+    )
     return G, C, sp.Matrix([potential]).jacobian(q).T
 
 
@@ -140,27 +143,42 @@ def loops():
     qd = [a.qd[0] for a in arms] + [a.qd[1] for a in arms]
     values = {}
     for i, arm in enumerate(arms):
-        numbers = [*ROBOT.base[i], *ROBOT.lengths[i], *ROBOT.masses[i], *ROBOT.centers[i], *ROBOT.inertias[i],
-                   ROBOT.rotor_inertia[i], ROBOT.load if i == 1 else 0.0]
+        numbers = [
+            *ROBOT.base[i],
+            *ROBOT.lengths[i],
+            *ROBOT.masses[i],
+            *ROBOT.centers[i],
+            *ROBOT.inertias[i],
+            ROBOT.rotor_inertia[i],
+            ROBOT.load if i == 1 else 0.0,
+        ]
         values |= dict(zip(arm.parameters, numbers, strict=True))
     values |= dict(zip(GRAVITY, ROBOT.gravity, strict=True))
     tips = [a.tip.subs(values) for a in arms]
     h = sp.Matrix.vstack(tips[0] - tips[1], tips[2] - tips[1])
     J = h.jacobian(q)
     J_dot = sum((J.diff(x) * xd for x, xd in zip(q, qd, strict=True)), sp.zeros(*J.shape))
-    kinetic, potential = (sum(energies).subs(values) for energies in (
-        [a.kinetic() for a in arms], [a.potential(GRAVITY) for a in arms]))
+    kinetic, potential = (
+        sum(energies).subs(values) for energies in ([a.kinetic() for a in arms], [a.potential(GRAVITY) for a in arms])
+    )
     G, C, Q = lagrange(q, qd, kinetic, potential)
-    return {name: sp.lambdify([q, qd], expression, "numpy")
-            for name, expression in {"h": h, "J": J, "J_dot": J_dot, "G": G, "C": C, "Q": Q}.items()}
+    return {
+        name: sp.lambdify([q, qd], expression, "numpy")
+        for name, expression in {"h": h, "J": J, "J_dot": J_dot, "G": G, "C": C, "Q": Q}.items()
+    }
 
 
-@pytest.mark.parametrize(("name", "numpy_form"), [
-    ("h", lambda q, qd: rk.loop_constraints(ROBOT, q)[:, None]), ("J", lambda q, qd: rk.constraint_jacobian(ROBOT, q)),
-    ("J_dot", lambda q, qd: rk.constraint_jacobian_dot(ROBOT, q, qd)), ("G", lambda q, qd: rk.mass_matrix(ROBOT, q)),
-    ("C", lambda q, qd: rk.coriolis_matrix(ROBOT, q, qd)),
-    ("Q", lambda q, qd: rk.generalized_forces(ROBOT, q, qd)[:, None]),
-])
+@pytest.mark.parametrize(
+    ("name", "numpy_form"),
+    [
+        ("h", lambda q, qd: rk.loop_constraints(ROBOT, q)[:, None]),
+        ("J", lambda q, qd: rk.constraint_jacobian(ROBOT, q)),
+        ("J_dot", lambda q, qd: rk.constraint_jacobian_dot(ROBOT, q, qd)),
+        ("G", lambda q, qd: rk.mass_matrix(ROBOT, q)),
+        ("C", lambda q, qd: rk.coriolis_matrix(ROBOT, q, qd)),
+        ("Q", lambda q, qd: rk.generalized_forces(ROBOT, q, qd)[:, None]),
+    ],
+)
 def test_numpy_forms_of_the_cut_tree(loops, name, numpy_form):
     for q, qd in STATES:
         assert_allclose(numpy_form(q, qd), loops[name](q, qd), atol=1e-14 * max(1, np.abs(loops[name](q, qd)).max()))

@@ -11,9 +11,13 @@ import rapkm_lite as rk
 def paths():
     square = [[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]]
     rested = rk.triangle(TESTBED, rest=0.25, angle=0.3, centre=(0.01, 0.02))
-    return {"triangle": rk.triangle(TESTBED), "with rest": rested,
-            "circle": rk.circle(TESTBED, 0.09, turns=2), "square": rk.polygon(TESTBED, square, 4.0),
-            "asymmetric": rk.triangle(MACHINES["asymmetric"], side=0.18)}
+    return {
+        "triangle": rk.triangle(TESTBED),
+        "with rest": rested,
+        "circle": rk.circle(TESTBED, 0.09, turns=2),
+        "square": rk.polygon(TESTBED, square, 4.0),
+        "asymmetric": rk.triangle(MACHINES["asymmetric"], side=0.18),
+    }
 
 
 every_path = pytest.mark.parametrize("path", paths().values(), ids=paths().keys())

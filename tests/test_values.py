@@ -44,9 +44,15 @@ def test_values_are_equal_by_value():
     value = Sample(np.array([1.0, 0.0, np.nan]), (np.ones(2),))
     same = Sample(np.array([1.0, -0.0, np.nan]), [np.ones(2, dtype=int)])
     assert value == same and hash(value) == hash(same) and len({value, same}) == 1
-    for other in (Sample(np.array([1.0, 0.0, 2.0]), (np.ones(2),)), Sample(np.array([1.0, 0.0, np.nan])), 1.0, None,
-                  Sample(np.array([[1.0, 0.0, np.nan]]), (np.ones(2),)), Sample(value.numbers, value.parts, 2.0),
-                  Sample(value.numbers, value.parts, extra=np.zeros(1))):
+    for other in (
+        Sample(np.array([1.0, 0.0, 2.0]), (np.ones(2),)),
+        Sample(np.array([1.0, 0.0, np.nan])),
+        1.0,
+        None,
+        Sample(np.array([[1.0, 0.0, np.nan]]), (np.ones(2),)),
+        Sample(value.numbers, value.parts, 2.0),
+        Sample(value.numbers, value.parts, extra=np.zeros(1)),
+    ):
         assert value != other
     assert Sample(np.ma.masked_less([1.0, 2.0], 1.5)) != Sample(np.ma.masked_less([1.0, 2.0], 0.5))
     assert Sample(np.array(7)) == Sample(7.0) and hash(Sample(np.array(7))) == hash(Sample(7.0))
@@ -59,8 +65,18 @@ def test_a_value_prints_as_it_was_typed():
     assert repr(Sample(np.zeros((40, 2)))) == "Sample(<array (40, 2)>)"
 
 
-@pytest.mark.parametrize("array", [np.zeros((0, 2)), np.float64(2.0), np.arange(4)[::2], np.ones((2, 2), order="F"),
-                                   np.array([True, False]), np.array(["a", "b"])], ids=str)
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.zeros((0, 2)),
+        np.float64(2.0),
+        np.arange(4)[::2],
+        np.ones((2, 2), order="F"),
+        np.array([True, False]),
+        np.array(["a", "b"]),
+    ],
+    ids=str,
+)
 def test_frozen_keeps_shape_type_and_numbers(array):
     kept = frozen(array)
     assert kept.shape == np.shape(array) and kept.dtype == np.asarray(array).dtype and np.array_equal(kept, array)
@@ -74,8 +90,14 @@ def arrays(value):
 
 
 PATH = rk.triangle(rk.load(), dt=0.05)
-VALUES = {"machine": rk.load("asymmetric"), "path": PATH, "sample": PATH[17], "part": PATH[3:7],
-          "log": rk.mystery_run("offset_a"), "long path": rk.triangle(rk.load("four_arms"))}
+VALUES = {
+    "machine": rk.load("asymmetric"),
+    "path": PATH,
+    "sample": PATH[17],
+    "part": PATH[3:7],
+    "log": rk.mystery_run("offset_a"),
+    "long path": rk.triangle(rk.load("four_arms")),
+}
 
 
 @pytest.mark.parametrize("value", VALUES.values(), ids=VALUES.keys())

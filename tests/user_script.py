@@ -33,8 +33,13 @@ run = rk.simulate(testbed, rk.CTC(400, 40, independent=(0, 1)), path, model=test
 total: float = float(run.energy.sum())
 
 gentle = rk.AntagonismFilter(lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a), W=[1.0, 2.0, 1.0])
-broken = rk.simulate(testbed, gentle, rk.circle(testbed, 0.05, 0.2, centre=[0, 0]), encoder=np.float64(2000),
-                     faults=[rk.TorqueLimit([0.3, 0.3, np.inf]), rk.DeadDrive(1, 0.1), rk.OffsetJump(0, 0, 1e-3)])
+broken = rk.simulate(
+    testbed,
+    gentle,
+    rk.circle(testbed, 0.05, 0.2, centre=[0, 0]),
+    encoder=np.float64(2000),
+    faults=[rk.TorqueLimit([0.3, 0.3, np.inf]), rk.DeadDrive(1, 0.1), rk.OffsetJump(0, 0, 1e-3)],
+)
 summing = rk.PID(7, 20, [0.2, 0.2, 0.2], limit=0.5)
 in_pairs = [rk.CTC(400, 40, [0, 1]), rk.APD(7, 0.2, (1, 2), W=2), rk.CTC(400, 40, None), rk.SwitchedCTC(400, 40, 1)]
 pose = rk.at(testbed, path.q[0], path.qd[0])

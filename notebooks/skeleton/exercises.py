@@ -63,15 +63,27 @@ def _too_fast(speed, A, limit) -> tuple[float, str]:
 # Name -> the package's answer, a hint, cases and an invariant: a law of nature that a right answer obeys.
 EXERCISES = {
     "NN.driven_rates": Exercise(
-        reference=driven_rates, cases=_velocities, invariant=_moves_so, unit="rad/s", tolerance=1e-9,
+        reference=driven_rates,
+        cases=_velocities,
+        invariant=_moves_so,
+        unit="rad/s",
+        tolerance=1e-9,
         hint="row i of A times the velocity is the rate of drive i",
     ),
     "NN.turning": Exercise(
-        reference=turning, cases=_matrices, invariant=_exceeded, unit="rad/m", tolerance=1e-9,
+        reference=turning,
+        cases=_matrices,
+        invariant=_exceeded,
+        unit="rad/m",
+        tolerance=1e-9,
         hint="a scalar product with a unit vector is largest along the vector itself",
     ),
     "NN.safe_speed": Exercise(
-        reference=safe_speed, cases=_limits, invariant=_too_fast, unit="m/s", tolerance=1e-9,
+        reference=safe_speed,
+        cases=_limits,
+        invariant=_too_fast,
+        unit="m/s",
+        tolerance=1e-9,
         hint="the drive that turns farthest per metre decides",
     ),
 }

@@ -176,8 +176,10 @@ class SwitchedCTC(LawValue):
         c = np.empty_like(q_a)
         for pair in {tuple(p) for p in chosen.tolist()}:
             k = np.all(chosen == pair, axis=-1)
-            part = Desired(desired.n_arms, *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd,
-                                                            desired.qdd)))
+            part = Desired(
+                desired.n_arms,
+                *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd, desired.qdd)),
+            )
             c[k] = self.fixed(pair).torque(model, q[k], qd[k], q_a[k], qd_a[k], part)
         return c
 

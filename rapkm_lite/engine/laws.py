@@ -25,9 +25,15 @@ def look(lanes, drives, arms, table, o, w):
         rate = want(table, o, ELBOW_RATE, i, W)
         for j in range(L):
             ax, ay, dx, dy, ad, inv, _ = geometry(
-                w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
-                w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+                w[at(MODEL + BX, i, j, W, L)],
+                w[at(MODEL + BY, i, j, W, L)],
+                w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)],
+                w[at(MODEL + MEAN, i, j, W, L)],
+                w[at(MODEL + MODE, i, j, W, L)],
+                w[of(PX, j, W, L)],
+                w[of(PY, j, W, L)],
+            )
             bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)] = bx, by, lx, ly
             w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)] = ad, inv
@@ -58,11 +64,20 @@ def best_pair(lanes, drives, arms, w):
         for k in range(i + 1, N):
             for j in range(L):
                 # d / l2 from b = d / (a x d).
-                size = (w[at(MODEL + ELBOW_SCALE, i, j, W, L)] * w[at(MODEL + ELBOW_SCALE, k, j, W, L)]
-                        / (w[at(MODEL + SCALE, i, j, W, L)] * w[at(MODEL + SCALE, k, j, W, L)]
-                           * w[at(MINV, i, j, W, L)] * w[at(MINV, k, j, W, L)]))
-                measure = abs(size * (w[at(A1, i, j, W, L)] * w[at(A2, k, j, W, L)]
-                                      - w[at(A2, i, j, W, L)] * w[at(A1, k, j, W, L)]))
+                size = (
+                    w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
+                    * w[at(MODEL + ELBOW_SCALE, k, j, W, L)]
+                    / (
+                        w[at(MODEL + SCALE, i, j, W, L)]
+                        * w[at(MODEL + SCALE, k, j, W, L)]
+                        * w[at(MINV, i, j, W, L)]
+                        * w[at(MINV, k, j, W, L)]
+                    )
+                )
+                measure = abs(
+                    size
+                    * (w[at(A1, i, j, W, L)] * w[at(A2, k, j, W, L)] - w[at(A2, i, j, W, L)] * w[at(A1, k, j, W, L)])
+                )
                 used = w[of(JOINT_J, j, W, L)] == i and w[of(JOINT_K, j, W, L)] == k
                 w[of(NOW, j, W, L)] = measure if used else w[of(NOW, j, W, L)]
                 better = measure > w[of(BEST, j, W, L)]
@@ -105,12 +120,17 @@ def reference(lanes, drives, arms, law, table, o, w):
         for j in range(L):
             fx = fy = 0.0
             for i in range(N):
-                a1, a2, rate, elbow = (w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], want(table, o, RATE, i, W),
-                                       want(table, o, ELBOW_RATE, i, W))
+                a1, a2, rate, elbow = (
+                    w[at(A1, i, j, W, L)],
+                    w[at(A2, i, j, W, L)],
+                    want(table, o, RATE, i, W),
+                    want(table, o, ELBOW_RATE, i, W),
+                )
                 fx += a1 * rate - (a1 + w[at(L1, i, j, W, L)]) * elbow
                 fy += a2 * rate - (a2 + w[at(L2, i, j, W, L)]) * elbow
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = solve2(
-                w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy)
+                w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy
+            )
     elif law.form == APD:
         for j in range(L):
             a11, a12, _, _, _, r1, _ = joint(drives, arms, table, o, w, JOINT_J, j, L)
@@ -133,16 +153,34 @@ def shares(lanes, drives, arms, extra, w):
             bx, by, lx, ly = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)]
             vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
             ad, inv, base = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)], bx * vx + by * vy
-            base_acc, back_acc = accelerations(base, lx * vx + ly * vy, bx * ux + by * uy, lx * ux + ly * uy, ad, inv,
-                                               w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)])
-            m11, m12, m22, fx, fy = inertia(w[at(MODEL + S1, i, j, W, L)], w[at(MODEL + S2, i, j, W, L)],
-                                            bx, by, lx, ly, base_acc, back_acc)
+            base_acc, back_acc = accelerations(
+                base,
+                lx * vx + ly * vy,
+                bx * ux + by * uy,
+                lx * ux + ly * uy,
+                ad,
+                inv,
+                w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + L2SQ, i, j, W, L)],
+            )
+            m11, m12, m22, fx, fy = inertia(
+                w[at(MODEL + S1, i, j, W, L)], w[at(MODEL + S2, i, j, W, L)], bx, by, lx, ly, base_acc, back_acc
+            )
             if len(extra) > 0:
-                env = (w[of(ENVIRONMENT + GRAVITY_X, j, W, L)], w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
-                       w[of(ENVIRONMENT + SHARPNESS, j, W, L)])
+                env = (
+                    w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
+                    w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
+                    w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
+                )
                 place = lx / inv, ly / inv, bx / inv, by / inv, ad, inv, 0.0
-                gx, gy = drag(w[at(MODEL + W1, i, j, W, L)], w[at(MODEL + W2, i, j, W, L)],
-                              w[at(MODEL + FRICTION, i, j, W, L)], env, place, base)
+                gx, gy = drag(
+                    w[at(MODEL + W1, i, j, W, L)],
+                    w[at(MODEL + W2, i, j, W, L)],
+                    w[at(MODEL + FRICTION, i, j, W, L)],
+                    env,
+                    place,
+                    base,
+                )
                 fx, fy = fx + gx, fy + gy
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = m11, m12, m22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = -fx, -fy
@@ -197,8 +235,10 @@ def redundant_feedback(lanes, drives, arms, law, table, o, w):
             bx, by, lx, ly = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)]
             ex, ey = -(bx + lx), -(by + ly)
             s = w[at(GAIN_P, i, j, W, L)] * w[at(E, i, j, W, L)] + w[at(GAIN_D, i, j, W, L)] * w[at(ED, i, j, W, L)]
-            t = (w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
-                 + w[at(ELBOW_D, i, j, W, L)] * w[at(ELBOW_ED, i, j, W, L)])
+            t = (
+                w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
+                + w[at(ELBOW_D, i, j, W, L)] * w[at(ELBOW_ED, i, j, W, L)]
+            )
             r = want(table, o, ACCELERATION, i, W) - w[at(ACC_B, i, j, W, L)]
             q = want(table, o, ELBOW_ACCELERATION, i, W) - w[at(ACC_E, i, j, W, L)]
             ad, inv = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)]
@@ -221,7 +261,8 @@ def redundant_feedback(lanes, drives, arms, law, table, o, w):
             else:
                 wx, wy = wx + bx * r + ex * q, wy + by * r + ey * q
         w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = solve2(
-            w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], wx + tx, wy + ty)
+            w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], wx + tx, wy + ty
+        )
         w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = gx, gy
 
 

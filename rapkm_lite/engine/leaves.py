@@ -39,10 +39,16 @@ def smooth_sign(z):
     u2 = u * u
     u4 = u2 * u2
     # The series in pairs of pairs, so that less waits for each other: its last term is below 1e-17 of the first.
-    low = (1.0 + u * (1 / 2)) + u2 * (1 / 6 + u * (1 / 24)) + u4 * ((1 / 120 + u * (1 / 720)) + u2 * (
-        1 / 5040 + u * (1 / 40320)))
-    high = (1 / 362880 + u * (1 / 3628800)) + u2 * (1 / 39916800 + u * (1 / 479001600)) + u4 * (
-        (1 / 6227020800 + u * (1 / 87178291200)) + u2 * (1 / 1307674368000))
+    low = (
+        (1.0 + u * (1 / 2))
+        + u2 * (1 / 6 + u * (1 / 24))
+        + u4 * ((1 / 120 + u * (1 / 720)) + u2 * (1 / 5040 + u * (1 / 40320)))
+    )
+    high = (
+        (1 / 362880 + u * (1 / 3628800))
+        + u2 * (1 / 39916800 + u * (1 / 479001600))
+        + u4 * ((1 / 6227020800 + u * (1 / 87178291200)) + u2 * (1 / 1307674368000))
+    )
     t = u * (low + u4 * u4 * high)
     for _ in range(6):
         t = t * (2.0 + t)
@@ -62,8 +68,15 @@ def geometry(base_x, base_y, l1sq, half, mean, mode, x, y):
     root, inverse = math.sqrt(inside), 1.0 / rho2
     k, h = kappa * inverse, root * (mode * inverse)
     rest = 1.0 - k
-    return (k * X + h * Y, k * Y - h * X, rest * X - h * Y, rest * Y + h * X, 0.5 * rho2 - mean,
-            root * (mode / inside), area2)
+    return (
+        k * X + h * Y,
+        k * Y - h * X,
+        rest * X - h * Y,
+        rest * Y + h * X,
+        0.5 * rho2 - mean,
+        root * (mode / inside),
+        area2,
+    )
 
 
 @leaf
@@ -80,8 +93,13 @@ def accelerations(base, back, base_ref, back_ref, ad, inv, l1sq, l2sq):
 def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
     """Share of an arm in the mass matrix and in the force at zero xdd: m11, m12, m22, fx, fy."""
     sx, sy, tx, ty = s1 * bx, s1 * by, s2 * lx, s2 * ly
-    return (sx * bx + tx * lx, sx * by + tx * ly, sy * by + ty * ly,
-            -(sx * base_acc + tx * back_acc), -(sy * base_acc + ty * back_acc))
+    return (
+        sx * bx + tx * lx,
+        sx * by + tx * ly,
+        sy * by + ty * ly,
+        -(sx * base_acc + tx * back_acc),
+        -(sy * base_acc + ty * back_acc),
+    )
 
 
 @leaf
@@ -123,5 +141,13 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
     # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
     h = r * inv
     g1, g2 = 1.0 - h * ad, h * l2sq
-    return (g1 * bx * bx - g2 * lx * lx, g1 * bx * by - g2 * lx * ly, g1 * by * by - g2 * ly * ly, bx * r, by * r,
-            bx, by, near)
+    return (
+        g1 * bx * bx - g2 * lx * lx,
+        g1 * bx * by - g2 * lx * ly,
+        g1 * by * by - g2 * ly * ly,
+        bx * r,
+        by * r,
+        bx,
+        by,
+        near,
+    )

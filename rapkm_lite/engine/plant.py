@@ -27,15 +27,29 @@ def sense(lanes, arms, extra, table, o, w, dt):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             place = geometry(
-                w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(HALF, i, j, W, L)],
-                w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[of(X, j, W, L)], w[of(Y, j, W, L)])
+                w[at(BX, i, j, W, L)],
+                w[at(BY, i, j, W, L)],
+                w[at(L1SQ, i, j, W, L)],
+                w[at(HALF, i, j, W, L)],
+                w[at(MEAN, i, j, W, L)],
+                w[at(MODE, i, j, W, L)],
+                w[of(X, j, W, L)],
+                w[of(Y, j, W, L)],
+            )
             m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
-                w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
-                w[of(VX, j, W, L)], w[of(VY, j, W, L)])
+                w[at(S1, i, j, W, L)],
+                w[at(S2, i, j, W, L)],
+                w[at(L1SQ, i, j, W, L)],
+                w[at(L2SQ, i, j, W, L)],
+                place,
+                w[of(VX, j, W, L)],
+                w[of(VY, j, W, L)],
+            )
             if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
-                gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
-                              place, rate)
+                gx, gy = drag(
+                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, place, rate
+                )
                 fx, fy = fx + gx, fy + gy
             ax, ay = place[0], place[1]
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
@@ -79,15 +93,29 @@ def pull(lanes, arms, extra, w):
     for i in range(W):
         for j in range(L):
             place = geometry(
-                w[at(BX, i, j, W, L)], w[at(BY, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(HALF, i, j, W, L)],
-                w[at(MEAN, i, j, W, L)], w[at(MODE, i, j, W, L)], w[of(SX, j, W, L)], w[of(SY, j, W, L)])
+                w[at(BX, i, j, W, L)],
+                w[at(BY, i, j, W, L)],
+                w[at(L1SQ, i, j, W, L)],
+                w[at(HALF, i, j, W, L)],
+                w[at(MEAN, i, j, W, L)],
+                w[at(MODE, i, j, W, L)],
+                w[of(SX, j, W, L)],
+                w[of(SY, j, W, L)],
+            )
             m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
-                w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], place,
-                w[of(SVX, j, W, L)], w[of(SVY, j, W, L)])
+                w[at(S1, i, j, W, L)],
+                w[at(S2, i, j, W, L)],
+                w[at(L1SQ, i, j, W, L)],
+                w[at(L2SQ, i, j, W, L)],
+                place,
+                w[of(SVX, j, W, L)],
+                w[of(SVY, j, W, L)],
+            )
             if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
-                gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env,
-                              place, rate)
+                gx, gy = drag(
+                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, place, rate
+                )
                 fx, fy = fx + gx, fy + gy
             c = w[at(C, i, j, W, L)]
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
@@ -133,9 +161,20 @@ def count_steps(lanes, arms, w, dt):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
         stiff, fast, near = 0.0, 0.0, 0.0
         for i in range(W):
-            a, b, c = stiffness(w[at(FRICTION, i, j, W, L)], sharpness, m11, m12, m22, w[at(B1, i, j, W, L)],
-                                w[at(B2, i, j, W, L)], w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)],
-                                w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
+            a, b, c = stiffness(
+                w[at(FRICTION, i, j, W, L)],
+                sharpness,
+                m11,
+                m12,
+                m22,
+                w[at(B1, i, j, W, L)],
+                w[at(B2, i, j, W, L)],
+                w[at(QD, i, j, W, L)],
+                w[at(ACC, i, j, W, L)],
+                w[of(KX, j, W, L)],
+                w[of(KY, j, W, L)],
+                dt,
+            )
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
         n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = n

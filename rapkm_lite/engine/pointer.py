@@ -85,8 +85,14 @@ def pointer(function, N: int, matrices: bool, memory: int):
     at_hand = matrices_of if matrices else nothing
 
     def call(buffer):
-        c = ask(buffer[0], buffer[1 : 1 + N], buffer[1 + N : 1 + 2 * N], wanted(buffer), at_hand(buffer),
-                buffer[kept : kept + memory])
+        c = ask(
+            buffer[0],
+            buffer[1 : 1 + N],
+            buffer[1 + N : 1 + 2 * N],
+            wanted(buffer),
+            at_hand(buffer),
+            buffer[kept : kept + memory],
+        )
         for i in range(N):
             # An answer of another length is none.
             buffer[answer + i] = c[i] if len(c) == N else np.nan

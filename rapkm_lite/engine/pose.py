@@ -32,10 +32,16 @@ def control_rows(lanes, drives, arms, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            place = geometry(w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)],
-                             w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + HALF, i, j, W, L)],
-                             w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
-                             w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+            place = geometry(
+                w[at(MODEL + BX, i, j, W, L)],
+                w[at(MODEL + BY, i, j, W, L)],
+                w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)],
+                w[at(MODEL + MEAN, i, j, W, L)],
+                w[at(MODEL + MODE, i, j, W, L)],
+                w[of(PX, j, W, L)],
+                w[of(PY, j, W, L)],
+            )
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = place[2] * place[5], place[3] * place[5]
 
 
@@ -47,11 +53,18 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             place = geometry(
-                w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)],
-                w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+                w[at(MODEL + BX, i, j, W, L)],
+                w[at(MODEL + BY, i, j, W, L)],
+                w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)],
+                w[at(MODEL + MEAN, i, j, W, L)],
+                w[at(MODEL + MODE, i, j, W, L)],
+                w[of(PX, j, W, L)],
+                w[of(PY, j, W, L)],
+            )
             p11, p12, p22, gx, gy, bx, by, near = pose_terms(
-                w[at(MODEL + L2SQ, i, j, W, L)], w[at(MODEL + SCALE, i, j, W, L)], place, ux, uy, w[at(E, i, j, W, L)])
+                w[at(MODEL + L2SQ, i, j, W, L)], w[at(MODEL + SCALE, i, j, W, L)], place, ux, uy, w[at(E, i, j, W, L)]
+            )
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = p11, p12, p22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)], w[at(NEAR, i, j, W, L)] = gx, gy, near
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
@@ -82,10 +95,19 @@ def single_step(arms, w, x, y):
     W = len(arms)
     m = MODEL * W
     for i in range(W):
-        place = geometry(w[m + BX * W + i], w[m + BY * W + i], w[m + L1SQ * W + i], w[m + HALF * W + i],
-                         w[m + MEAN * W + i], w[m + MODE * W + i], x, y)
-        p11, p12, p22, gx, gy, bx, by, near = pose_terms(w[m + L2SQ * W + i], w[m + SCALE * W + i], place,
-                                                         w[UX * W + i], w[UY * W + i], w[E * W + i])
+        place = geometry(
+            w[m + BX * W + i],
+            w[m + BY * W + i],
+            w[m + L1SQ * W + i],
+            w[m + HALF * W + i],
+            w[m + MEAN * W + i],
+            w[m + MODE * W + i],
+            x,
+            y,
+        )
+        p11, p12, p22, gx, gy, bx, by, near = pose_terms(
+            w[m + L2SQ * W + i], w[m + SCALE * W + i], place, w[UX * W + i], w[UY * W + i], w[E * W + i]
+        )
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
         w[A1 * W + i], w[A2 * W + i], w[NEAR * W + i] = bx, by, near
 
@@ -122,8 +144,15 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
             ax, ay, dx, dy, _, inv, area2 = geometry(
-                w[at(MODEL + BX, i, j, W, L)], w[at(MODEL + BY, i, j, W, L)], w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)], w[at(MODEL + MEAN, i, j, W, L)], w[at(MODEL + MODE, i, j, W, L)], x, y)
+                w[at(MODEL + BX, i, j, W, L)],
+                w[at(MODEL + BY, i, j, W, L)],
+                w[at(MODEL + L1SQ, i, j, W, L)],
+                w[at(MODEL + HALF, i, j, W, L)],
+                w[at(MODEL + MEAN, i, j, W, L)],
+                w[at(MODEL + MODE, i, j, W, L)],
+                x,
+                y,
+            )
             if not area2 > 0.0:
                 return x, y, False
             bx, by = dx * inv, dy * inv
@@ -166,8 +195,9 @@ def measured_pose(lanes, drives, arms, study, table, o, w, k, smooth):
     if rough > 0.0:
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
-                px, py, found = gauss_newton(drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)],
-                                             tolerance)
+                px, py, found = gauss_newton(
+                    drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
+                )
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
                     w[of(STATUS, j, W, L)], w[of(SAMPLE, j, W, L)] = NO_POSE, k

@@ -15,8 +15,12 @@ from .tables import *
 def fetch(row, block, W, table, o, w):
     """Copy a block of the desired motion into a row; four numbers are read before they are written, as one vector."""
     if W == 4:
-        a, b, c, d = (want(table, o, block, 0, W), want(table, o, block, 1, W), want(table, o, block, 2, W),
-                      want(table, o, block, 3, W))
+        a, b, c, d = (
+            want(table, o, block, 0, W),
+            want(table, o, block, 1, W),
+            want(table, o, block, 2, W),
+            want(table, o, block, 3, W),
+        )
         w[row * W], w[row * W + 1], w[row * W + 2], w[row * W + 3] = a, b, c, d
     else:
         for i in range(W):
@@ -35,10 +39,12 @@ def sense(arms, extra, table, o, w, dt):
     fetch(WANTED_RATE, RATE, W, table, o, w)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        place = geometry(w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
-                         w[MODE * W + i], x, y)
+        place = geometry(
+            w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
+        )
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy
+        )
         if extra is not None:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
@@ -64,8 +70,7 @@ def join(arms, w):
     """End-effector acceleration from the shares of the arms."""
     W = len(arms)
     mass = w[of(MASS, 0, W, 1)]
-    return solve2(mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W),
-                  total(FX, w, W), total(FY, w, W))
+    return solve2(mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W), total(FX, w, W), total(FY, w, W))
 
 
 @leaf
@@ -74,10 +79,12 @@ def acceleration(arms, extra, acting, w, x, y, vx, vy):
     W = len(arms)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        place = geometry(w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i],
-                         w[MODE * W + i], x, y)
+        place = geometry(
+            w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
+        )
         m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy)
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy
+        )
         if extra is not None:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
@@ -99,8 +106,12 @@ def step(arms, extra, acting, w, x, y, vx, vy, k1x, k1y, dt):
     zx, zy = vx + dt * k3x, vy + dt * k3y
     k4x, k4y = acceleration(arms, extra, acting, w, x + dt * wx, y + dt * wy, zx, zy)
     s = dt / 6.0
-    return (x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy),
-            vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y))
+    return (
+        x + s * (vx + 2.0 * (ux + wx) + zx),
+        y + s * (vy + 2.0 * (uy + wy) + zy),
+        vx + s * (k1x + 2.0 * (k2x + k3x) + k4x),
+        vy + s * (k1y + 2.0 * (k2y + k3y) + k4y),
+    )
 
 
 @outlined
@@ -111,8 +122,20 @@ def count_steps(arms, w, kx, ky, dt):
     m11, m12, m22 = mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W)
     stiff, fast, near = 0.0, 0.0, 0.0
     for i in range(W):
-        a, b, c = stiffness(w[FRICTION * W + i], sharpness, m11, m12, m22, w[B1 * W + i], w[B2 * W + i], w[QD * W + i],
-                            w[ACC * W + i], kx, ky, dt)
+        a, b, c = stiffness(
+            w[FRICTION * W + i],
+            sharpness,
+            m11,
+            m12,
+            m22,
+            w[B1 * W + i],
+            w[B2 * W + i],
+            w[QD * W + i],
+            w[ACC * W + i],
+            kx,
+            ky,
+            dt,
+        )
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
     return max(1.0, math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS)))) if near > 0.0 else 0.0
 

@@ -66,8 +66,18 @@ def motion_table(trajectory, width: int, count: int = ALL) -> np.ndarray:
     """Desired motion per sample, (k, 6 + count width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
     q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
-    blocks = [q[:, :N], qd[:, :N], np.cos(q[:, :N]), np.sin(q[:, :N]),
-              qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(q[:, N:]), np.sin(q[:, N:]), q[:, N:]]
+    blocks = [
+        q[:, :N],
+        qd[:, :N],
+        np.cos(q[:, :N]),
+        np.sin(q[:, :N]),
+        qdd[:, :N],
+        qd[:, N:],
+        qdd[:, N:],
+        np.cos(q[:, N:]),
+        np.sin(q[:, N:]),
+        q[:, N:],
+    ]
     arms = _filled(N, width)
     return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks[:count])])
 

@@ -106,8 +106,16 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             link = base + want(table, o, ELBOW_RATE, i, W)
             den = ax * dy - ay * dx
         else:
-            ax, ay, dx, dy, _, inv, _ = geometry(w[m + BX * W], w[m + BY * W], l1sq, w[m + HALF * W], w[m + MEAN * W],
-                                                 w[m + MODE * W], w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
+            ax, ay, dx, dy, _, inv, _ = geometry(
+                w[m + BX * W],
+                w[m + BY * W],
+                l1sq,
+                w[m + HALF * W],
+                w[m + MEAN * W],
+                w[m + MODE * W],
+                w[of(PX, 0, W, 1)],
+                w[of(PY, 0, W, 1)],
+            )
             den = 1.0 / inv
             vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
             base, link = (dx * vx + dy * vy) / den, -(ax * vx + ay * vy) / den
@@ -149,7 +157,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     transposed(Q2, F, Q_, 2, n, 1)
     # Redundant coordinates with N = U U^T: U (U^T G U) U^T and so on.
     project(F, F_dot, U, V, P, P_dot, n)
-    small, wide = scratch[4], scratch[5 : 7].reshape(2, 2 * n)
+    small, wide = scratch[4], scratch[5:7].reshape(2, 2 * n)
     product(H, G, U, n, n, 2)
     transposed(small, U, H, 2, n, 2)
     product(T, U, small, n, 2, 2)

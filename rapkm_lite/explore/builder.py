@@ -33,8 +33,16 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
     step = math.log10(high / low) / steps
     # A browser moves a value between two steps to the nearer one, so the steps are laid through the value.
     first = math.log10(value) - step * round(math.log10(value / low) / step)
-    return widgets.FloatLogSlider(value, base=10, min=first, max=first + steps * step, step=step, description=label,
-                                  readout_format=".3g", **_common())
+    return widgets.FloatLogSlider(
+        value,
+        base=10,
+        min=first,
+        max=first + steps * step,
+        step=step,
+        description=label,
+        readout_format=".3g",
+        **_common(),
+    )
 
 
 def choice(label: str, options, value=None) -> widgets.Widget:
@@ -53,8 +61,18 @@ def _common() -> dict:
     return {"style": {"description_width": "initial"}, "layout": dict(_LAYOUT)}
 
 
-def explorer(draw: Callable, controls: dict, panels: dict, *, layout=None, widths=None, size=(9.4, 3.3), setup=None,
-             play: str | None = None, live: bool | None = None) -> Explorer:
+def explorer(
+    draw: Callable,
+    controls: dict,
+    panels: dict,
+    *,
+    layout=None,
+    widths=None,
+    size=(9.4, 3.3),
+    setup=None,
+    play: str | None = None,
+    live: bool | None = None,
+) -> Explorer:
     """Build an explorer from ``draw(picture, **controls)`` and draw it once.
 
     draw : puts curves into the `LivePicture`, and returns the numbers that matter, a dict of name -> text (or None).
@@ -76,8 +94,10 @@ def explorer(draw: Callable, controls: dict, panels: dict, *, layout=None, width
     names = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
     rest = len(names) < len(parameters)
     if not set(names) <= set(controls) or (not rest and set(controls) - set(names)):
-        raise ValueError(f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
-                         f"{', '.join(names) or '(none)'} after the picture; allowed: the same names")
+        raise ValueError(
+            f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
+            f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
+        )
     if play is not None and play not in controls:
         raise ValueError(f"play = {play!r}; allowed: one of {', '.join(controls)}")
     picture = LivePicture(panels, layout, widths, size, setup)
@@ -100,8 +120,9 @@ class Explorer:
         width = f"{self.picture.canvas.get_width_height()[0]}px"
         self._image = widgets.Image(format="png", layout={"max_width": "100%", "width": width, "object_fit": "contain"})
         self._words = widgets.HTML()
-        button = widgets.Button(description="Reset", tooltip="back to the first setting", icon="undo",
-                                layout={"width": "90px"})
+        button = widgets.Button(
+            description="Reset", tooltip="back to the first setting", icon="undo", layout={"width": "90px"}
+        )
         button.on_click(lambda _: self.reset())
         row = []
         for name, widget in self.controls.items():
@@ -116,8 +137,15 @@ class Explorer:
         self.update()
 
     def _player(self, widget) -> widgets.Play:
-        play = widgets.Play(widget.value, min=widget.min, max=widget.max, step=widget.step, interval=80,
-                            show_repeat=False, layout={"width": "120px"})
+        play = widgets.Play(
+            widget.value,
+            min=widget.min,
+            max=widget.max,
+            step=widget.step,
+            interval=80,
+            show_repeat=False,
+            layout={"width": "120px"},
+        )
         self._link = widgets.jslink((play, "value"), (widget, "value"))
         return play
 
@@ -191,8 +219,11 @@ class Explorer:
     def _html(self) -> str:
         if self.problem:
             return f'<div role="status">{html.escape(self.problem)}</div>'
-        items = "".join(f'<span style="margin-right:1.6em;white-space:nowrap">{html.escape(name)}: '
-                        f"<b>{html.escape(text)}</b></span> " for name, text in self.numbers.items())
+        items = "".join(
+            f'<span style="margin-right:1.6em;white-space:nowrap">{html.escape(name)}: '
+            f"<b>{html.escape(text)}</b></span> "
+            for name, text in self.numbers.items()
+        )
         return f'<div role="status" style="line-height:1.5">{items}</div>'
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:

@@ -58,13 +58,24 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         q = inverse_kinematics(robot, point, modes[mode])
         all_drives = act.singular_values(act.control_matrix(robot, q))[1]
         draw_machine(picture, "machine", robot, q)
-        numbers = {"degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
-                   "σ_min of all drives": f"{all_drives:.2f} rad/m"}
+        numbers = {
+            "degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
+            "σ_min of all drives": f"{all_drives:.2f} rad/m",
+        }
         for pair, name, value in zip(pairs, "abc", pair_measures(robot, q), strict=False):
             weak = value < WEAK
             draw_machine(picture, name, robot, q, arms=pair)
-            picture.text(name, 0.5, 1.02, f"{pair_name(pair)}: {value:.2f} rad/m", inside=True, ha="center",
-                         fontsize=10, fontweight="bold" if weak else "normal", color=ALARM if weak else AFTER)
+            picture.text(
+                name,
+                0.5,
+                1.02,
+                f"{pair_name(pair)}: {value:.2f} rad/m",
+                inside=True,
+                ha="center",
+                fontsize=10,
+                fontweight="bold" if weak else "normal",
+                color=ALARM if weak else AFTER,
+            )
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"
         return numbers
 
@@ -76,8 +87,12 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         bar = axes["machine"].figure.colorbar(ScalarMappable(LEVELS, MAP), ax=axes["machine"], shrink=0.85, pad=0.02)
         bar.set_label("σ_min in rad/m")
 
-    controls = {"x": slider("x in mm", -200, 200, 2, 20), "y": slider("y in mm", -200, 230, 2, 30),
-                "mode": choice("working mode", modes), "drives": choice("map for", which)}
+    controls = {
+        "x": slider("x in mm", -200, 200, 2, 20),
+        "y": slider("y in mm", -200, 230, 2, 30),
+        "mode": choice("working mode", modes),
+        "drives": choice("map for", which),
+    }
     rows = [["machine", name] for name in "abc"[: len(pairs)]]
     return explorer(draw, controls, panels, layout=rows, widths=[2.7, 1], size=(8.2, 5.4), setup=setup, live=True)
 
@@ -118,18 +133,26 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             picture.line(panel, [place, place], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.8, zorder=1)
         corners = act.force_polygon(A[k], 1e-3 * torque)
         for pair in pairs:
-            picture.polygon("force", act.force_polygon(A[k][list(pair)], 1e-3 * torque), fill=False, linewidth=1.5,
-                            edgecolor=pair_line(robot, pair)["color"], linestyle=pair_line(robot, pair)["linestyle"])
+            picture.polygon(
+                "force",
+                act.force_polygon(A[k][list(pair)], 1e-3 * torque),
+                fill=False,
+                linewidth=1.5,
+                edgecolor=pair_line(robot, pair)["color"],
+                linestyle=pair_line(robot, pair)["linestyle"],
+            )
         picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
         bound = np.abs(corners).max()
         picture.fit("force", bound)
         picture.limits("force", x=picture.axes["force"].get_ylim())
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
-        return {"point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
-                "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
-                "σ_min of the pairs": per_drive(sigma[k], 2) + " rad/m",
-                "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
-                "null vector": per_drive(null[k], 2)}
+        return {
+            "point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
+            "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
+            "σ_min of the pairs": per_drive(sigma[k], 2) + " rad/m",
+            "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
+            "null vector": per_drive(null[k], 2),
+        }
 
     def setup(axes):
         plot_workspace(robot, axes["plane"])
@@ -138,17 +161,35 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         legend(axes["force"], [("all drives", {"color": AFTER})])
 
     way = "place on the path in %"
-    panels = {"plane": plane_limits(robot, 0.05) | {"title": "Machine"},
-              "sigma": {"title": "Pairs", "xlabel": way, "ylabel": "σ_min in rad/m", "xlim": (0, 100), "ylim": (0, 8)},
-              "null": {"title": "Null vector", "xlabel": way, "ylabel": "component", "xlim": (0, 100),
-                       "ylim": (-1.05, 1.05)},
-              "force": {"title": "Forces", "xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal",
-                        "xlim": (-2, 2), "ylim": (-2, 2)}}
-    controls = {"place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0), "path": choice("path", paths.keys()),
-                "size": slider("side or diameter in mm", 40, 320, 5, 240),
-                "torque": slider("torque limit in mN m", 20, 200, 5, 85)}
-    return explorer(draw, controls, panels, layout=[["plane", "sigma"], ["force", "null"]], widths=[1, 1.35],
-                    size=(9.2, 6.6), setup=setup, live=True)
+    panels = {
+        "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
+        "sigma": {"title": "Pairs", "xlabel": way, "ylabel": "σ_min in rad/m", "xlim": (0, 100), "ylim": (0, 8)},
+        "null": {"title": "Null vector", "xlabel": way, "ylabel": "component", "xlim": (0, 100), "ylim": (-1.05, 1.05)},
+        "force": {
+            "title": "Forces",
+            "xlabel": "f_x in N",
+            "ylabel": "f_y in N",
+            "aspect": "equal",
+            "xlim": (-2, 2),
+            "ylim": (-2, 2),
+        },
+    }
+    controls = {
+        "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
+        "path": choice("path", paths.keys()),
+        "size": slider("side or diameter in mm", 40, 320, 5, 240),
+        "torque": slider("torque limit in mN m", 20, 200, 5, 85),
+    }
+    return explorer(
+        draw,
+        controls,
+        panels,
+        layout=[["plane", "sigma"], ["force", "null"]],
+        widths=[1, 1.35],
+        size=(9.2, 6.6),
+        setup=setup,
+        live=True,
+    )
 
 
 def prestress(robot: Manipulator | None = None) -> Explorer:
@@ -175,18 +216,26 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             picture.line(panel, t.t[[0, -1]], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=1)
         energy = [t.dt * np.sum(robot.resistance * (v / robot.torque_constant) ** 2) for v in (least, c)]
         changes = [sign_changes(v) for v in (least, c)]
-        return {"changes of sign without": per_drive(changes[0], 0), "with": per_drive(changes[1], 0),
-                "heat without": f"{energy[0]:.2f} J", "heat with": f"{energy[1]:.2f} J",
-                "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m"}
+        return {
+            "changes of sign without": per_drive(changes[0], 0),
+            "with": per_drive(changes[1], 0),
+            "heat without": f"{energy[0]:.2f} J",
+            "heat with": f"{energy[1]:.2f} J",
+            "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
+        }
 
     def setup(axes):
         drive_legend(axes["without"], robot)
         drive_legend(axes["with"], robot)
 
-    panels = {name: {"title": title, "xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
-              for name, title in (("without", "No prestress"), ("with", "With prestress"))}
-    controls = {"level": slider("prestress wished for in mN m", -100, 100, 2, 40),
-                "side": slider("side of the triangle in mm", 60, 300, 5, 240)}
+    panels = {
+        name: {"title": title, "xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
+        for name, title in (("without", "No prestress"), ("with", "With prestress"))
+    }
+    controls = {
+        "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
+        "side": slider("side of the triangle in mm", 60, 300, 5, 240),
+    }
     return explorer(draw, controls, panels, setup=setup, live=True)
 
 

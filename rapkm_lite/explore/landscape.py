@@ -56,20 +56,40 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         for i in range(robot.n_arms):
             for k in range(robot.n_arms):
                 at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
-                picture.bar("directions", at, directions[i, k] * np.sign(directions[:, k].sum() or 1), 0.2,
-                            facecolor=arm_colour(i))
+                picture.bar(
+                    "directions",
+                    at,
+                    directions[i, k] * np.sign(directions[:, k].sum() or 1),
+                    0.2,
+                    facecolor=arm_colour(i),
+                )
         picture.line("directions", [0.5, robot.n_arms + 0.5], [0, 0], color=NEUTRAL, linewidth=0.8)
-        return {"antagonistic energy": f"{dq @ S @ dq:.2f} J", "trace of S": f"{np.trace(S):.3f} J/mrad²",
-                "principal costs": " / ".join(f"{c:.3f}" for c in np.maximum(costs, 0)) + " J/mrad²"}
+        return {
+            "antagonistic energy": f"{dq @ S @ dq:.2f} J",
+            "trace of S": f"{np.trace(S):.3f} J/mrad²",
+            "principal costs": " / ".join(f"{c:.3f}" for c in np.maximum(costs, 0)) + " J/mrad²",
+        }
 
-    ticks = {"xlim": (0.5, robot.n_arms + 0.5), "xlabel": "principal direction, cheapest first",
-             "xticks": range(1, robot.n_arms + 1)}
-    panels = {"map": {"xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad", "xlim": (-12, 12), "ylim": (-12, 12),
-                      "aspect": "equal"},
-              "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
-              "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.05, 1.05), **ticks}}
+    ticks = {
+        "xlim": (0.5, robot.n_arms + 0.5),
+        "xlabel": "principal direction, cheapest first",
+        "xticks": range(1, robot.n_arms + 1),
+    }
+    panels = {
+        "map": {
+            "xlabel": "offset 1 in mrad",
+            "ylabel": "offset 2 in mrad",
+            "xlim": (-12, 12),
+            "ylim": (-12, 12),
+            "aspect": "equal",
+        },
+        "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
+        "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.05, 1.05), **ticks},
+    }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
-    controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
-                 "side": slider("side of the triangle in mm", 20, 240, 10, 120),
-                 "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40)}
+    controls |= {
+        "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
+        "side": slider("side of the triangle in mm", 20, 240, 10, 120),
+        "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
+    }
     return explorer(draw, controls, panels)

@@ -66,8 +66,9 @@ class LivePicture:
             blocks = y[:count].reshape(-1, span)
             low, high = blocks.argmin(axis=1), blocks.argmax(axis=1)
             start = np.arange(0, count, span)
-            keep = np.concatenate([np.stack([start + np.minimum(low, high), start + np.maximum(low, high)], -1).ravel(),
-                                   [len(t) - 1]])
+            keep = np.concatenate(
+                [np.stack([start + np.minimum(low, high), start + np.maximum(low, high)], -1).ravel(), [len(t) - 1]]
+            )
             t, y = t[keep], y[keep]
         self.line(panel, t, y, **style)
 
@@ -91,18 +92,24 @@ class LivePicture:
 
     def arrow(self, panel: str, start, vector, width: float = 0.006, **style) -> None:
         """An arrow from `start` (2,) along `vector` (2,), in data coordinates; invisible when shorter than `width`."""
-        arrow = self._artist(panel, "arrow", style,
-                             lambda ax, kw: ax.add_patch(FancyArrow(0, 0, 1, 0, length_includes_head=True, **kw)))
+        arrow = self._artist(
+            panel, "arrow", style, lambda ax, kw: ax.add_patch(FancyArrow(0, 0, 1, 0, length_includes_head=True, **kw))
+        )
         length = float(np.hypot(*vector))
         head = min(4 * width, 0.6 * length)
         arrow.set_visible(length > width)
-        arrow.set_data(x=start[0], y=start[1], dx=vector[0], dy=vector[1], width=width, head_width=3.2 * width,
-                       head_length=head)
+        arrow.set_data(
+            x=start[0], y=start[1], dx=vector[0], dy=vector[1], width=width, head_width=3.2 * width, head_length=head
+        )
 
     def image(self, panel: str, values, extent, **style) -> None:
         """A map of values (rows, columns) over extent (x0, x1, y0, y1); masked values stay transparent."""
-        image = self._artist(panel, "image", {"zorder": 0, **style},
-                             lambda ax, kw: ax.add_image(AxesImage(ax, origin="lower", extent=extent, **kw)))
+        image = self._artist(
+            panel,
+            "image",
+            {"zorder": 0, **style},
+            lambda ax, kw: ax.add_image(AxesImage(ax, origin="lower", extent=extent, **kw)),
+        )
         if image.get_array() is not values:
             image.set_data(values)
 
@@ -136,8 +143,19 @@ class LivePicture:
         key = ("", "sentence")
         if key not in self._pools:
             box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
-            text = self.figure.text(0.5, 0.5, "", ha="center", va="center", color=ALARM, fontsize=11.5, zorder=100,
-                                    bbox=box, animated=True, in_layout=False)
+            text = self.figure.text(
+                0.5,
+                0.5,
+                "",
+                ha="center",
+                va="center",
+                color=ALARM,
+                fontsize=11.5,
+                zorder=100,
+                bbox=box,
+                animated=True,
+                in_layout=False,
+            )
             self._pools[key] = [(text, {})]
         text = self._pools[key][0][0]
         text.set_text(textwrap.fill(words, int(8.5 * self.figure.get_figwidth())))
@@ -154,7 +172,8 @@ class LivePicture:
         file = io.BytesIO()
         # 64 colours are enough for lines on white, and half the size and time of all colours.
         image.convert("RGB").quantize(64, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(
-            file, "PNG", compress_level=1)
+            file, "PNG", compress_level=1
+        )
         return file.getvalue()
 
     def _draw_background(self, renderer) -> None:

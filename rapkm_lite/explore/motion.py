@@ -47,10 +47,13 @@ def animation(robot: Manipulator | None = None) -> Explorer:
             picture.fit(panel, values, symmetric=panel == "torque", least=0.5)
             picture.line(panel, run.t[[k, k]], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.9, zorder=1)
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
-        return {"time": f"{run.t[k]:.2f} s", "force on the end-effector": f"{np.hypot(*total):.2f} N",
-                "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
-                "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
-                "path error": f"{error[k]:.2f} mm"}
+        return {
+            "time": f"{run.t[k]:.2f} s",
+            "force on the end-effector": f"{np.hypot(*total):.2f} N",
+            "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
+            "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
+            "path error": f"{error[k]:.2f} mm",
+        }
 
     def setup(axes):
         plot_workspace(robot, axes["plane"])
@@ -60,9 +63,22 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
     plane = plane_limits(robot, 0.05) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
-    panels = {"plane": plane, "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
-              "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time}}
-    controls = {"time": slider("time in ms", 0, 5000, 40, 400), "filter": choice("antagonism filter", LAWS.keys()),
-                "offsets": switch("calibration offsets −5, −6, 12 mrad", True)}
-    return explorer(draw, controls, panels, layout=[["plane", "torque"], ["plane", "error"]], size=(9.2, 4.8),
-                    setup=setup, play="time")
+    panels = {
+        "plane": plane,
+        "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
+        "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time},
+    }
+    controls = {
+        "time": slider("time in ms", 0, 5000, 40, 400),
+        "filter": choice("antagonism filter", LAWS.keys()),
+        "offsets": switch("calibration offsets −5, −6, 12 mrad", True),
+    }
+    return explorer(
+        draw,
+        controls,
+        panels,
+        layout=[["plane", "torque"], ["plane", "error"]],
+        size=(9.2, 4.8),
+        setup=setup,
+        play="time",
+    )

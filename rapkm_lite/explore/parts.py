@@ -26,17 +26,44 @@ def draw_machine(picture, panel: str, robot: Manipulator, q, arms=None, faint=()
         colour, alpha = arm_colour(i), 0.2 if i in faint else 1.0
         picture.line(panel, *points.T, color=colour, linewidth=4, alpha=alpha, solid_capstyle="round", zorder=3)
         picture.line(panel, *points[0], color=colour, marker="o", markersize=10, alpha=alpha, zorder=4)
-        picture.line(panel, *points[1], color=colour, marker="o", markersize=6.5, alpha=alpha, markerfacecolor="white",
-                     markeredgewidth=2, zorder=4)
-    picture.line(panel, *chains[0, 2], color=NEUTRAL, marker="s", markersize=7, markerfacecolor="white",
-                 markeredgewidth=1.8, zorder=5)
+        picture.line(
+            panel,
+            *points[1],
+            color=colour,
+            marker="o",
+            markersize=6.5,
+            alpha=alpha,
+            markerfacecolor="white",
+            markeredgewidth=2,
+            zorder=4,
+        )
+    picture.line(
+        panel,
+        *chains[0, 2],
+        color=NEUTRAL,
+        marker="s",
+        markersize=7,
+        markerfacecolor="white",
+        markeredgewidth=1.8,
+        zorder=5,
+    )
 
 
 def legend(ax, entries) -> None:
     """A one-line legend above the panel, on the right; entries are (words, keywords of a line)."""
     handles = [Line2D([], [], **{"linewidth": 2, **style}) for _, style in entries]
-    ax.legend(handles, [words for words, _ in entries], ncols=len(entries), loc="lower right", bbox_to_anchor=(1, 1),
-              handlelength=1.7, columnspacing=0.9, handletextpad=0.6, borderaxespad=0.1, fontsize=9)
+    ax.legend(
+        handles,
+        [words for words, _ in entries],
+        ncols=len(entries),
+        loc="lower right",
+        bbox_to_anchor=(1, 1),
+        handlelength=1.7,
+        columnspacing=0.9,
+        handletextpad=0.6,
+        borderaxespad=0.1,
+        fontsize=9,
+    )
 
 
 def drive_legend(ax, robot: Manipulator, words: str = "drive") -> None:
@@ -47,8 +74,10 @@ def drive_legend(ax, robot: Manipulator, words: str = "drive") -> None:
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
     """One slider per drive, offset_1, offset_2, ..., in mrad."""
     values = np.resize(values, robot.n_arms)
-    return {f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(values[i]))
-            for i in range(robot.n_arms)}
+    return {
+        f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(values[i]))
+        for i in range(robot.n_arms)
+    }
 
 
 def per_drive(values, digits: int) -> str:

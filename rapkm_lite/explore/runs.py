@@ -27,8 +27,15 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
         for i, value in enumerate(values):
             at = i + 1 + (k - (len(groups) - 1) / 2) * width
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
-            picture.text(panel, at, value, format(value + 0.0, form).replace("-", "−"), ha="center", fontsize=9,
-                         va="bottom" if value >= 0 else "top")
+            picture.text(
+                panel,
+                at,
+                value,
+                format(value + 0.0, form).replace("-", "−"),
+                ha="center",
+                fontsize=9,
+                va="bottom" if value >= 0 else "top",
+            )
 
 
 def steady_state(robot: Manipulator | None = None) -> Explorer:
@@ -59,21 +66,30 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         picture.fit("torque", 1.25 * torque, least=10.0)
         for panel in ("rest", "torque"):
             picture.line(panel, [0.4, N + 0.6], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=4)
-        return {"error at rest, theory": per_drive(theory, 2) + " mrad",
-                "simulated": per_drive(error[-1], 2) + " mrad",
-                "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
-                "rest torque": per_drive(torque, 1) + " mN m",
-                "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W"}
+        return {
+            "error at rest, theory": per_drive(theory, 2) + " mrad",
+            "simulated": per_drive(error[-1], 2) + " mrad",
+            "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
+            "rest torque": per_drive(torque, 1) + " mN m",
+            "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W",
+        }
 
     def setup(axes):
         drive_legend(axes["error"], robot)
-        legend(axes["rest"], [("theory", {"color": NEUTRAL, "alpha": 0.45, "linewidth": 7}),
-                              ("simulated", {"color": NEUTRAL, "linewidth": 7})])
+        legend(
+            axes["rest"],
+            [
+                ("theory", {"color": NEUTRAL, "alpha": 0.45, "linewidth": 7}),
+                ("simulated", {"color": NEUTRAL, "linewidth": 7}),
+            ],
+        )
 
     drives = {"xticks": range(1, N + 1), "xlabel": "drive", "xlim": (0.4, N + 0.6)}
-    panels = {"error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
-              "rest": {"ylabel": "error at rest in mrad", **drives},
-              "torque": {"ylabel": "torque at rest in mN m", **drives}}
+    panels = {
+        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
+        "rest": {"ylabel": "error at rest in mrad", **drives},
+        "torque": {"ylabel": "torque at rest in mN m", **drives},
+    }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     controls["place"] = choice("point", points.keys())
@@ -90,8 +106,11 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     if robot.same_kinematics(load()):
         paths["reading of Table 1"] = experiment("table1_reading").trajectory
     table = measured_energies() if N == 3 else None
-    plain = lru_cache(maxsize=4)(lambda path, on, encoder, K_P, K_D, *offset: simulate(
-        machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder or None).energy)
+    plain = lru_cache(maxsize=4)(
+        lambda path, on, encoder, K_P, K_D, *offset: (
+            simulate(machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder or None).energy
+        )
+    )
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
         offset = 1e-3 * np.array([offsets[f"offset_{i + 1}"] for i in range(N)])
@@ -111,9 +130,11 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         if filter != "off":
             before = plain(path, friction, encoder, K_P, K_D, *offset).sum()
             numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
-        return numbers | {"torque at the end": per_drive(torque[-1], 1) + " mN m",
-                          "largest torque": f"{np.abs(torque).max():.0f} mN m",
-                          "largest error": f"{np.abs(error).max():.1f} mrad"}
+        return numbers | {
+            "torque at the end": per_drive(torque[-1], 1) + " mN m",
+            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "largest error": f"{np.abs(error).max():.1f} mrad",
+        }
 
     def setup(axes):
         drive_legend(axes["torque"], robot)
@@ -121,14 +142,24 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         measured = [("Table 1", {"color": NEUTRAL, "alpha": 0.4, "linewidth": 7})] if table is not None else []
         legend(axes["energy"], [("this run", {"color": NEUTRAL, "linewidth": 7}), *measured])
 
-    panels = {"torque": {"xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5)},
-              "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 5)},
-              "energy": {"xlabel": "drive", "ylabel": "electric energy in J", "xlim": (0.4, N + 0.6),
-                         "xticks": range(1, N + 1)}}
+    panels = {
+        "torque": {"xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5)},
+        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 5)},
+        "energy": {
+            "xlabel": "drive",
+            "ylabel": "electric energy in J",
+            "xlim": (0.4, N + 0.6),
+            "xticks": range(1, N + 1),
+        },
+    }
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
-    controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
-                 "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
-                 "filter": choice("antagonism filter", LAWS.keys()), "friction": switch("friction", True),
-                 "encoder": choice("encoder counts per turn", counts), "path": choice("path", paths.keys())}
+    controls |= {
+        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
+        "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
+        "filter": choice("antagonism filter", LAWS.keys()),
+        "friction": switch("friction", True),
+        "encoder": choice("encoder counts per turn", counts),
+        "path": choice("path", paths.keys()),
+    }
     return explorer(draw, controls, panels, widths=[1.15, 1.15, 1], setup=setup)

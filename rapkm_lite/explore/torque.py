@@ -92,9 +92,11 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.fit("error", error, least=5.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
-        return numbers | {"largest torque": f"{np.abs(torque).max():.0f} mN m",
-                          "largest error": f"{np.abs(error).max():.1f} mrad",
-                          "energy": per_drive(run.energy, 2) + f" J, in all {run.energy.sum():.2f} J"}
+        return numbers | {
+            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "largest error": f"{np.abs(error).max():.1f} mrad",
+            "energy": per_drive(run.energy, 2) + f" J, in all {run.energy.sum():.2f} J",
+        }
 
     def setup(axes):
         plot_workspace(robot, axes["plane"])
@@ -110,13 +112,26 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         drive_legend(axes["error"], robot)
 
     reach = robot.base
-    plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (reach[:, 0].min(), reach[:, 0].max()),
-             "ylim": (reach[:, 1].min() - 0.06, reach[:, 1].max() + 0.02), "title": " "}
+    plane = {
+        "xlabel": "x in m",
+        "ylabel": "y in m",
+        "aspect": "equal",
+        "xlim": (reach[:, 0].min(), reach[:, 0].max()),
+        "ylim": (reach[:, 1].min() - 0.06, reach[:, 1].max() + 0.02),
+        "title": " ",
+    }
     time = {"xlabel": TIME, "xlim": (0, 5)}
-    panels = {"plane": plane, "map": {"title": "Feedback", "ylabel": "norm in N m s²/rad", **time},
-              "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
-              "error": {"title": "Error", "ylabel": "angle error in mrad", **time}}
-    controls = {"law": choice("law", words), "side": slider("side of the triangle in mm", 100, 300, 5, 170),
-                "rate": slider("poles at −1/s times", 10, 80, 2, 40)} | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
-    return explorer(draw, controls, panels, layout=[["plane", "map"], ["torque", "error"]], size=(9.2, 6.2),
-                    setup=setup)
+    panels = {
+        "plane": plane,
+        "map": {"title": "Feedback", "ylabel": "norm in N m s²/rad", **time},
+        "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
+        "error": {"title": "Error", "ylabel": "angle error in mrad", **time},
+    }
+    controls = {
+        "law": choice("law", words),
+        "side": slider("side of the triangle in mm", 100, 300, 5, 170),
+        "rate": slider("poles at −1/s times", 10, 80, 2, 40),
+    } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
+    return explorer(
+        draw, controls, panels, layout=[["plane", "map"], ["torque", "error"]], size=(9.2, 6.2), setup=setup
+    )

@@ -90,7 +90,7 @@ def _measure(exercise: Exercise, answer) -> str:
     if lawful > limit:
         raise _Verdict("wrong", f"{sentence}: {lawful:.3g} (allowed {limit:.0e})")
     law = f"; {sentence}: below {limit:.0e}" if exercise.invariant else ""
-    return f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[:len(cases) > 1]}{law}"
+    return f"within {limit:.0e} {exercise.unit} of the package at {len(cases)} case{'s'[: len(cases) > 1]}{law}"
 
 
 def examine(name: str, answer) -> tuple[str, str]:

@@ -7,9 +7,19 @@ import tomllib
 from pathlib import Path
 
 UNITS = {
-    "base": "m", "lengths": "m", "masses": "kg", "centers": "m", "inertias": "kg m^2", "rotor_inertia": "kg m^2",
-    "resistance": "ohm", "torque_constant": "N m/A", "friction": "N m", "friction_velocity": "rad/s",
-    "gravity": "m/s^2", "load": "kg", "mode": "1",
+    "base": "m",
+    "lengths": "m",
+    "masses": "kg",
+    "centers": "m",
+    "inertias": "kg m^2",
+    "rotor_inertia": "kg m^2",
+    "resistance": "ohm",
+    "torque_constant": "N m/A",
+    "friction": "N m",
+    "friction_velocity": "rad/s",
+    "gravity": "m/s^2",
+    "load": "kg",
+    "mode": "1",
 }
 
 

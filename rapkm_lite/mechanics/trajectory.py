@@ -158,8 +158,15 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     return follow(robot, t, x, rate[:, None] * step / edge_time, rate_dot[:, None] * step / edge_time**2)
 
 
-def triangle(robot: Manipulator, side: float = 0.24, duration: float = 5.0, dt: float = 1e-3,
-             centre=(0.0, 0.0), angle: float = 0.0, rest: float = 0.0) -> Trajectory:
+def triangle(
+    robot: Manipulator,
+    side: float = 0.24,
+    duration: float = 5.0,
+    dt: float = 1e-3,
+    centre=(0.0, 0.0),
+    angle: float = 0.0,
+    rest: float = 0.0,
+) -> Trajectory:
     """The chapter's path: an equilateral triangle, one corner up, from the lower left corner, counter-clockwise.
 
     side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s, see `polygon`.
@@ -174,8 +181,9 @@ def triangle(robot: Manipulator, side: float = 0.24, duration: float = 5.0, dt: 
     return polygon(robot, corners, duration, dt, rest)
 
 
-def circle(robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3,
-           centre=(0.0, 0.0), turns: int = 1) -> Trajectory:
+def circle(
+    robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3, centre=(0.0, 0.0), turns: int = 1
+) -> Trajectory:
     """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s.
 
     >>> import rapkm_lite as rk

@@ -43,8 +43,15 @@ class Code:
         return self.form, self.filter, self.true_pose, self.switched, self.user
 
 
-_FORMS = {PD: tables.PD, PID: tables.PID, APD: tables.APD, CTC: tables.CTC, SwitchedCTC: tables.CTC,
-          RedundantAPD: tables.REDUNDANT_APD, RedundantCTC: tables.REDUNDANT_CTC}
+_FORMS = {
+    PD: tables.PD,
+    PID: tables.PID,
+    APD: tables.APD,
+    CTC: tables.CTC,
+    SwitchedCTC: tables.CTC,
+    RedundantAPD: tables.REDUNDANT_APD,
+    RedundantCTC: tables.REDUNDANT_CTC,
+}
 _ZERO = np.zeros(())
 _FILTERS = {AntagonismFilter: tables.FORCE_FILTER, CommandFilter: tables.COMMAND_FILTER}
 
@@ -85,8 +92,13 @@ def _gains(law: Any, N: int) -> tuple[int, dict, dict]:
         code = code if getattr(law, "projected", True) else tables.REDUNDANT_CTC_LINE2
         return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
     (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
-    run = {"PAIR_P1": p1, "PAIR_P2": p2, "PAIR_D1": d1, "PAIR_D2": d2,
-           "HYSTERESIS": float(getattr(law, "hysteresis", 1.0))}
+    run = {
+        "PAIR_P1": p1,
+        "PAIR_P2": p2,
+        "PAIR_D1": d1,
+        "PAIR_D2": d2,
+        "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
+    }
     independent = getattr(law, "independent", None)
     if independent is not None:
         if max(independent) >= 2 * N:
@@ -146,9 +158,14 @@ def _sums(setup: Setup, w) -> tuple:
     done, dt, holds = status == DONE, setup.trajectory.dt, len(t) - 1
     energies = w("COPPER").T * (robot.resistance / robot.torque_constant**2) * dt + w("WORK").T
     final = np.stack([w("X"), w("Y")], axis=-1)
-    return (np.where(done[:, None], energies, 0.0), np.sqrt(np.where(done, w("TORQUE2"), 0.0) / holds),
-            np.where(done, w("ANTAGONISM") * dt, 0.0), np.where(done[:, None], final, 0.0),
-            np.where(done, 0.0, t[sample]), status)
+    return (
+        np.where(done[:, None], energies, 0.0),
+        np.sqrt(np.where(done, w("TORQUE2"), 0.0) / holds),
+        np.where(done, w("ANTAGONISM") * dt, 0.0),
+        np.where(done[:, None], final, 0.0),
+        np.where(done, 0.0, t[sample]),
+        status,
+    )
 
 
 def _run(setup: Setup, codes: list[Code], offsets, history):
@@ -176,10 +193,15 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)
-    law = tables.Law(code.form, code.filter,
-                     code.filter != tables.NO_FILTER or tables.PID < code.form < tables.USER or asks == tables.POSED,
-                     tables.TRUE if code.true_pose else tables.MEASURED, model.same_kinematics(robot), code.switched,
-                     asks)
+    law = tables.Law(
+        code.form,
+        code.filter,
+        code.filter != tables.NO_FILTER or tables.PID < code.form < tables.USER or asks == tables.POSED,
+        tables.TRUE if code.true_pose else tables.MEASURED,
+        model.same_kinematics(robot),
+        code.switched,
+        asks,
+    )
     kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
     modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < code.form < tables.USER else None
@@ -187,9 +209,20 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
     with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
         try:
-            closed_loops(kind, study, modelled, user, tables.sensor(setup.sensors, trajectory.dt), law, trajectory.dt,
-                         _made_for(trajectory, W, desired),
-                         tables.faults(setup.faults, W), w, log, buffer)
+            closed_loops(
+                kind,
+                study,
+                modelled,
+                user,
+                tables.sensor(setup.sensors, trajectory.dt),
+                law,
+                trajectory.dt,
+                _made_for(trajectory, W, desired),
+                tables.faults(setup.faults, W),
+                w,
+                log,
+                buffer,
+            )
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR

@@ -44,8 +44,9 @@ class Experiment(Value):
 
     def run(self, law=None) -> Run:
         """Simulate it, by default with its own law."""
-        return simulate(self.robot, self.law if law is None else law, self.trajectory, sensors=self.sensors,
-                        faults=self.faults)
+        return simulate(
+            self.robot, self.law if law is None else law, self.trajectory, sensors=self.sensors, faults=self.faults
+        )
 
 
 def experiment(source="testbed") -> Experiment:
@@ -60,8 +61,11 @@ def experiment(source="testbed") -> Experiment:
     (3,)
     """
     robot, tables = load(source), read_toml(source)
-    allowed = {"control": ["K_P", "K_D", "dt"], "path": ["side", "duration", "centre", "angle", "rest"],
-               "sensor": ["offset", "encoder", "velocity_filter"]}
+    allowed = {
+        "control": ["K_P", "K_D", "dt"],
+        "path": ["side", "duration", "centre", "angle", "rest"],
+        "sensor": ["offset", "encoder", "velocity_filter"],
+    }
     for table, keys in allowed.items():
         for key in tables.get(table, {}):
             known(f"TOML key in [{table}]", key, keys)

@@ -33,18 +33,22 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
         measure = abs(crossed[pairs.index((min(pair), max(pair)))])
         if measure < 0.3:
-            return (f"{REASONS[status]} (near a parameterization singularity of its independent drives "
-                    f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)")
+            return (
+                f"{REASONS[status]} (near a parameterization singularity of its independent drives "
+                f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)"
+            )
     return f"{REASONS[status]} ({_stability(setup, law, k)})"
 
 
 def too_stiff(setup: Setup) -> str:
     """The sentence on friction that would need more steps per hold than the engine takes."""
     robot = setup.robot
-    return (f"{REASONS[TOO_STIFF]} of {setup.trajectory.dt:g} s: f_c / v0 = "
-            f"{robot.friction.max() / robot.friction_velocity:g} N m s/rad (friction {robot.friction.max():g} N m, "
-            f"friction_velocity {robot.friction_velocity:g} rad/s) needs more than 4000 steps in a hold; allowed: a "
-            "larger friction_velocity, less friction or a shorter dt")
+    return (
+        f"{REASONS[TOO_STIFF]} of {setup.trajectory.dt:g} s: f_c / v0 = "
+        f"{robot.friction.max() / robot.friction_velocity:g} N m s/rad (friction {robot.friction.max():g} N m, "
+        f"friction_velocity {robot.friction_velocity:g} rad/s) needs more than 4000 steps in a hold; allowed: a "
+        "larger friction_velocity, less friction or a shorter dt"
+    )
 
 
 def _stability(setup: Setup, law, k: int) -> str:
@@ -52,12 +56,16 @@ def _stability(setup: Setup, law, k: int) -> str:
     if factor is None:
         return "look at gains, offsets and the path"
     if factor > 1.05:
-        return (f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
-                f"sample of {setup.trajectory.dt:g} s")
+        return (
+            f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
+            f"sample of {setup.trajectory.dt:g} s"
+        )
     if factor > 1.001:
         return f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
-    return (f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
-            "offsets, a weak gain, or a path too near the boundary")
+    return (
+        f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
+        "offsets, a weak gain, or a path too near the boundary"
+    )
 
 
 def _ours(law) -> bool:

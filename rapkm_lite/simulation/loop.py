@@ -24,8 +24,10 @@ def own_copy(law):
     try:
         return copy.deepcopy(law)
     except Exception as error:
-        raise ValueError(f"law = {law!r} cannot be copied ({error}), and so its runs would depend on each other; "
-                         "allowed: an object that copy.deepcopy copies, or a function") from error
+        raise ValueError(
+            f"law = {law!r} cannot be copied ({error}), and so its runs would depend on each other; "
+            "allowed: an object that copy.deepcopy copies, or a function"
+        ) from error
 
 
 def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
@@ -43,17 +45,17 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     k = 0
     try:
         for k, t in enumerate(times):
-            q, qd = plant.observe(k, state)                                            # sense
-            angles, rates = encoders.read(k, q, qd)                                    # measure
+            q, qd = plant.observe(k, state)  # sense
+            angles, rates = encoders.read(k, q, qd)  # measure
             truth = state[:2], state[2:]
-            torque = controller.command(t, angles, rates, trajectory[k], truth)       # pose (if asked for), command
+            torque = controller.command(t, angles, rates, trajectory[k], truth)  # pose (if asked for), command
             if faults is not None:
                 torque = faults.act(k, torque)
-            states[k], q_a[k], qd_a[k], c[k] = state, q, qd, torque                    # record
+            states[k], q_a[k], qd_a[k], c[k] = state, q, qd, torque  # record
             if controller.pair is not None:
                 pairs[k] = controller.pair
             if k < last:
-                state = plant.hold(state, torque, dt)                                  # hold
+                state = plant.hold(state, torque, dt)  # hold
                 if state is None:
                     return Outcome(plant.status, k, *history), None
     except NoPose as error:

@@ -127,9 +127,17 @@ class Run(Value):
         return f"Run({len(self) and self.t[-1]:g} s, {type(self.law).__name__}, energy ({joules}) J)"
 
 
-def simulate(robot: Manipulator, law: LawLike, trajectory: Trajectory, offset: ArrayLike = 0.0,
-             encoder: float | None = None, model: Manipulator | None = None, velocity_filter: float | None = None,
-             faults: FaultsLike = (), sensors: Sensors | None = None) -> Run:
+def simulate(
+    robot: Manipulator,
+    law: LawLike,
+    trajectory: Trajectory,
+    offset: ArrayLike = 0.0,
+    encoder: float | None = None,
+    model: Manipulator | None = None,
+    velocity_filter: float | None = None,
+    faults: FaultsLike = (),
+    sensors: Sensors | None = None,
+) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
     The run starts at rest at the first point of the path.  The controller measures q_a + offset and the true rates.
@@ -186,8 +194,20 @@ def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
     rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
     q_a, qd_a, c, pairs = (column[rows] for column in columns)
     states = states[rows]
-    return Run(setup.robot, law, setup.trajectory, setup.sensors, faults, setup.trajectory.t[rows], states[:, :2],
-               states[:, 2:], q_a, qd_a, c, pairs)
+    return Run(
+        setup.robot,
+        law,
+        setup.trajectory,
+        setup.sensors,
+        faults,
+        setup.trajectory.t[rows],
+        states[:, :2],
+        states[:, 2:],
+        q_a,
+        qd_a,
+        c,
+        pairs,
+    )
 
 
 def hand_over(error, partial, note: str) -> None:

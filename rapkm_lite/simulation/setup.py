@@ -56,8 +56,12 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
     Raises ValueError for what does not fit together, and where the machine does not reach the start of the path.
     """
     model = robot if model is None else model
-    for name, value, kind in (("robot", robot, Manipulator), ("model", model, Manipulator),
-                              ("trajectory", trajectory, Trajectory), ("sensors", sensors, Sensors)):
+    for name, value, kind in (
+        ("robot", robot, Manipulator),
+        ("model", model, Manipulator),
+        ("trajectory", trajectory, Trajectory),
+        ("sensors", sensors, Sensors),
+    ):
         if not isinstance(value, kind):
             raise ValueError(f"{name} = {value!r}; allowed: a {kind.__name__}")
     if model.n_arms != robot.n_arms:

@@ -76,10 +76,20 @@ class Sweep(Value):
         return f"Sweep({len(self)} runs, {int(self.failed.sum())} failed{ends})"
 
 
-def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Trajectory, offsets: ArrayLike,
-          encoder: float | None = None, model: Manipulator | None = None, velocity_filter: float | None = None,
-          executor: Executor | None = None, failed: str = "raise", chunk: int = 64, progress: bool = False,
-          faults: FaultsLike = ()) -> Sweep:
+def sweep(
+    robot: Manipulator,
+    law: LawLike | Sequence[LawLike],
+    trajectory: Trajectory,
+    offsets: ArrayLike,
+    encoder: float | None = None,
+    model: Manipulator | None = None,
+    velocity_filter: float | None = None,
+    executor: Executor | None = None,
+    failed: str = "raise",
+    chunk: int = 64,
+    progress: bool = False,
+    faults: FaultsLike = (),
+) -> Sweep:
     """Run a law on the machine along a trajectory once per row of `offsets`, many runs at a time.
 
     law : one law for all runs, or a sequence of k laws, such as PD with other gains.
@@ -113,8 +123,12 @@ def sweep(robot: Manipulator, law: LawLike | Sequence[LawLike], trajectory: Traj
             finished = np.count_nonzero(table.status == DONE)
             if finished:
                 partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
-                hand_over(error, partial, f"{finished} of {len(laws)} runs were finished; they are in the `partial` of "
-                                          "this exception, a Sweep whose other rows are masked.")
+                hand_over(
+                    error,
+                    partial,
+                    f"{finished} of {len(laws)} runs were finished; they are in the `partial` of "
+                    "this exception, a Sweep whose other rows are masked.",
+                )
             raise
     broken = bool(table.failed.any())
     result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
@@ -164,8 +178,9 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
-        hand_over(error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its "
-                                 "`partial`.")
+        hand_over(
+            error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`."
+        )
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
 
@@ -229,8 +244,18 @@ class Columns(NamedTuple):
             return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
         times = np.ma.array(self.failure_time, mask=~failed | (self.status == NOT_RUN))
-        return Sweep(robot, law, trajectory, offsets, column(self.energies), column(self.torque_norm),
-                     column(self.antagonistic_energy), column(self.x_final), failed, times)
+        return Sweep(
+            robot,
+            law,
+            trajectory,
+            offsets,
+            column(self.energies),
+            column(self.torque_norm),
+            column(self.antagonistic_energy),
+            column(self.x_final),
+            failed,
+            times,
+        )
 
 
 def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:

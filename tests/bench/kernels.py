@@ -21,10 +21,16 @@ PD = rk.PD(7.05, 0.225)
 FILTER, TRUE_FILTER = rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true")
 # What the C kernel is told to do for the same law: filtered, measured pose.
 IN_C = {"PD": (0, 0), "filter, true pose": (1, 0), "filter, measured pose": (1, 1)}
-LAWS = {"PD": PD, "filter, true pose": TRUE_FILTER, "filter, measured pose": FILTER,
-        "RedundantCTC": rk.RedundantCTC(900.0, 60.0), "CTC in x": rk.CTC(900.0, 60.0, None),
-        "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0),
-        "PD, small triangle": PD, "CTC of a pair, small triangle": rk.CTC(900.0, 60.0, (0, 1))}
+LAWS = {
+    "PD": PD,
+    "filter, true pose": TRUE_FILTER,
+    "filter, measured pose": FILTER,
+    "RedundantCTC": rk.RedundantCTC(900.0, 60.0),
+    "CTC in x": rk.CTC(900.0, 60.0, None),
+    "SwitchedCTC": rk.SwitchedCTC(900.0, 60.0),
+    "PD, small triangle": PD,
+    "CTC of a pair, small triangle": rk.CTC(900.0, 60.0, (0, 1)),
+}
 
 
 def cases(robot):
@@ -61,8 +67,9 @@ def yards(folder: Path, robot, lanes: int, kinds) -> dict:
     for friction, machine in ((False, robot.replace(friction=0.0)), (True, robot)):
         function = yardsticks.compile_c(folder, lanes, friction)
         for kind in kinds if function else ():
-            jobs[f"C {friction} {kind}"] = yardsticks.c_run(function, lanes, machine, rk.triangle(machine),
-                                                            OFFSET if lanes == 1 else BLOCK[:lanes], *IN_C[kind])
+            jobs[f"C {friction} {kind}"] = yardsticks.c_run(
+                function, lanes, machine, rk.triangle(machine), OFFSET if lanes == 1 else BLOCK[:lanes], *IN_C[kind]
+            )
     return jobs
 
 
@@ -92,10 +99,10 @@ def single_runs(robot, folder: Path) -> None:
     print(f"{'':40}{'ms':>6}{'/ C':>14}{'/ C, friction':>15}{'/ our PD':>14}")
     for name in jobs:
         kind = name.removesuffix(", friction")
-        columns = [t[name].over(t[yard]) if yard in against else ""
-                   for yard in (f"C False {kind}", f"C True {kind}")]
-        print(f"{name:40}{1e3 * t[name].median:6.2f}{columns[0]:>14}{columns[1]:>15}"
-              f"{t[name].over(t[own_pd(name)]):>14}")
+        columns = [t[name].over(t[yard]) if yard in against else "" for yard in (f"C False {kind}", f"C True {kind}")]
+        print(
+            f"{name:40}{1e3 * t[name].median:6.2f}{columns[0]:>14}{columns[1]:>15}{t[name].over(t[own_pd(name)]):>14}"
+        )
 
 
 def studies(robot, folder: Path) -> None:
@@ -109,11 +116,20 @@ def studies(robot, folder: Path) -> None:
     print(f"{'':40}{'runs/s':>8}{'C SIMD':>14}{'C, friction':>15}{'our PD':>14}")
     for name in jobs:
         columns = [t[yard].over(t[name]) for yard in against] or ["", ""]
-        print(f"{name:40}{len(BLOCK) / t[name].median:8.0f}{columns[0]:>14}{columns[1]:>15}"
-              f"{t[own_pd(name)].over(t[name]):>14}")
+        print(
+            f"{name:40}{len(BLOCK) / t[name].median:8.0f}{columns[0]:>14}{columns[1]:>15}"
+            f"{t[own_pd(name)].over(t[name]):>14}"
+        )
     offsets = np.tile(BLOCK, (16, 1))
-    sweeps = {name: lambda law=law, path=path, machine=machine: rk.sweep(machine, law, path, offsets)
-              for name, machine, law, path in cases(robot) if "friction" in name}
-    print("rk.sweep on all cores, runs/s: " + ", ".join(
-        f"{name.removesuffix(', friction')} {len(offsets) / time.median:.0f}"
-        for name, time in in_turns(3, **sweeps).items()))
+    sweeps = {
+        name: lambda law=law, path=path, machine=machine: rk.sweep(machine, law, path, offsets)
+        for name, machine, law, path in cases(robot)
+        if "friction" in name
+    }
+    print(
+        "rk.sweep on all cores, runs/s: "
+        + ", ".join(
+            f"{name.removesuffix(', friction')} {len(offsets) / time.median:.0f}"
+            for name, time in in_turns(3, **sweeps).items()
+        )
+    )

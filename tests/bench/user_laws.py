@@ -85,8 +85,9 @@ def laws(robot, path) -> None:
 
 def python(code: str, **environment) -> float:
     """The number that a script prints in a process of its own."""
-    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, **environment}, capture_output=True,
-                          text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, capture_output=True, text=True, check=True
+    )
     return float(done.stdout)
 
 
@@ -94,8 +95,10 @@ def start_up(robot, path) -> None:
     """Print the first result with an empty cache and from it, and a run without Numba."""
     with tempfile.TemporaryDirectory() as cache:
         times = [python(START, NUMBA_CACHE_DIR=cache) for _ in range(6)]
-    print(f"\nFirst result, import included: {times[0]:.2f} s with an empty cache, "
-          f"{statistics.median(times[1:]):.2f} s from it (shortest {min(times[1:]):.2f} s)")
+    print(
+        f"\nFirst result, import included: {times[0]:.2f} s with an empty cache, "
+        f"{statistics.median(times[1:]):.2f} s from it (shortest {min(times[1:]):.2f} s)"
+    )
     plain, kernel = python(AGAIN, RAPKM_LITE_NUMBA="0"), in_turns(15, run=single(robot, FILTER, path))["run"].median
     print(f"Without Numba: {plain:.2f} s for the same run, {plain / kernel:.0f} times the kernel")
 
@@ -112,5 +115,7 @@ def mujoco(robot, path) -> None:
     t = in_turns(7, engine=single(robot, PD, path), **jobs)
     print()
     for name, job in jobs.items():
-        print(f"MuJoCo rollout, {name}: {1e3 * t[name].median:.1f} ms, {t[name].median / t['engine'].median:.0f} times "
-              f"the engine, angles {np.abs(job() - truth).max():.1g} rad apart")
+        print(
+            f"MuJoCo rollout, {name}: {1e3 * t[name].median:.1f} ms, {t[name].median / t['engine'].median:.0f} times "
+            f"the engine, angles {np.abs(job() - truth).max():.1g} rad apart"
+        )

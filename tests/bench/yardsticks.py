@@ -21,10 +21,28 @@ def compile_c(folder: Path, lanes: int, friction: bool = False):
     library = folder / f"kernel{lanes}{friction}.so"
     source = Path(__file__).with_name("kernel.c")
     still = rk.hold(rk.load(), (0.0, 0.0))
-    known = {"LANES": lanes, "FRICTION": int(friction), "COLUMNS": tables.motion_table(still, 3).shape[1],
-             **{name: getattr(tables, name) for name in ("ANGLE", "RATE", "COS", "SIN")}}
-    subprocess.run([compiler, "-O3", "-march=native", "-ffast-math", *(f"-D{k}={v}" for k, v in known.items()),
-                    "-shared", "-fPIC", "-o", str(library), str(source), "-lm"], check=True)
+    known = {
+        "LANES": lanes,
+        "FRICTION": int(friction),
+        "COLUMNS": tables.motion_table(still, 3).shape[1],
+        **{name: getattr(tables, name) for name in ("ANGLE", "RATE", "COS", "SIN")},
+    }
+    subprocess.run(
+        [
+            compiler,
+            "-O3",
+            "-march=native",
+            "-ffast-math",
+            *(f"-D{k}={v}" for k, v in known.items()),
+            "-shared",
+            "-fPIC",
+            "-o",
+            str(library),
+            str(source),
+            "-lm",
+        ],
+        check=True,
+    )
     function = ctypes.CDLL(str(library)).closed_loop
     function.restype = ctypes.c_long
     return function
@@ -49,8 +67,18 @@ def c_run(function, lanes, robot, path, offsets, filtered=False, measured=False)
     numbers = [real(v) for v in (7.05, 0.225, weight, 1 / robot.friction_velocity)]
 
     def run():
-        steps = function(pointer[0], pointer[1], ctypes.c_long(len(path)), real(path.dt), pointer[2], *numbers,
-                         int(measured), int(filtered), pointer[3], pointer[4])
+        steps = function(
+            pointer[0],
+            pointer[1],
+            ctypes.c_long(len(path)),
+            real(path.dt),
+            pointer[2],
+            *numbers,
+            int(measured),
+            int(filtered),
+            pointer[3],
+            pointer[4],
+        )
         assert steps >= 0
         return history, sums.reshape(10, lanes)
 
@@ -67,16 +95,21 @@ def mujoco_rollout(robot, path, offset, integrator):
     for i in range(robot.n_arms):
         (l1, l2), (m1, m2) = robot.lengths[i], robot.masses[i]
         # Each link is a slender rod about its middle.
-        inner = (f'<body name="d{i}" pos="{l1} 0 0"><joint name="e{i}" axis="0 0 1"/>'
-                 f'<inertial pos="{l2 / 2} 0 0" mass="{m2}" diaginertia="1e-6 1e-3 {m2 * l2**2 / 12}"/></body>')
-        bodies += (f'<body name="p{i}" pos="{robot.base[i, 0]} {robot.base[i, 1]} 0">'
-                   f'<joint name="b{i}" axis="0 0 1" armature="{robot.rotor_inertia[i]}"/>'
-                   f'<inertial pos="{l1 / 2} 0 0" mass="{m1}" diaginertia="1e-6 1e-3 {m1 * l1**2 / 12}"/>'
-                   f"{inner}</body>")
+        inner = (
+            f'<body name="d{i}" pos="{l1} 0 0"><joint name="e{i}" axis="0 0 1"/>'
+            f'<inertial pos="{l2 / 2} 0 0" mass="{m2}" diaginertia="1e-6 1e-3 {m2 * l2**2 / 12}"/></body>'
+        )
+        bodies += (
+            f'<body name="p{i}" pos="{robot.base[i, 0]} {robot.base[i, 1]} 0">'
+            f'<joint name="b{i}" axis="0 0 1" armature="{robot.rotor_inertia[i]}"/>'
+            f'<inertial pos="{l1 / 2} 0 0" mass="{m1}" diaginertia="1e-6 1e-3 {m1 * l1**2 / 12}"/>'
+            f"{inner}</body>"
+        )
         drives += f'<position joint="b{i}" kp="7.05"/><velocity joint="b{i}" kv="0.225"/>'
         if i != 1:
-            loops += (f'<connect body1="d{i}" body2="d1" anchor="{l2} 0 0" solref="0.002 1" '
-                      'solimp="0.999 0.9999 0.001"/>')
+            loops += (
+                f'<connect body1="d{i}" body2="d1" anchor="{l2} 0 0" solref="0.002 1" solimp="0.999 0.9999 0.001"/>'
+            )
     model = mujoco.MjModel.from_xml_string(f"""
         <mujoco><compiler angle="radian" balanceinertia="true"/>
         <option timestep="{path.dt}" integrator="{integrator}" gravity="0 0 0"><flag contact="disable"/></option>

@@ -73,7 +73,8 @@ def _not_the_best(c, A, f, W, c0) -> tuple[float, str]:
     free = np.linalg.svd(A.T)[2][2:]
     slope = np.linalg.norm(free @ W @ (c - c0)) / np.linalg.norm(W)
     return max(float(slope), float(np.linalg.norm(A.T @ c - f) / np.linalg.norm(A))), (
-        "force missed, or slope of the price along a torque that moves nothing, as a torque in N m")
+        "force missed, or slope of the price along a torque that moves nothing, as a torque in N m"
+    )
 
 
 def input_singularity(mode) -> np.ndarray:
@@ -96,23 +97,39 @@ def _spread(x, mode) -> tuple[float, str]:
 
 EXERCISES = {
     "02.control_matrix": Exercise(
-        reference=_control_matrix, cases=_arms, invariant=_stretching, unit="rad/m", tolerance=1e-10,
+        reference=_control_matrix,
+        cases=_arms,
+        invariant=_stretching,
+        unit="rad/m",
+        tolerance=1e-10,
         hint="the tip velocity xd and the elbow velocity, qd_i times a_i turned by a quarter turn, have the same "
-             "component along d_i; for the elbow it is qd_i times the cross product a_i x d_i; solve for qd_i",
+        "component along d_i; for the elbow it is qd_i times the cross product a_i x d_i; solve for qd_i",
     ),
     "02.guaranteed_force": Exercise(
-        reference=guaranteed_force, cases=_control_matrices, invariant=_overpromise, unit="N", tolerance=1e-9,
+        reference=guaranteed_force,
+        cases=_control_matrices,
+        invariant=_overpromise,
+        unit="N",
+        tolerance=1e-9,
         hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across row "
-             "A_i every drive j adds at most torque times |A_j x A_i| / |A_i|",
+        "A_i every drive j adds at most torque times |A_j x A_i| / |A_i|",
     ),
     "02.best_torques": Exercise(
-        reference=best_torques, cases=_choices, invariant=_not_the_best, unit="N m", tolerance=1e-9,
+        reference=best_torques,
+        cases=_choices,
+        invariant=_not_the_best,
+        unit="N m",
+        tolerance=1e-9,
         hint="write c = c0 + s: the step s must make up for the force f - A^T c0 and be as small as possible in the "
-             "weights W, and (A^T)_W^+ of (11) gives the smallest step for a force",
+        "weights W, and (A^T)_W^+ of (11) gives the smallest step for a force",
     ),
     "02.input_singularity": Exercise(
-        reference=input_singularity, cases=_mixed_modes, invariant=_spread, unit="m", tolerance=1e-6,
+        reference=input_singularity,
+        cases=_mixed_modes,
+        invariant=_spread,
+        unit="m",
+        tolerance=1e-6,
         hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest "
-             "point of the map, or ask where two of the three curves cross",
+        "point of the map, or ask where two of the three curves cross",
     ),
 }

@@ -58,8 +58,16 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     plot_pair_curves(robot, axes[0], pairs=[pair])
     plot_machine(robot, q, axes[0], arms=pair, labels=False)
     for i in pair:
-        axes[0].annotate(f"drive {i + 1}", robot.base[i], xytext=(10, 10 * np.sign(robot.base[i, 1])), va="center",
-                         textcoords="offset points", color=arm_line(i)["color"], fontweight="bold", fontsize=9)
+        axes[0].annotate(
+            f"drive {i + 1}",
+            robot.base[i],
+            xytext=(10, 10 * np.sign(robot.base[i, 1])),
+            va="center",
+            textcoords="offset points",
+            color=arm_line(i)["color"],
+            fontweight="bold",
+            fontsize=9,
+        )
     _, d = arm_vectors(robot, q)
     axes[0].axline(x, np.add(x, d[pair[0]]), color=ALARM, lw=1.0, ls=":", zorder=2)
     plot_workspace(robot, axes[1])

@@ -75,24 +75,44 @@ EXERCISES = {
     "03.rest_error": Exercise(
         steady_state_error,
         "solve the two equations A^T K_P (A xi + offset) = 0 for the shift xi, then e = A xi",
-        "rad", _rest_cases, _unbalanced, 1e-9),
+        "rad",
+        _rest_cases,
+        _unbalanced,
+        1e-9,
+    ),
     "03.fight": Exercise(
         _fight,
         "c = mu eta; the errors -c / K - offset must lie in the tangent plane, so eta times them is zero",
-        "N m", _fight_cases, _open_chain, 1e-9),
+        "N m",
+        _fight_cases,
+        _open_chain,
+        1e-9,
+    ),
     "03.counts": Exercise(
         lambda K_P, friction: np.pi * K_P / friction,
         "one step of the torque is K_P 2 pi / counts, and it must fit into the friction band from -f_c to f_c",
-        "counts", lambda rng: [(float(k), float(f)) for k, f in zip(rng.uniform(1, 20, 4), rng.uniform(1e-3, 1e-2, 4),
-                                                                    strict=True)],
-        lambda counts, K_P, friction: (abs(K_P * 2 * np.pi / counts - 2 * friction),
-                                       "difference of the torque step from 2 f_c, in N m"), 1e-8),
+        "counts",
+        lambda rng: [
+            (float(k), float(f)) for k, f in zip(rng.uniform(1, 20, 4), rng.uniform(1e-3, 1e-2, 4), strict=True)
+        ],
+        lambda counts, K_P, friction: (
+            abs(K_P * 2 * np.pi / counts - 2 * friction),
+            "difference of the torque step from 2 f_c, in N m",
+        ),
+        1e-8,
+    ),
     "03.offsets": Exercise(
         lambda: hidden("offset_a")[0],
         "each rest gives one equation eta.offset = -eta.c / k_P; three rests, three unknowns",
-        "rad", invariant=_unexplained_torque, tolerance=3e-4),
+        "rad",
+        invariant=_unexplained_torque,
+        tolerance=3e-4,
+    ),
     "03.gains": Exercise(
         lambda: hidden("gain")[1],
         "at rest c_i = -K_i times (measured minus desired): a straight line through the origin for each drive",
-        "N m/rad", invariant=_unexplained_gain, tolerance=0.2),
+        "N m/rad",
+        invariant=_unexplained_gain,
+        tolerance=0.2,
+    ),
 }

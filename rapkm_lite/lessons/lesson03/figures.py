@@ -40,8 +40,14 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
         ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)
     ax.plot(0, 0, "+", color=NEUTRAL, ms=13, mew=2, zorder=5)
     ax.plot(*rest, "s", mfc="white", mec=NEUTRAL, mew=1.8, ms=8, zorder=6)
-    ax.set(xlim=centre[0] + half * np.array([-1, 1]), ylim=centre[1] + half * np.array([-1, 1]), aspect="equal",
-           xlabel="x − desired x in mm", ylabel="y − desired y in mm", title=title)
+    ax.set(
+        xlim=centre[0] + half * np.array([-1, 1]),
+        ylim=centre[1] + half * np.array([-1, 1]),
+        aspect="equal",
+        xlabel="x − desired x in mm",
+        ylabel="y − desired y in mm",
+        title=title,
+    )
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=1)
     return ax
 
@@ -63,8 +69,12 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     for look, (label, values) in zip(looks, theories.items(), strict=True):
         ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
-    ax.set(xscale="log", xlabel="gain of drive 3 / gain of drives 1 and 2", ylabel="largest rest torque in mN m",
-           title=title)
+    ax.set(
+        xscale="log",
+        xlabel="gain of drive 3 / gain of drives 1 and 2",
+        ylabel="largest rest torque in mN m",
+        title=title,
+    )
     _plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
     ax.legend()
     return ax
@@ -124,9 +134,12 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
-    ax.set(xscale="log", title=title,
-           xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
-           ylabel="torque jumps per second")
+    ax.set(
+        xscale="log",
+        title=title,
+        xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
+        ylabel="torque jumps per second",
+    )
     _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
     ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
     ax.legend(loc="center left")

@@ -53,8 +53,10 @@ def _torque_law(got, A, c):
 
 def _command_cases(rng):
     q = rng.uniform(-1, 1, (20, 3))
-    return [(A, rng.uniform(3, 15, 3), q[k] + rng.normal(0, 5e-3, 3), q[k])
-            for k, A in enumerate(_control_matrices(rng, 20))]
+    return [
+        (A, rng.uniform(3, 15, 3), q[k] + rng.normal(0, 5e-3, 3), q[k])
+        for k, A in enumerate(_control_matrices(rng, 20))
+    ]
 
 
 def _command_law(got, A, K_P, q_measured, q_desired):
@@ -65,8 +67,10 @@ def _command_law(got, A, K_P, q_measured, q_desired):
 
 def _log_cases(rng):
     robot = load()
-    return [(robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
-            for R, dt in ((0.611, 1e-3), ([0.5, 0.5, 0.5], 2e-3))]
+    return [
+        (robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
+        for R, dt in ((0.611, 1e-3), ([0.5, 0.5, 0.5], 2e-3))
+    ]
 
 
 def _pythagoras(got, robot, A, c, dt):
@@ -79,15 +83,27 @@ EXERCISES = {
     "04.filtered_torques": Exercise(
         filtered_torques,
         "c_eff = A f must give the same force, A^T A f = A^T c: solve for f, then multiply by A.",
-        "N m", _torque_cases, _torque_law, 1e-10),
+        "N m",
+        _torque_cases,
+        _torque_law,
+        1e-10,
+    ),
     "04.filtered_command": Exercise(
         filtered_command,
         "project the error e with the filter of the matrix K_P A (rk.antagonism_filter takes any matrix), "
         "and subtract the result from the measured angles.",
-        "rad", _command_cases, _command_law, 1e-10),
+        "rad",
+        _command_cases,
+        _command_law,
+        1e-10,
+    ),
     "04.saved_energy": Exercise(
         saved_energy,
         "filter the torques sample by sample, with R = rk.antagonism_filter(A) of shape (k, 3, 3), and subtract two "
         "copper losses.",
-        "J", _log_cases, _pythagoras, 1e-10),
+        "J",
+        _log_cases,
+        _pythagoras,
+        1e-10,
+    ),
 }

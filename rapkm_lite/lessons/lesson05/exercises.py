@@ -73,14 +73,24 @@ EXERCISES = {
     "05.feedback_map": Exercise(
         feedback_map,
         "accelerations need forces by Gbar, forces need torques by (A^T)^+, both in the angles of the pair",
-        "N m per rad/s^2", _pairs_at_poses, _acceleration),
+        "N m per rad/s^2",
+        _pairs_at_poses,
+        _acceleration,
+    ),
     "05.explicit_pseudoinverse": Exercise(
         explicit_pseudoinverse,
         "with B = (A~_1^T)^+ A~_2^T first the bottom block, (I + B^T B)^-1 B^T (A~_1^T)^+; the top one is "
         "(A~_1^T)^+ minus B times it; then put the rows into the order of the drives",
-        "(without unit)", _partitions, _penrose),
+        "(without unit)",
+        _partitions,
+        _penrose,
+    ),
     "05.gain_for_bandwidth": Exercise(
         gain_for_bandwidth,
         "take effective_gain of the matrix that selects the driven joints at every pose, and its smallest eigenvalue",
-        "1/s^2", _bandwidths, _slowest, tolerance=1e-6),
+        "1/s^2",
+        _bandwidths,
+        _slowest,
+        tolerance=1e-6,
+    ),
 }

@@ -16,8 +16,11 @@ def _paths(rng) -> list[tuple]:
     """A few machines, paths and gains."""
     robot = load().replace(friction=0.0)
     corners = rng.uniform(-0.06, 0.06, (3, 2))
-    return [(robot, circle(robot, 0.05, dt=5e-3), 7.05), (robot, polygon(robot, corners, dt=5e-3), rng.uniform(2, 9)),
-            (robot, triangle(robot, dt=5e-3), rng.uniform(2, 9))]
+    return [
+        (robot, circle(robot, 0.05, dt=5e-3), 7.05),
+        (robot, polygon(robot, corners, dt=5e-3), rng.uniform(2, 9)),
+        (robot, triangle(robot, dt=5e-3), rng.uniform(2, 9)),
+    ]
 
 
 def uniform_form(robot, trajectory, K_P: float) -> np.ndarray:
@@ -73,15 +76,27 @@ def _no_cheaper(cost, S, size):
 
 EXERCISES = {
     "06.form": Exercise(
-        uniform_form, cases=_paths, invariant=_trace, tolerance=1e-6, unit="J/rad²",
+        uniform_form,
+        cases=_paths,
+        invariant=_trace,
+        tolerance=1e-6,
+        unit="J/rad²",
         hint="N = I - A (A^T A)^-1 A^T at every sample; sum k_P² (R_el/k_t²) N over the holds, times dt",
     ),
     "06.expected_cost": Exercise(
-        expected_cost, cases=_forms, invariant=_sampled, tolerance=1e-9, unit="J",
+        expected_cost,
+        cases=_forms,
+        invariant=_sampled,
+        tolerance=1e-9,
+        unit="J",
         hint="the mean of dq^T S dq is the sum of S_ij times the covariance of dq_i and dq_j",
     ),
     "06.cheapest_offsets": Exercise(
-        cheapest_offsets, cases=_forms, invariant=_no_cheaper, tolerance=1e-9, unit="J",
+        cheapest_offsets,
+        cases=_forms,
+        invariant=_no_cheaper,
+        tolerance=1e-9,
+        unit="J",
         hint="dq^T S dq at a fixed norm is smallest along an eigenvector of S; which one?",
     ),
 }
