@@ -16,6 +16,7 @@ from .machine.arguments import ConvergenceError
 from .machine.datafiles import data_path
 from .machine.logs import Log, mystery_run
 from .machine.manipulator import Manipulator, load
+from .machine.mjcf import to_mjcf
 from .mechanics.actuation import (
     actuation_type,
     control_matrix,
@@ -107,7 +108,7 @@ __all__ = [
     "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement", "orthogonal_complement_dot",
     "polygon", "potential_energy", "prestress_projector", "reachable", "redundant_control_matrix",
     "redundant_dynamics", "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate",
-    "singular_values", "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips",
+    "singular_values", "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf",
     "triangle", "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",
 ]  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Peer engines on the same machine: forward dynamics in Pinocchio, a whole closed-loop run in MuJoCo.
 
 Needs the optional extra: pip install -e .[oracles].  Both peers get the machine link by link from its data, in three
-dimensions, and close the loops in their own way.  Frictionless.
+dimensions, and close the loops in their own way; MuJoCo through `rk.to_mjcf`.  Frictionless.
 """
 
 import numpy as np
@@ -75,37 +75,6 @@ def test_forward_dynamics_agrees_with_pinocchio(name):
         assert_allclose(-reactions[k, :2], force, atol=1e-8 * np.abs(reactions[k]).max())
 
 
-# MuJoCo: loops closed by stiff springs between the tips.  The gaps stay below a nanometre.
-def mujoco_twin(mujoco, robot, step):
-    def body(name, pos, m, c, inertia, armature, inner):
-        I = f"{inertia:.17g}"  # noqa: E741
-        return (
-            f'<body pos="{pos[0]:.17g} {pos[1]:.17g} 0">'
-            f'<joint name="{name}" axis="0 0 1" armature="{armature:.17g}"/>'
-            f'<inertial pos="{c:.17g} 0 0" mass="{m:.17g}" diaginertia="{I} {I} {I}"/>{inner}</body>'
-        )
-
-    bodies, loops = "", ""
-    for i in range(robot.n_arms):
-        (l1, l2), (m1, m2), (c1, c2), (i1, i2) = robot.lengths[i], robot.masses[i], robot.centers[i], robot.inertias[i]
-        load = robot.load if i == 1 else 0.0
-        # A point mass at the tip, lumped into the distal link.
-        mass, centre = m2 + load, (m2 * c2 + load * l2) / (m2 + load)
-        inertia = i2 + m2 * (c2 - centre) ** 2 + load * (l2 - centre) ** 2
-        distal = body(f"elbow{i}", (l1, 0.0), mass, centre, inertia, 0.0, f'<site name="tip{i}" pos="{l2:.17g} 0 0"/>')
-        bodies += body(f"base{i}", robot.base[i], m1, c1, i1, robot.rotor_inertia[i], distal)
-        if i != 1:
-            loops += f'<connect site1="tip{i}" site2="tip1" solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"/>'
-    gx, gy = robot.gravity
-    return mujoco.MjModel.from_xml_string(f"""
-        <mujoco>
-          <option timestep="{step}" integrator="RK4" gravity="{gx} {gy} 0" solver="Newton" tolerance="1e-14"
-                  iterations="100" jacobian="dense"><flag contact="disable"/></option>
-          <compiler angle="radian"/>
-          <worldbody>{bodies}</worldbody><equality>{loops}</equality>
-        </mujoco>""")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_closed_loop_run_agrees_with_mujoco(name):
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
@@ -115,21 +84,48 @@ def test_closed_loop_run_agrees_with_mujoco(name):
     run = rk.simulate(robot, law, path, offset)
 
     step = 2.5e-4
-    model = mujoco_twin(mujoco, robot, step)
+    model = mujoco.MjModel.from_xml_string(rk.to_mjcf(robot, path.q[0], step))
     state = mujoco.MjData(model)
-    base = [model.joint(f"base{i}").qposadr[0] for i in range(robot.n_arms)]
-    elbow = [model.joint(f"elbow{i}").qposadr[0] for i in range(robot.n_arms)]
-    tips = [model.site(f"tip{i}").id for i in range(robot.n_arms)]
-    state.qpos[base], state.qpos[elbow] = path.q_a[0], path.q[0, robot.n_arms :]
+    mujoco.mj_resetDataKeyframe(model, state, 0)
+    base = [model.joint(f"base{i + 1}").qposadr[0] for i in range(robot.n_arms)]
+    tips = [model.site(f"tip{i + 1}").id for i in range(robot.n_arms)]
     error = gap = 0.0
     for k in range(len(path)):
         mujoco.mj_kinematics(model, state)
         at = state.site_xpos[tips][:, :2]
         error, gap = max(error, np.abs(at[1] - run.x[k]).max()), max(gap, np.abs(at - at[1]).max())
-        state.qfrc_applied[base] = -law.K_P * (state.qpos[base] + offset - path.q_a[k]) - law.K_D * (
+        state.ctrl[:] = -law.K_P * (state.qpos[base] + offset - path.q_a[k]) - law.K_D * (
             state.qvel[base] - path.qd_a[k]
         )
         mujoco.mj_step(model, state, round(path.dt / step))
     assert np.abs(run.error).max() > 1e-3  # the run has something to disagree about
     assert gap < 1e-8
     assert error < 1e-6, f"largest distance {error:.3g} m"
+
+
+def test_mjcf_says_what_the_machine_is():
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
+    robot = MACHINES["asymmetric"].replace(friction=0.0)
+    q, qd, qdd, (x, _, _) = random_motion(robot, 1, bend=0.3)
+    model = mujoco.MjModel.from_xml_string(rk.to_mjcf(robot, q[0]))
+    state = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, state, 0)
+    mujoco.mj_forward(model, state)
+    N = robot.n_arms
+    assert_allclose(state.sensor("x").data[:2], x[0], atol=1e-12)
+    assert_allclose([state.sensor(f"q{i + 1}").data[0] for i in range(N)], q[0, :N], rtol=0, atol=1e-15)
+    # The mass matrix of the tree, ours ordered base joints first.
+    G = np.zeros((model.nv, model.nv))
+    for row, unit in zip(G, np.eye(model.nv), strict=True):
+        mujoco.mj_mulM(model, state, row, unit)
+    order = [model.joint(f"{kind}{i + 1}").dofadr[0] for kind in ("base", "elbow") for i in range(N)]
+    assert_allclose(G[np.ix_(order, order)], rk.mass_matrix(robot, q[0]), atol=1e-15)
+
+
+def test_mjcf_refuses_what_it_cannot_export():
+    with pytest.raises(ValueError, match="robot = 3"):
+        rk.to_mjcf(3)
+    with pytest.raises(ValueError, match="timestep"):
+        rk.to_mjcf(MACHINES["testbed"], timestep=0.0)
+    with pytest.raises(ValueError, match="q has shape"):
+        rk.to_mjcf(MACHINES["testbed"], q=[0.0])

@@ -1,0 +1,84 @@
+"""The machine for MuJoCo: an XML text in its format MJCF."""
+
+from __future__ import annotations
+
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from .arguments import exact_array, positive_number
+from .manipulator import Manipulator
+
+# Loops are closed by stiff, critically damped springs between the tips: the gaps of a run stay below a nanometre.
+_LOOP = 'solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"'
+
+
+def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
+    """The machine as MJCF, a text that ``mujoco.MjModel.from_xml_string`` reads.
+
+    Hinges "base1" .. "baseN" and "elbow1" .. "elbowN" in the order of q, with the same angles; sites "tip1" .. "tipN",
+    tied to tip 2 by equality constraints; motors "drive1" .. "driveN" whose control is the torque c in N m; sensors:
+    angles and rates of the base joints, in rad and rad/s, and the position of tip 2 in m.  The load is lumped into the
+    distal link of arm 2.  Not exported: Coulomb friction (another model there), resistance and torque constant.
+
+    q : (2N,) rad, a pose for the keyframe "start"; without it there is none, and MuJoCo starts with stretched arms.
+    timestep : s; its integrator is RK4.
+    Raises ValueError for values out of range.
+
+    >>> from rapkm_lite import load
+    >>> to_mjcf(load()).count("<motor")
+    3
+    """
+    if not isinstance(robot, Manipulator):
+        raise ValueError(f"robot = {robot!r}; allowed: a Manipulator")
+    timestep = positive_number("timestep", timestep)
+    N = robot.n_arms
+    gx, gy = robot.gravity
+    arms = "".join(_arm(robot, i) for i in range(N))
+    loops = "".join(f'    <connect site1="tip{i + 1}" site2="tip2" {_LOOP}/>\n' for i in range(N) if i != 1)
+    drives = [f"drive{i + 1}" for i in range(N)]
+    motors = "".join(f'    <motor name="{d}" joint="base{i + 1}"/>\n' for i, d in enumerate(drives))
+    angles = "".join(f'    <jointpos name="q{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
+    rates = "".join(f'    <jointvel name="qd{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
+    start = ""
+    if q is not None:
+        pose = exact_array("q", q, robot.n_joints)
+        # A tree is read arm by arm: base1 elbow1 base2 elbow2 ...
+        start = f'  <keyframe><key name="start" qpos="{_row(pose.reshape(2, N).T.ravel())}"/></keyframe>\n'
+    return (
+        f"<mujoco model={quoteattr(robot.name)}>\n"
+        f'  <compiler angle="radian"/>\n'
+        f'  <option timestep="{timestep:.17g}" integrator="RK4" gravity="{_row([gx, gy, 0.0])}" solver="Newton" '
+        f'tolerance="1e-14" iterations="100" jacobian="dense"><flag contact="disable"/></option>\n'
+        f"  <worldbody>\n{arms}  </worldbody>\n"
+        f"  <equality>\n{loops}  </equality>\n"
+        f"  <actuator>\n{motors}  </actuator>\n"
+        f'  <sensor>\n{angles}{rates}    <framepos name="x" objtype="site" objname="tip2"/>\n  </sensor>\n'
+        f"{start}</mujoco>\n"
+    )
+
+
+def _arm(robot: Manipulator, i: int) -> str:
+    (l1, l2), (m1, m2), (c1, c2), (i1, i2) = robot.lengths[i], robot.masses[i], robot.centers[i], robot.inertias[i]
+    load = robot.load if i == 1 else 0.0
+    mass, centre = m2 + load, (m2 * c2 + load * l2) / (m2 + load)
+    inertia = i2 + m2 * (c2 - centre) ** 2 + load * (l2 - centre) ** 2
+    tip = f'        <site name="tip{i + 1}" pos="{l2:.17g} 0 0"/>\n'
+    distal = _link(f"elbow{i + 1}", [l1, 0.0, 0.0], l2, mass, centre, inertia, 0.0, tip)
+    return _link(f"base{i + 1}", [*robot.base[i], 0.0], l1, m1, c1, i1, robot.rotor_inertia[i], distal)
+
+
+def _link(joint: str, position, length: float, mass: float, centre: float, inertia: float, rotor: float, inner) -> str:
+    # Moments about the other two axes do nothing in the plane, but MuJoCo wants them to fit a body.
+    moments = _row([inertia, inertia, inertia])
+    return (
+        f'    <body name="{joint} link" pos="{_row(position)}">\n'
+        f'      <joint name="{joint}" axis="0 0 1" armature="{rotor:.17g}"/>\n'
+        f'      <inertial pos="{centre:.17g} 0 0" mass="{mass:.17g}" diaginertia="{moments}"/>\n'
+        f'      <geom type="capsule" size="{length / 40:.6g}" fromto="0 0 0 {length:.17g} 0 0"/>\n'
+        f"{inner}    </body>\n"
+    )
+
+
+def _row(numbers) -> str:
+    return " ".join(f"{number:.17g}" for number in np.asarray(numbers, dtype=float))
