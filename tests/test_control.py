@@ -58,10 +58,7 @@ def test_force_filter_removes_antagonism_and_nothing_else():
 def test_command_filter_equals_the_force_filter_only_for_equal_gains():
     q, qd, desired = state_and_target(TESTBED)
     A, offset = rk.control_matrix(TESTBED, q), np.array([0.004, -0.002, 0.005])
-    pair = lambda pd: [
-        torque(f(pd), TESTBED, q, qd, desired, offset)  # noqa: E731
-        for f in (rk.AntagonismFilter, rk.CommandFilter)
-    ]
+    pair = lambda pd: [torque(f(pd), TESTBED, q, qd, desired, offset) for f in (rk.AntagonismFilter, rk.CommandFilter)]
     force, command = pair(rk.PD(7.05, 0.225))
     assert_allclose(force, command, atol=1e-14)
     force, command = pair(rk.PD([4.0, 7.0, 10.0], [0.2, 0.2, 0.3]))
@@ -320,14 +317,11 @@ def test_the_two_lines_of_28_are_two_laws():
     q, qd, desired = state_and_target(ROBOT)
     pinv = np.linalg.pinv(T(rk.redundant_control_matrix(ROBOT, q)), rcond=1e-9)
     G, C, Q = rk.mass_matrix(ROBOT, q), rk.coriolis_matrix(ROBOT, q, qd), rk.generalized_forces(ROBOT, q, qd)
-    line_2 = lambda desired: mv(
-        pinv,
-        mv(G, desired.qdd)
-        + mv(C, desired.qd)
-        + Q  # noqa: E731
-        - 50.0 * (q - desired.q)
-        - 5.0 * (qd - desired.qd),
-    )
+
+    def line_2(desired):
+        feedback = 50.0 * (q - desired.q) + 5.0 * (qd - desired.qd)
+        return mv(pinv, mv(G, desired.qdd) + mv(C, desired.qd) + Q - feedback)
+
     law = rk.RedundantAPD(50.0, 5.0)
     apart = norm(torque(law, ROBOT, q, qd, desired) - line_2(desired)) / norm(line_2(desired))
     assert np.median(apart) > 1e-4
@@ -364,13 +358,10 @@ def stiffness(law, robot, x):
 
     h = 1e-4
     weights = {1: 2 / 3, 2: -1 / 12}
-    slope = lambda e: (
-        sum(
-            w * (acceleration(x + k * h * e) - acceleration(x - k * h * e))  # noqa: E731
-            for k, w in weights.items()
-        )
-        / h
-    )
+
+    def slope(e):
+        return sum(w * (acceleration(x + k * h * e) - acceleration(x - k * h * e)) for k, w in weights.items()) / h
+
     return -np.stack([slope(e) for e in np.eye(2)], axis=-1)
 
 

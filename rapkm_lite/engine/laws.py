@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
-from .jit import leaf, outlined
+from .jit import outlined
 from .leaves import accelerations, drag, geometry, inertia, small_angle, solve2
+from .minimal import best_pair, minimal_feedback, reference
 from .rows import *
 from .tables import *
 
@@ -55,96 +56,6 @@ def look(lanes, drives, arms, table, o, w):
 
 
 @outlined
-def best_pair(lanes, drives, arms, w):
-    """The pair of drives with the largest |d_j x d_k|, kept while no other is better by the factor HYSTERESIS."""
-    L, N, W = len(lanes), len(drives), len(arms)
-    for j in range(L):
-        w[of(BEST, j, W, L)], w[of(NOW, j, W, L)] = -1.0, -1.0
-    for i in range(N):
-        for k in range(i + 1, N):
-            for j in range(L):
-                # d / l2 from b = d / (a x d).
-                size = (
-                    w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
-                    * w[at(MODEL + ELBOW_SCALE, k, j, W, L)]
-                    / (
-                        w[at(MODEL + SCALE, i, j, W, L)]
-                        * w[at(MODEL + SCALE, k, j, W, L)]
-                        * w[at(MINV, i, j, W, L)]
-                        * w[at(MINV, k, j, W, L)]
-                    )
-                )
-                measure = abs(
-                    size
-                    * (w[at(A1, i, j, W, L)] * w[at(A2, k, j, W, L)] - w[at(A2, i, j, W, L)] * w[at(A1, k, j, W, L)])
-                )
-                used = w[of(JOINT_J, j, W, L)] == i and w[of(JOINT_K, j, W, L)] == k
-                w[of(NOW, j, W, L)] = measure if used else w[of(NOW, j, W, L)]
-                better = measure > w[of(BEST, j, W, L)]
-                w[of(BEST_J, j, W, L)] = i if better else w[of(BEST_J, j, W, L)]
-                w[of(BEST_K, j, W, L)] = k if better else w[of(BEST_K, j, W, L)]
-                w[of(BEST, j, W, L)] = measure if better else w[of(BEST, j, W, L)]
-    for j in range(L):
-        now = w[of(NOW, j, W, L)]
-        change = now < 0.0 or w[of(BEST, j, W, L)] > w[of(HYSTERESIS, j, W, L)] * now
-        w[of(JOINT_J, j, W, L)] = w[of(BEST_J, j, W, L)] if change else w[of(JOINT_J, j, W, L)]
-        w[of(JOINT_K, j, W, L)] = w[of(BEST_K, j, W, L)] if change else w[of(JOINT_K, j, W, L)]
-
-
-@leaf
-def joint(drives, arms, table, o, w, which, j, L):
-    """Of the joint whose number stands in the run row `which`: its row of F, its acceleration at zero xdd, its errors,
-    desired rate and acceleration."""
-    N, W = len(drives), len(arms)
-    number = w[of(which, j, W, L)]
-    fx = fy = acc = e = ed = rate = desired = 0.0
-    for i in range(N):
-        # Masks instead of an index: every run may have joints of its own.
-        b, s = 1.0 if number == i else 0.0, 1.0 if number == N + i else 0.0
-        a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
-        fx += b * a1 - s * (a1 + w[at(L1, i, j, W, L)])
-        fy += b * a2 - s * (a2 + w[at(L2, i, j, W, L)])
-        acc += b * w[at(ACC_B, i, j, W, L)] + s * w[at(ACC_E, i, j, W, L)]
-        e += b * w[at(E, i, j, W, L)] + s * w[at(ELBOW_E, i, j, W, L)]
-        ed += b * w[at(ED, i, j, W, L)] + s * w[at(ELBOW_ED, i, j, W, L)]
-        rate += b * want(table, o, RATE, i, W) + s * want(table, o, ELBOW_RATE, i, W)
-        desired += b * want(table, o, ACCELERATION, i, W) + s * want(table, o, ELBOW_ACCELERATION, i, W)
-    return fx, fy, acc, e, ed, rate, desired
-
-
-@outlined
-def reference(lanes, drives, arms, law, table, o, w):
-    """The reference rate u: the velocity of the pose, in APD laws what the desired rates of the coordinates mean."""
-    L, N, W = len(lanes), len(drives), len(arms)
-    if law.form == REDUNDANT_APD:
-        for j in range(L):
-            fx = fy = 0.0
-            for i in range(N):
-                a1, a2, rate, elbow = (
-                    w[at(A1, i, j, W, L)],
-                    w[at(A2, i, j, W, L)],
-                    want(table, o, RATE, i, W),
-                    want(table, o, ELBOW_RATE, i, W),
-                )
-                fx += a1 * rate - (a1 + w[at(L1, i, j, W, L)]) * elbow
-                fy += a2 * rate - (a2 + w[at(L2, i, j, W, L)]) * elbow
-            w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = solve2(
-                w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy
-            )
-    elif law.form == APD:
-        for j in range(L):
-            a11, a12, _, _, _, r1, _ = joint(drives, arms, table, o, w, JOINT_J, j, L)
-            a21, a22, _, _, _, r2, _ = joint(drives, arms, table, o, w, JOINT_K, j, L)
-            task = w[of(JOINT_J, j, W, L)] < 0.0
-            det = 1.0 if task else a11 * a22 - a12 * a21
-            w[of(REF_X, j, W, L)] = table[o + 2] if task else (a22 * r1 - a12 * r2) / det
-            w[of(REF_Y, j, W, L)] = table[o + 3] if task else (a11 * r2 - a21 * r1) / det
-    else:
-        for j in range(L):
-            w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
-
-
-@outlined
 def shares(lanes, drives, arms, extra, w):
     """Shares of the arms in M and h, and the accelerations of their joints at zero xdd, with the reference rate."""
     L, N, W = len(lanes), len(drives), len(arms)
@@ -185,29 +96,6 @@ def shares(lanes, drives, arms, extra, w):
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = m11, m12, m22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = -fx, -fy
             w[at(ACC_B, i, j, W, L)], w[at(ACC_E, i, j, W, L)] = base_acc, -base_acc - back_acc
-
-
-@outlined
-def minimal_feedback(lanes, drives, arms, law, table, o, w):
-    """w and g of APD and CTC for two joints or, where JOINT_J is negative, the end-effector position."""
-    L, W = len(lanes), len(arms)
-    for j in range(L):
-        a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
-        a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
-        task = w[of(JOINT_J, j, W, L)] < 0.0
-        a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
-        e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
-        e1d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d
-        e2d = w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
-        v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
-        s1 = w[of(PAIR_P1, j, W, L)] * e1 + w[of(PAIR_D1, j, W, L)] * e1d
-        s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
-        force = law.form == APD
-        v1, v2 = v1 if force else v1 - s1, v2 if force else v2 - s2
-        det = a11 * a22 - a12 * a21
-        w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = (a22 * v1 - a12 * v2) / det, (a11 * v2 - a21 * v1) / det
-        w[of(PUSH_X, j, W, L)] = -(a11 * s1 + a21 * s2) if force else 0.0
-        w[of(PUSH_Y, j, W, L)] = -(a12 * s1 + a22 * s2) if force else 0.0
 
 
 @outlined

@@ -3,123 +3,27 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..control.compiled_law import CompiledLaw
-from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..engine import COMPILED, tables
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
+from .codes import Code, code_of
 from .patience import patience
 from .setup import Outcome, Setup
 
-__all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Code", "Plant", "encode", "many", "single"]
+__all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "encode", "many", "single"]
 
 LANES = 16 if COMPILED else 1
 _made = weakref.WeakKeyDictionary()
 
 
-@dataclass(frozen=True, eq=False)
-class Code:
-    """A law as the engine knows it: codes of `engine.tables`, and what fills the rows of the work table.
-
-    drives : values (N,) by name of a row with one number per drive.  run : values by name of a row with one per run.
-    """
-
-    form: int
-    filter: int
-    true_pose: bool
-    switched: bool
-    drives: dict
-    run: dict
-    user: CompiledLaw | None = None
-
-    @property
-    def kind(self) -> tuple:
-        """Codes of one kind can run side by side."""
-        return self.form, self.filter, self.true_pose, self.switched, self.user
-
-
-_FORMS = {
-    PD: tables.PD,
-    PID: tables.PID,
-    APD: tables.APD,
-    CTC: tables.CTC,
-    SwitchedCTC: tables.CTC,
-    RedundantAPD: tables.REDUNDANT_APD,
-    RedundantCTC: tables.REDUNDANT_CTC,
-}
-_ZERO = np.zeros(())
-_FILTERS = {AntagonismFilter: tables.FORCE_FILTER, CommandFilter: tables.COMMAND_FILTER}
-
-
 def encode(law: Any, model) -> Code | None:
-    """The engine's form of a law, or None where it has none: then the law runs through the textbook layer.
-
-    The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
-    """
-    form, weights, pose = tables.NO_FILTER, None, getattr(law, "pose", None)
-    if type(law) in _FILTERS:
-        form, weights, law = _FILTERS[type(law)], getattr(law, "W", None), law.law
-        if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
-            return None
-    own = getattr(law, "W", None)
-    weights = weights if own is None else own
-    if weights is not None and np.ndim(weights) > 1:
-        return None
-    if type(law) is CompiledLaw and COMPILED:
-        code, drives, run, user = tables.USER, {}, {}, law
-    elif type(law) in _FORMS and not any(getattr(law, name, _ZERO).ndim > 1 for name in ("K_P", "K_D", "K_I")):
-        (code, drives, run), user = _gains(law, model.n_arms), None
-    else:
-        return None
-    drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
-    run = {"JOINT_J": -1.0, "JOINT_K": -1.0} | run
-    return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run, user)
-
-
-def _gains(law: Any, N: int) -> tuple[int, dict, dict]:
-    """Code of a law of this package, and what it fills the rows of drives and runs with."""
-    code = _FORMS[type(law)]
-    if code in (tables.PD, tables.PID):
-        names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == tables.PID else {})
-        return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}
-    if code in (tables.REDUNDANT_APD, tables.REDUNDANT_CTC):
-        (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
-        code = code if getattr(law, "projected", True) else tables.REDUNDANT_CTC_LINE2
-        return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
-    (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
-    run = {
-        "PAIR_P1": p1,
-        "PAIR_P2": p2,
-        "PAIR_D1": d1,
-        "PAIR_D2": d2,
-        "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
-    }
-    independent = getattr(law, "independent", None)
-    if independent is not None:
-        if max(independent) >= 2 * N:
-            raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
-        run |= {"JOINT_J": float(independent[0]), "JOINT_K": float(independent[1])}
-    return code, {}, run
-
-
-def _per(name: str, value, size: int) -> np.ndarray:
-    value = np.asarray(value, dtype=float)
-    if value.shape not in ((), (size,)):
-        raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
-    return np.broadcast_to(value, (size,))
-
-
-def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gains of drives and elbows; (N,) acts on the driven joints only, as in (29)."""
-    if K.shape == (N,):
-        return K, np.zeros(N)
-    K = _per(name, K, 2 * N)
-    return K[:N], K[N:]
+    """The engine's form of a law, or None where it has none: then the law runs through the textbook layer."""
+    code = code_of(law, model)
+    return None if code is None or (code.user is not None and not COMPILED) else code
 
 
 def single(setup: Setup, code: Code) -> Outcome:
@@ -193,10 +97,11 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)
+    form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
     law = tables.Law(
-        code.form,
-        code.filter,
-        code.filter != tables.NO_FILTER or tables.PID < code.form < tables.USER or asks == tables.POSED,
+        form,
+        filtered,
+        filtered != tables.NO_FILTER or tables.PID < form < tables.USER or asks == tables.POSED,
         tables.TRUE if code.true_pose else tables.MEASURED,
         model.same_kinematics(robot),
         code.switched,
@@ -204,7 +109,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     )
     kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
-    modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < code.form < tables.USER else None
+    modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < form < tables.USER else None
     desired = _short_motion if modelled is None and user is None else _motion
     w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
     with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):

@@ -7,27 +7,24 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control.grammar import BadAnswer, LawLike, as_law
+from ..control.grammar import LawLike, as_law
 from ..machine.arguments import real_array
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory
-from .compiled import DONE, encode, many
-from .energy import antagonistic_energy, root_mean_square_torque
+from .chunks import NOT_RUN, Columns, run_chunk
+from .compiled import DONE, encode
 from .explain import REASONS
 from .faults import FaultsLike, check_faults
-from .loop import LAW_FAILED, own_copy
+from .loop import own_copy
 from .patience import progress_bar
 from .runs import SimulationError, complete, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
-
-NOT_RUN = -1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,7 +119,7 @@ def sweep(
         except BaseException as error:
             finished = np.count_nonzero(table.status == DONE)
             if finished:
-                partial = table.sweep(robot, law, setup.trajectory, offsets, mask=True)
+                partial = _result(table, robot, law, setup.trajectory, offsets, mask=True)
                 hand_over(
                     error,
                     partial,
@@ -131,7 +128,7 @@ def sweep(
                 )
             raise
     broken = bool(table.failed.any())
-    result = table.sweep(robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
+    result = _result(table, robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
     if failed == "raise" and broken:
         i = int(np.argmax(result.failed))
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
@@ -213,74 +210,13 @@ def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
     return laws if several else laws * k, np.array(np.broadcast_to(offsets, (k, N)))
 
 
-class Columns(NamedTuple):
-    """The columns of a sweep while it is made; `status` is NOT_RUN until a row is known."""
+def _result(table: Columns, robot, law, trajectory, offsets, mask: bool) -> Sweep:
+    """The columns as a study, with the rows masked that are not finished."""
+    failed = table.failed
 
-    energies: np.ndarray
-    torque_norm: np.ndarray
-    antagonistic_energy: np.ndarray
-    x_final: np.ndarray
-    failure_time: np.ndarray
-    status: np.ndarray
+    def column(v: np.ndarray) -> np.ndarray:
+        return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
-    @classmethod
-    def blank(cls, k: int, N: int) -> Columns:
-        return cls(np.zeros((k, N)), np.zeros(k), np.zeros(k), np.zeros((k, 2)), np.zeros(k), np.full(k, NOT_RUN))
-
-    @property
-    def failed(self) -> np.ndarray:
-        return self.status != DONE
-
-    def enter(self, first: int, rows: Columns, errors: dict) -> dict:
-        """Take the rows from `first` on; returns their errors by the rows of the sweep."""
-        for column, part in zip(self, rows, strict=True):
-            column[first : first + len(part)] = part
-        return {first + i: error for i, error in errors.items()}
-
-    def sweep(self, robot, law, trajectory, offsets, mask: bool) -> Sweep:
-        failed = self.failed
-
-        def column(v: np.ndarray) -> np.ndarray:
-            return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
-
-        times = np.ma.array(self.failure_time, mask=~failed | (self.status == NOT_RUN))
-        return Sweep(
-            robot,
-            law,
-            trajectory,
-            offsets,
-            column(self.energies),
-            column(self.torque_norm),
-            column(self.antagonistic_energy),
-            column(self.x_final),
-            failed,
-            times,
-        )
-
-
-def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:
-    """The columns of some runs, and what stopped the first one of those in Python that failed, by its row.
-
-    A function of values only, so that any executor can send it to another process.
-    """
-    codes = {id(law): encode(law, setup.model) for law in laws}
-    rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
-    fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
-    if fast:
-        own = list(fast)
-        for column, part in zip(rows, many(setup, list(fast.values()), offsets[own]), strict=True):
-            column[own] = part
-    for i in sorted(set(range(len(laws))) - set(fast)):
-        try:
-            run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
-        except BadAnswer:
-            raise
-        except Exception as error:
-            rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
-            if not errors:
-                errors[i] = error
-        else:
-            values = run.energy, root_mean_square_torque(run), antagonistic_energy(run), run.x[-1], 0.0, DONE
-            for column, value in zip(rows, values, strict=True):
-                column[i] = value
-    return rows, errors
+    columns = map(column, (table.energies, table.torque_norm, table.antagonistic_energy, table.x_final))
+    times = np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN))
+    return Sweep(robot, law, trajectory, offsets, *columns, failed, times)

@@ -1,0 +1,69 @@
+"""Some runs of a study at a time, as an executor gets them: their columns, and what stopped them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..control.grammar import BadAnswer
+from .compiled import DONE, encode, many
+from .energy import antagonistic_energy, root_mean_square_torque
+from .loop import LAW_FAILED
+from .runs import complete
+from .setup import Setup
+
+NOT_RUN = -1
+
+
+class Columns(NamedTuple):
+    """The columns of a sweep while it is made; `status` is NOT_RUN until a row is known."""
+
+    energies: np.ndarray
+    torque_norm: np.ndarray
+    antagonistic_energy: np.ndarray
+    x_final: np.ndarray
+    failure_time: np.ndarray
+    status: np.ndarray
+
+    @classmethod
+    def blank(cls, k: int, N: int) -> Columns:
+        return cls(np.zeros((k, N)), np.zeros(k), np.zeros(k), np.zeros((k, 2)), np.zeros(k), np.full(k, NOT_RUN))
+
+    @property
+    def failed(self) -> np.ndarray:
+        return self.status != DONE
+
+    def enter(self, first: int, rows: Columns, errors: dict) -> dict:
+        """Take the rows from `first` on; returns their errors by the rows of the sweep."""
+        for column, part in zip(self, rows, strict=True):
+            column[first : first + len(part)] = part
+        return {first + i: error for i, error in errors.items()}
+
+
+def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:
+    """The columns of some runs, and what stopped the first one of those in Python that failed, by its row.
+
+    A function of values only, so that any executor can send it to another process.
+    """
+    codes = {id(law): encode(law, setup.model) for law in laws}
+    rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
+    fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
+    if fast:
+        own = list(fast)
+        for column, part in zip(rows, many(setup, list(fast.values()), offsets[own]), strict=True):
+            column[own] = part
+    for i in sorted(set(range(len(laws))) - set(fast)):
+        try:
+            run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
+        except BadAnswer:
+            raise
+        except Exception as error:
+            rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
+            if not errors:
+                errors[i] = error
+        else:
+            values = run.energy, root_mean_square_torque(run), antagonistic_energy(run), run.x[-1], 0.0, DONE
+            for column, value in zip(rows, values, strict=True):
+                column[i] = value
+    return rows, errors

@@ -1,0 +1,112 @@
+"""Laws in the words of the engine: names of codes and rows, and what stands in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..control.compiled_law import CompiledLaw
+from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
+from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
+
+
+@dataclass(frozen=True, eq=False)
+class Code:
+    """A law as the engine knows it: names of its codes, and what fills the rows of the work table.
+
+    drives : values (N,) by name of a row with one number per drive.  run : values by name of a row with one per run.
+    """
+
+    form: str
+    filter: str
+    true_pose: bool
+    switched: bool
+    drives: dict
+    run: dict
+    user: CompiledLaw | None = None
+
+    @property
+    def kind(self) -> tuple:
+        """Codes of one kind can run side by side."""
+        return self.form, self.filter, self.true_pose, self.switched, self.user
+
+
+_FORMS = {
+    PD: "PD",
+    PID: "PID",
+    APD: "APD",
+    CTC: "CTC",
+    SwitchedCTC: "CTC",
+    RedundantAPD: "REDUNDANT_APD",
+    RedundantCTC: "REDUNDANT_CTC",
+}
+_ZERO = np.zeros(())
+_FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
+
+
+def code_of(law: Any, model) -> Code | None:
+    """The engine's form of a law, or None where it has none.
+
+    The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
+    """
+    form, weights, pose = "NO_FILTER", None, getattr(law, "pose", None)
+    if type(law) in _FILTERS:
+        form, weights, law = _FILTERS[type(law)], getattr(law, "W", None), law.law
+        if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
+            return None
+    own = getattr(law, "W", None)
+    weights = weights if own is None else own
+    if weights is not None and np.ndim(weights) > 1:
+        return None
+    if type(law) is CompiledLaw:
+        code, drives, run, user = "USER", {}, {}, law
+    elif type(law) in _FORMS and not any(getattr(law, name, _ZERO).ndim > 1 for name in ("K_P", "K_D", "K_I")):
+        (code, drives, run), user = _gains(law, model.n_arms), None
+    else:
+        return None
+    drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
+    run = {"JOINT_J": -1.0, "JOINT_K": -1.0} | run
+    return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run, user)
+
+
+def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
+    """Code of a law of this package, and what it fills the rows of drives and runs with."""
+    code = _FORMS[type(law)]
+    if code in ("PD", "PID"):
+        names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == "PID" else {})
+        return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}
+    if code in ("REDUNDANT_APD", "REDUNDANT_CTC"):
+        (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
+        code = code if getattr(law, "projected", True) else "REDUNDANT_CTC_LINE2"
+        return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
+    (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
+    run = {
+        "PAIR_P1": p1,
+        "PAIR_P2": p2,
+        "PAIR_D1": d1,
+        "PAIR_D2": d2,
+        "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
+    }
+    independent = getattr(law, "independent", None)
+    if independent is not None:
+        if max(independent) >= 2 * N:
+            raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
+        run |= {"JOINT_J": float(independent[0]), "JOINT_K": float(independent[1])}
+    return code, {}, run
+
+
+def _per(name: str, value, size: int) -> np.ndarray:
+    value = np.asarray(value, dtype=float)
+    if value.shape not in ((), (size,)):
+        raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
+    return np.broadcast_to(value, (size,))
+
+
+def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gains of drives and elbows; (N,) acts on the driven joints only, as in (29)."""
+    if K.shape == (N,):
+        return K, np.zeros(N)
+    K = _per(name, K, 2 * N)
+    return K[:N], K[N:]
