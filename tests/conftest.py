@@ -16,6 +16,7 @@ GROUPS = {
         "test_compiled_law",
         "test_docs",
         "test_engine",
+        "test_engine_js",
         "test_explore",
         "test_figures",
         "test_lanes",
