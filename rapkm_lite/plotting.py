@@ -3,6 +3,10 @@
 Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.
 """
 
+from .figures.film import (
+    LARGEST,
+    film,
+)
 from .figures.machine import (
     arm_points,
     plane_axes,
@@ -32,11 +36,13 @@ from .figures.style import (
     ALARM,
     ARM_COLOURS,
     ARM_LINES,
+    ARM_TEXT_COLOURS,
     BEFORE,
     NEUTRAL,
     STYLE,
     arm_colour,
     arm_line,
+    arm_text_colour,
     axes_or_new,
     use_style,
 )
@@ -103,14 +109,18 @@ __all__ = [
     "ALARM",
     "ARM_COLOURS",
     "ARM_LINES",
+    "ARM_TEXT_COLOURS",
     "BEFORE",
+    "LARGEST",
     "NEUTRAL",
     "STYLE",
     "arm_colour",
     "arm_line",
     "arm_points",
+    "arm_text_colour",
     "axes_or_new",
     "curve_crossings",
+    "film",
     "grid_points",
     "lines_per_drive",
     "mode_name",

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..mechanics.kinematics import arm_vectors
 from ..mechanics.maps import sampling_box, workspace_grid
-from .style import NEUTRAL, arm_colour, axes_or_new
+from .style import NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 
 
 def arm_points(robot, q) -> np.ndarray:
@@ -46,7 +46,7 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
                 textcoords="offset points",
                 ha="center",
                 va="center",
-                color=arm_colour(i),
+                color=arm_text_colour(i),
                 fontweight="bold",
                 fontsize=9,
                 zorder=6,

@@ -1,4 +1,4 @@
-"""Colours and the style file.  One colour per arm everywhere, safe for colour-blind readers and apart in greyscale."""
+"""Colours and the style file.  One colour per arm everywhere, at least 3:1 on white and apart for colour-blind eyes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import matplotlib.pyplot as plt
 import matplotlib.style
 
 STYLE = Path(__file__).with_name("rapkm.mplstyle")
-# P. Tol's high-contrast scheme first; from the fourth arm on, colours between them in lightness.
-ARM_COLOURS = ("#004488", "#BB5566", "#DDAA33", "#66AACC", "#997700", "#EE99AA")
+# Blue, red, olive; then teal, purple, brown.  Text in an arm's colour takes the darker tone, at least 4.5:1 on white.
+ARM_COLOURS = ("#004488", "#BB5566", "#948A00", "#3997BF", "#8A3FC0", "#4D2020")
+ARM_TEXT_COLOURS = ("#004488", "#A84456", "#7D7400", "#2B7797", "#8A3FC0", "#4D2020")
 ARM_LINES = ("-", (0, (5, 1.2)), (0, (4, 1.2, 1, 1.2)), (0, (1.5, 1.2)), "-", "--")
 # Without / with filter, wrong / right, and what belongs to no arm.
 BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
@@ -24,6 +25,11 @@ def use_style() -> None:
 def arm_colour(i: int) -> str:
     """Colour of arm i (0-based)."""
     return ARM_COLOURS[i % len(ARM_COLOURS)]
+
+
+def arm_text_colour(i: int) -> str:
+    """Colour of text that belongs to arm i (0-based), readable on white."""
+    return ARM_TEXT_COLOURS[i % len(ARM_TEXT_COLOURS)]
 
 
 def arm_line(i: int) -> dict:

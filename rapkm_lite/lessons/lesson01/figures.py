@@ -10,7 +10,7 @@ from matplotlib.ticker import MultipleLocator
 
 from ...figures.machine import plot_machine
 from ...figures.maps import mode_name
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, axes_or_new
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, arm_text_colour, axes_or_new
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
 
@@ -22,7 +22,7 @@ def plot_joint_angles(robot, q, ax=None):
     for i in range(N):
         base, elbow = float(q[i]), float(q[N + i])
         at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
-        _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_colour(i))
+        _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_text_colour(i))
         _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_colour(i))
     return ax
 
@@ -78,7 +78,7 @@ def plot_topology(robot, ax=None):
     for i in range(N):
         ax.plot([i, i], [0.1, 2], color=arm_colour(i), lw=3)
         for y, name in ((0.55, f"$q^{{{i + 1}}}$ driven"), (1.5, f"$q^{{{N + i + 1}}}$")):
-            ax.text(i + 0.07, y, name, color=arm_colour(i), va="center")
+            ax.text(i + 0.07, y, name, color=arm_text_colour(i), va="center")
         for y, link in ((1, i + 1), (2, N + i + 1)):
             ax.text(
                 i,

@@ -1,0 +1,99 @@
+"""A new lesson from the skeleton, and the list of all figures."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import nbformat
+
+from .storing import tidy
+
+NOTEBOOKS = Path(__file__).resolve().parents[1]
+SOLUTIONS = NOTEBOOKS / "solutions"
+PACKAGE = NOTEBOOKS.parent / "rapkm_lite"
+
+
+def defined(path: Path) -> list[str]:
+    """Public functions and constants that a module defines, without what it imports."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    names = [node.name for node in body if isinstance(node, ast.FunctionDef)]
+    for node in body:
+        if isinstance(node, ast.Assign):
+            targets = node.targets[0].elts if isinstance(node.targets[0], ast.Tuple) else node.targets
+            names += [target.id for target in targets]
+    # Constants before functions, as the import sorter has them.
+    return sorted((n for n in names if not n.startswith("_")), key=lambda n: (not n.isupper(), n))
+
+
+def figure_list() -> str:
+    """The text of ``rapkm_lite/plotting.py``: every figure of the shared room and of every lesson, by name."""
+    rooms = sorted(PACKAGE.glob("figures/[!_]*.py")) + sorted(PACKAGE.glob("lessons/lesson*/figures.py"))
+    owner, text = (
+        {},
+        [
+            '"""Every figure under one name: ``plotting.plot_x(..., ax=None) -> ax``; one colour per arm everywhere.',
+            "",
+            "Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.",
+            '"""',
+            "",
+        ],
+    )
+    for path in rooms:
+        module = "." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        names = [n for n in defined(path) if module.startswith(".figures") or n.startswith("plot_")]
+        for name in names:
+            if name in owner:
+                raise ValueError(f"{name} stands in {owner[name]} and in {module}; allowed: one figure of that name")
+            owner[name] = module
+        if names:
+            text += [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+    return "\n".join([*text, "", "__all__ = [", *(f'    "{name}",' for name in sorted(owner)), "]", ""])
+
+
+def cells(text: str) -> list[nbformat.NotebookNode]:
+    """Cells of a notebook written as text: a line ``# %%``, ``# %% [markdown]`` or ``# %% tags=[...]`` begins each one.
+
+    Lines of Markdown stand behind ``# ``.
+    """
+    made = []
+    for block in re.split(r"^# %%", text, flags=re.M)[1:]:
+        head, _, body = block.partition("\n")
+        if "[markdown]" in head:
+            made.append(nbformat.v4.new_markdown_cell(re.sub(r"^# ?", "", body, flags=re.M).strip()))
+        else:
+            tags = ast.literal_eval(head.partition("=")[2] or "[]")
+            made.append(nbformat.v4.new_code_cell(body.strip(), metadata={"tags": tags} if tags else {}))
+    return made
+
+
+def new(name: str) -> None:
+    """Lay out a lesson: its source in ``solutions/``, its room in ``rapkm_lite/lessons/``, its line in the README.
+
+    Raises ValueError when the name is not like 13_title or its number is taken.
+    """
+    number, _, words = name.partition("_")
+    room = PACKAGE / "lessons" / f"lesson{number}"
+    if not re.fullmatch(r"\d\d_[a-z0-9_]+", name) or room.exists():
+        raise ValueError(f"name = {name!r}; allowed: a number that no lesson has, and words, like 13_title")
+
+    def filled(path: Path) -> str:
+        return path.read_text(encoding="utf-8").replace("NN", number).replace("TITLE", words.replace("_", " "))
+
+    skeleton = NOTEBOOKS / "skeleton"
+    room.mkdir()
+    (room / "__init__.py").write_text(f'"""Lesson {number}: {words.replace("_", " ")}."""\n', encoding="utf-8")
+    for part in ("figures.py", "exercises.py"):
+        (room / part).write_text(filled(skeleton / part), encoding="utf-8")
+    notebook = nbformat.v4.new_notebook(cells=cells(filled(skeleton / "lesson.py")))
+    tidy(notebook)
+    nbformat.write(notebook, SOLUTIONS / f"{name}.ipynb")
+    readme = NOTEBOOKS.parent / "README.md"
+    question = notebook.cells[0].source.splitlines()[0].removeprefix("# ").partition(" · ")[2]
+    lines = readme.read_text(encoding="utf-8").splitlines(keepends=True)
+    last = max(k for k, line in enumerate(lines) if re.match(r"\| \[\d\d_", line))
+    lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 20 | – | – |\n")
+    readme.write_text("".join(lines), encoding="utf-8")
+    (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
+    print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number}")

@@ -1,0 +1,91 @@
+"""The stored form of a notebook: what a reader sees, with answers out of sight, and the student's copy of a lesson."""
+
+from __future__ import annotations
+
+import re
+
+import nbformat
+
+from .pictures import describe
+
+WIDGET = "application/vnd.jupyter.widget-view+json"
+HIDDEN, DEEPER = "hide-output", "dig-deeper"
+# JupyterLab shows the first line of a hidden output; tests/nbval-sanitize.cfg takes this one out of comparisons.
+COVER = "The answer is here; open it when you have your own.\n"
+_SOLUTION = re.compile(r"^([ \t]*)### BEGIN SOLUTION *\n(.*?)^[ \t]*### END SOLUTION *\n?", re.M | re.S)
+_DEEPER = re.compile(r"#+ Dig deeper\b")
+
+
+def blank(source: str) -> str:
+    """A code cell with its solutions taken out."""
+
+    def stub(match: re.Match) -> str:
+        indent, body = match.groups()
+        if indent:
+            return f"{indent}raise NotImplementedError\n"
+        names = dict.fromkeys(re.findall(r"^(\w+) *=[^=]", body, re.M))
+        return "".join(f"{name} = ...\n" for name in names)
+
+    return _SOLUTION.sub(stub, source if source.endswith("\n") else source + "\n").rstrip("\n")
+
+
+def student(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """The student's copy of a solved lesson, without outputs; links are meant from its folder, one level up."""
+    copy = nbformat.reads(nbformat.writes(notebook), as_version=4)
+    for cell in copy.cells:
+        if cell.cell_type == "code":
+            cell.source, cell.outputs, cell.execution_count = blank(cell.source), [], None
+        else:
+            cell.source = cell.source.replace("](../", "](")
+    return copy
+
+
+def kept(cell: nbformat.NotebookNode) -> dict:
+    """The metadata of a cell that are stored: tags, words of its pictures, and what JupyterLab hides or folds."""
+    tags = [tag for tag in cell.metadata.get("tags", []) if tag != DEEPER]
+    stored: dict = {}
+    if cell.cell_type == "markdown" and _DEEPER.match(cell.source):
+        stored["jp-MarkdownHeadingCollapsed"] = True
+        tags.append(DEEPER)
+    if cell.cell_type == "code" and HIDDEN in tags:
+        stored["jupyter"] = {"outputs_hidden": True}
+    if tags:
+        stored["tags"] = tags
+    if cell.metadata.get("alt"):
+        stored["alt"] = cell.metadata["alt"]
+    return stored
+
+
+def cover(cell: nbformat.NotebookNode) -> None:
+    """Begin the outputs of a hidden cell with a line that is not the answer."""
+    first = cell.outputs[0] if cell.outputs else None
+    if first is not None and first.get("name") == "stdout":
+        first.text = COVER + first.text
+    elif first is not None:
+        cell.outputs.insert(0, nbformat.v4.new_output("stream", name="stdout", text=COVER))
+
+
+def bare_widget(output: nbformat.NotebookNode) -> bool:
+    """True for a widget with nothing but its repr beside it, of which nothing is left without a kernel."""
+    data = output.get("data", {})
+    return WIDGET in data and set(data) <= {WIDGET, "text/plain"}
+
+
+def tidy(notebook: nbformat.NotebookNode) -> None:
+    """Keep what a reader sees of a notebook that has just run: no widget state, time stamps or versions."""
+    notebook.metadata = nbformat.from_dict(
+        {
+            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+        }
+    )
+    for number, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{number:02d}"
+        cell.metadata = nbformat.from_dict(kept(cell))
+        if cell.cell_type == "code":
+            cell.outputs = [o for o in cell.outputs if not bare_widget(o)]
+            for output in cell.outputs:
+                output.get("data", {}).pop(WIDGET, None)
+            describe(cell)
+            if HIDDEN in cell.metadata.get("tags", []):
+                cover(cell)

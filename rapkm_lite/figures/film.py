@@ -1,0 +1,159 @@
+"""Short films for the lessons: a picture that moves a few seconds, stops, and says in words what it shows."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.style
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from .style import STYLE
+
+LARGEST = 120_000  # bytes; a notebook holds several films
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film as bytes: an animated WebP, its poster (WebP, and PNG for what shows no HTML), and its words.
+
+    In a notebook it shows itself; who asks the system for less motion sees the poster.
+    """
+
+    moving: bytes
+    poster: bytes
+    png: bytes
+    size: tuple[int, int]
+    alt: str
+
+    def save(self, path: str | Path) -> None:
+        """Write the animated WebP to a file."""
+        Path(path).write_bytes(self.moving)
+
+    def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
+        words, (width, height) = html.escape(self.alt), self.size
+        page = (
+            f'<picture><source media="(prefers-reduced-motion: reduce)" srcset="{_address(self.poster)}">'
+            f'<img alt="{words}" width="{width}" height="{height}" style="max-width: 100%; height: auto"'
+            f' src="{_address(self.moving)}"></picture>'
+        )
+        return {"text/html": page, "image/png": base64.b64encode(self.png).decode("ascii"), "text/plain": self.alt}
+
+    def __repr__(self) -> str:
+        return f"Film({self.alt!r}, {len(self.moving) / 1000:.0f} kB)"
+
+
+def _address(webp: bytes) -> str:
+    return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")
+
+
+def _file(image: Image.Image, form: str, **options) -> bytes:
+    out = io.BytesIO()
+    image.save(out, form, **options)
+    return out.getvalue()
+
+
+def _shots(draw: Callable, steps: list, panels: int, figsize: tuple[float, float], dpi: float) -> list[Image.Image]:
+    """One picture per step; the axes stay where the first picture has them, so that nothing jumps."""
+    fig = Figure(figsize=figsize, dpi=dpi, layout="constrained")
+    canvas = FigureCanvasAgg(fig)
+    places: list = []
+    shots = []
+    for step in steps:
+        fig.clear()
+        axes = fig.subplots(1, panels)
+        draw(axes, step)
+        if places:
+            fig.set_layout_engine("none")
+            for ax, place in zip(fig.axes, places, strict=False):
+                ax.set_position(place)
+        canvas.draw()
+        places = places or [ax.get_position(original=True) for ax in fig.axes]
+        shots.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    return shots
+
+
+def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes:
+    """The animated WebP: lines and flat colours are smallest without loss in few colours, one set for all frames."""
+    some = shots[:: max(1, len(shots) // 6)] + shots[-1:]
+    sheet = Image.fromarray(np.concatenate([np.asarray(shot) for shot in some]))
+    for colours in (48, 24):
+        palette = sheet.quantize(colours, dither=Image.Dither.NONE)
+        tones = np.reshape(palette.getpalette(), (-1, 3))
+        tones[tones.sum(axis=1).argmax()] = 255  # the paper stays white
+        palette.putpalette(tones.ravel().tolist())
+        flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB") for shot in shots]
+        film = _file(
+            flat[0],
+            "WEBP",
+            save_all=True,
+            append_images=flat[1:],
+            duration=durations,
+            loop=loops,
+            lossless=True,
+            method=4,
+        )
+        if len(film) <= LARGEST:
+            return film
+    raise ValueError(
+        f"frames: {len(shots)} pictures of {shots[0].width} x {shots[0].height} make {len(film) / 1000:.0f} kB; "
+        f"allowed: {LARGEST / 1000:.0f} kB, so take fewer frames or a smaller figsize"
+    )
+
+
+def film(
+    draw: Callable[[Any, Any], Any],
+    frames: Iterable,
+    alt: str,
+    *,
+    panels: int = 1,
+    figsize: tuple[float, float] = (4.8, 3.6),
+    seconds: float = 5.0,
+    rest: float = 1.5,
+    loops: int = 2,
+    poster: int = -1,
+    dpi: float = 96,
+) -> Film:
+    """A film of ``draw(ax, step)``, called for every step of `frames` on empty axes; the last expression of a cell.
+
+    alt : what is seen and what it shows, one or two sentences.
+    panels : axes side by side; `draw` gets them as an array when there are several.
+    figsize : width and height in inches, at `dpi`.
+    seconds : of motion, in equal steps.  rest : seconds that the last frame stays.
+    loops : how often it plays; it always stops, on its last frame.
+    poster : index of the frame that stands for the film where motion is not wanted.
+
+    Set the limits of the axes in `draw`.  Raises ValueError without words, with fewer than two frames, with loops < 1,
+    or when the film would be larger than 120 kB.
+
+    >>> import numpy as np
+    >>> film(lambda ax, s: ax.plot([0, np.cos(s)], [0, np.sin(s)]), np.linspace(0, 1, 3), "A hand turns.").alt
+    'A hand turns.'
+    """
+    steps = list(frames)
+    if not alt.strip():
+        raise ValueError(f"alt = {alt!r}; allowed: a sentence that says what is seen and what it shows")
+    if len(steps) < 2:
+        raise ValueError(f"frames: {len(steps)}; allowed: two or more")
+    if loops < 1:
+        raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
+    with matplotlib.style.context(STYLE):
+        shots = _shots(draw, steps, panels, figsize, dpi)
+    each = round(1000 * seconds / len(steps))
+    moving = _moving(shots, [each] * (len(shots) - 1) + [each + round(1000 * rest)], loops)
+    still = shots[poster]
+    return Film(
+        moving=moving,
+        poster=_file(still, "WEBP", quality=85, method=6),
+        png=_file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True),
+        size=still.size,
+        alt=alt,
+    )
