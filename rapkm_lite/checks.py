@@ -1,5 +1,6 @@
 """The exercise checker under the name that the lessons import."""
 
-from .lessons.checker import Exercise, check, examine, exercises
+from .lessons.checker import Case, Exercise, Measured, check, examine, exercises, hint
+from .lessons.own import draw_own
 
-__all__ = ["Exercise", "check", "examine", "exercises"]
+__all__ = ["Case", "Exercise", "Measured", "check", "draw_own", "examine", "exercises", "hint"]

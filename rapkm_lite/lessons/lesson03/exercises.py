@@ -107,6 +107,7 @@ EXERCISES = {
         "rad",
         invariant=_unexplained_torque,
         tolerance=3e-4,
+        secret=True,
     ),
     "03.gains": Exercise(
         lambda: hidden("gain")[1],
@@ -114,5 +115,6 @@ EXERCISES = {
         "N m/rad",
         invariant=_unexplained_gain,
         tolerance=0.2,
+        secret=True,
     ),
 }

@@ -51,6 +51,20 @@ def _torque_law(got, A, c):
     return number, "the end-effector force changed (N), or torque is left along the null vector of A^T (N m)"
 
 
+def _scaled_up(A, c):
+    """A (A^T c): the projection without the inverse between its factors."""
+    return A @ (A.T @ c)
+
+
+def _one_by_one(A, c):
+    """The parts along the two columns of A, added as if these were at right angles."""
+    return sum(column * (column @ c) / (column @ column) for column in A.T)
+
+
+def _mean_removed(A, c):
+    return c - c.mean()
+
+
 def _command_cases(rng):
     q = rng.uniform(-1, 1, (20, 3))
     return [
@@ -65,45 +79,177 @@ def _command_law(got, A, K_P, q_measured, q_desired):
     return np.max(np.abs(force - wanted)), "the force at the end-effector is not the one of the plain PD drives (N)"
 
 
+def _command_with(change):
+    """A wrong command from the four parts: filter without gains R, filter with them R_K, K_P, measured and desired."""
+
+    def command(A, K_P, q_measured, q_desired):
+        R, R_K = antagonism.antagonism_filter(A), antagonism.command_filter(A, K_P)
+        return change(R, R_K, K_P, q_measured, q_desired)
+
+    return command
+
+
 def _log_cases(rng):
     robot = load()
     return [
         (robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
-        for R, dt in ((0.611, 1e-3), ([0.5, 0.5, 0.5], 2e-3))
+        for R, dt in ((0.611, 1e-3), ([0.5, 0.7, 1.1], 2e-3), (0.611, 1e-2))
     ]
 
 
 def _pythagoras(got, robot, A, c, dt):
-    along = np.sum(_null(A) * c, axis=-1)
-    total = float((robot.resistance[0] / robot.torque_constant[0] ** 2) * dt * np.sum(along**2))
-    return abs(got.sum() - total), "the total differs from R_el/k_t^2 times the integral of the squared antagonism (J)"
+    """For equal motors the total is that of the antagonism; for unequal ones only drive by drive."""
+    removed = c - _null(A) * np.sum(_null(A) * c, axis=-1, keepdims=True)
+    each = robot.resistance / robot.torque_constant**2 * dt * np.sum(c**2 - removed**2, axis=0)
+    return np.max(np.abs(got - each)), "the sums of R_el/k_t^2 (c^2 - c_eff^2) dt, with the null vector, differ by (J)"
+
+
+def _kept(A, c):
+    return matvec(antagonism.antagonism_filter(A), c)
+
+
+def _energy_with(change):
+    """A wrong saving from the copper loss of the log, of what the filter keeps, and of what it removes."""
+
+    def saving(robot, A, c, dt):
+        kept = _kept(A, c)
+        losses = [energy.copper_loss(robot, torques, dt) for torques in (c, kept, c - kept)]
+        return change(*losses)
+
+    return saving
+
+
+def _first_filter(robot, A, c, dt):
+    kept = c @ antagonism.antagonism_filter(A[0])
+    return energy.copper_loss(robot, c, dt) - energy.copper_loss(robot, kept, dt)
+
+
+def _first_motor(robot, A, c, dt):
+    same = robot.replace(resistance=float(robot.resistance[0]), torque_constant=float(robot.torque_constant[0]))
+    return saved_energy(same, A, c, dt)
+
+
+def _trapezoids(robot, A, c, dt):
+    saved = robot.resistance / robot.torque_constant**2 * (c**2 - _kept(A, c) ** 2)
+    return np.trapezoid(saved, dx=dt, axis=0)
 
 
 EXERCISES = {
     "04.filtered_torques": Exercise(
         filtered_torques,
-        "c_eff = A f must give the same force, A^T A f = A^T c: solve for f, then multiply by A.",
-        "N m",
-        _torque_cases,
-        _torque_law,
-        1e-10,
+        hints=(
+            "Two torque vectors that give the same force at the end-effector differ only by antagonism. Which one of "
+            "them has none?",
+            "Torques without antagonism are combinations of the columns of A, c_eff = A f. Two numbers f are unknown, "
+            "and the force gives two equations.",
+            "A^T A f = A^T c: f = np.linalg.solve(A.T @ A, A.T @ c), then A @ f.",
+        ),
+        unit="N m",
+        cases=_torque_cases,
+        invariant=_torque_law,
+        tolerance=1e-10,
+        close=1e-3,
+        improve="solve the two equations for f directly instead of searching for them",
+        mistakes={
+            "this is the complement, the antagonistic part of the torques: the filter keeps the rest, c minus this": (
+                lambda A, c: c - filtered_torques(A, c)
+            ),
+            "the inverse of A^T A is missing: A A^T c is no projection, and it has another unit": _scaled_up,
+            "this is the force A^T c at the end-effector, not yet the torques": lambda A, c: A.T @ c,
+            "these are the two numbers f; the factor A is missing, c_eff = A f": (
+                lambda A, c: np.linalg.solve(A.T @ A, A.T @ c)
+            ),
+            "the columns of A are not at right angles: their parts cannot be added one by one": _one_by_one,
+            "the mean of the torques is removed, as if the null vector were (1, 1, 1): it turns with the pose": (
+                _mean_removed
+            ),
+        },
     ),
     "04.filtered_command": Exercise(
         filtered_command,
-        "project the error e with the filter of the matrix K_P A (rk.antagonism_filter takes any matrix), "
-        "and subtract the result from the measured angles.",
-        "rad",
-        _command_cases,
-        _command_law,
-        1e-10,
+        hints=(
+            "The drive multiplies the error by its gain on its own. What must the error be so that the torques hold "
+            "no antagonism, and the force stays?",
+            "The force is A^T K_P e = (K_P A)^T e. So it is the error that is projected, and the matrix of the "
+            "projection is K_P A, row i times gain i.",
+            "R = rk.antagonism_filter(K_P[:, None] * A), and the command is q_measured - R @ (q_measured - q_desired).",
+        ),
+        unit="rad",
+        cases=_command_cases,
+        invariant=_command_law,
+        tolerance=1e-10,
+        close=1e-6,
+        improve="solve the two equations for the projection directly instead of searching for them",
+        mistakes={
+            "the gains are forgotten in the filter: it is that of A, not of K_P A (a factor K_P is missing)": (
+                _command_with(lambda R, R_K, K, q, d: q - R @ (q - d))
+            ),
+            "the filtered error is subtracted from the desired angles: (18) starts from the measured ones": (
+                _command_with(lambda R, R_K, K, q, d: d - R_K @ (q - d))
+            ),
+            "the sign of the filtered error is opposite: the command lies on the other side of the measured angles": (
+                _command_with(lambda R, R_K, K, q, d: q + R_K @ (q - d))
+            ),
+            "this is the filtered error only, not the command: subtract it from the measured angles": (
+                _command_with(lambda R, R_K, K, q, d: R_K @ (q - d))
+            ),
+            "the angles themselves are filtered; only the error may be": _command_with(lambda R, R_K, K, q, d: R_K @ d),
+            "the complement of the filter is used: the error along the null vector is kept, the rest removed": (
+                _command_with(lambda R, R_K, K, q, d: q - (q - d) + R_K @ (q - d))
+            ),
+            "the torques are filtered and divided by the gains: (17) projects the error with K_P A, not the torque": (
+                _command_with(lambda R, R_K, K, q, d: q - R @ (K * (q - d)) / K)
+            ),
+            "the filtered torque is subtracted from an angle: divide out the gains (units, N m against rad)": (
+                _command_with(lambda R, R_K, K, q, d: q - R @ (K * (q - d)))
+            ),
+            "A is divided by the gains instead of multiplied": (
+                lambda A, K_P, q, d: q - antagonism.antagonism_filter(A / K_P[:, None]) @ (q - d)
+            ),
+            "measured and desired angles are exchanged": (
+                lambda A, K_P, q, d: d - antagonism.command_filter(A, K_P) @ (d - q)
+            ),
+        },
     ),
     "04.saved_energy": Exercise(
         saved_energy,
-        "filter the torques sample by sample, with R = rk.antagonism_filter(A) of shape (k, 3, 3), and subtract two "
-        "copper losses.",
-        "J",
-        _log_cases,
-        _pythagoras,
-        1e-10,
+        hints=(
+            "What would the drives have lost with the filter? The log tells you the torques without it.",
+            "Filter the torques sample by sample: rk.antagonism_filter(A) has the shape (k, 3, 3). Two copper losses "
+            "follow.",
+            "kept = np.einsum('kij,kj->ki', rk.antagonism_filter(A), c), then rk.copper_loss(robot, c, dt) minus "
+            "rk.copper_loss(robot, kept, dt).",
+        ),
+        unit="J",
+        cases=_log_cases,
+        invariant=_pythagoras,
+        tolerance=1e-10,
+        close=1e-3,
+        improve="project exactly, without a damping or a tolerance in the filter",
+        mistakes={
+            "this is the copper loss of the antagonistic torques: it equals the saving in total (Pythagoras), not "
+            "drive by drive": _energy_with(lambda whole, kept, removed: removed),
+            "this is the copper loss that remains with the filter, not what it saves": (
+                _energy_with(lambda whole, kept, removed: kept)
+            ),
+            "this is the copper loss without the filter, not the difference": (
+                _energy_with(lambda whole, kept, removed: whole)
+            ),
+            "this is the total over the drives; one number for each drive is wanted": (
+                _energy_with(lambda whole, kept, removed: np.sum(whole - kept))
+            ),
+            "the saving is a share without unit; the difference in J is wanted": (
+                _energy_with(lambda whole, kept, removed: 1 - kept / whole)
+            ),
+            "the motors are forgotten: a torque squared is no power, the factor R_el/k_t^2 is missing": (
+                lambda robot, A, c, dt: dt * np.sum(c**2 - _kept(A, c) ** 2, axis=0)
+            ),
+            "the filter of the first sample is used for the whole log: A changes with the pose": _first_filter,
+            "all drives are given the motor of the first one: R_el/k_t^2 belongs to each drive": _first_motor,
+            "the last sample is left out; every torque is held for dt, the last one too": (
+                lambda robot, A, c, dt: saved_energy(robot, A[:-1], c[:-1], dt)
+            ),
+            "the torques are held between the samples: a sum, no trapezoidal rule": _trapezoids,
+        },
     ),
 }

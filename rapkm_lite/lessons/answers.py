@@ -1,0 +1,148 @@
+"""Answers from outside: called with copies, whatever they do, and read as numbers."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Result(NamedTuple):
+    """What an examination finds: "ok", "close", "todo" or "wrong", one sentence, and the name of the mistake if any."""
+
+    word: str
+    sentence: str
+    mistake: str = ""
+
+
+class Ended(Exception):
+    """What ends an examination before its last case; carries the `Result`."""
+
+    def __init__(self, word: str, sentence: str, mistake: str = ""):
+        super().__init__(Result(word, sentence, mistake))
+        self.result = Result(word, sentence, mistake)
+
+
+def copied(value: Any) -> Any:
+    """A copy of what could be changed in place; machines, paths and laws cannot, and stay."""
+    if isinstance(value, np.ndarray):
+        return np.array(value)
+    if isinstance(value, tuple) and type(value) is tuple:
+        return tuple(copied(v) for v in value)
+    return copy.deepcopy(value) if isinstance(value, list | dict | set | bytearray) else value
+
+
+class Answer:
+    """A function that gets copies, so that arithmetic in place changes nothing outside.  What `check` returns.
+
+    own : the function as the student wrote it, None when there is none.
+    student : the same, guarded, where it is wrong or close and the lesson goes on with the package's; else None.
+    """
+
+    own: Callable | None
+    student: Callable | None
+
+    def __init__(self, function: Callable, own: Callable | None = None, student: Callable | None = None):
+        functools.update_wrapper(self, function)
+        self._function, self.own, self.student = function, own, student
+
+    def __call__(self, *arguments, **named):
+        got = self._function(*map(copied, arguments), **{name: copied(value) for name, value in named.items()})
+        return tidied(got)
+
+    def __repr__(self) -> str:
+        return f"<checked answer {getattr(self, '__name__', 'without a name')}>"
+
+
+def tidied(got: Any) -> Any:
+    """Numbers and lists of numbers as floating-point arrays, a single number as a number; anything else as it is."""
+    if isinstance(got, np.ndarray | list | int | float | np.number) and not isinstance(got, bool):
+        try:
+            numbers = np.asarray(got)
+            if numbers.dtype.kind in "iuf":
+                return numbers.astype(float).reshape(() if numbers.shape == (1,) else numbers.shape)[()]
+        except (TypeError, ValueError, OverflowError):
+            return got
+    return got
+
+
+def _words(error: BaseException) -> str:
+    try:
+        text = " ".join(str(error).split())
+    except Exception:
+        text = "a message that cannot be shown"
+    return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__
+
+
+def _unfinished(error: BaseException | None) -> bool:
+    """True when NotImplementedError stands behind an error, also one raised on the way up."""
+    while error is not None:
+        if isinstance(error, NotImplementedError):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def guarded(action: Callable, *arguments) -> Any:
+    """The result of code from outside; every way to stop but Ctrl-C ends in `Ended`."""
+    try:
+        return action(*arguments)
+    except (KeyboardInterrupt, Ended):
+        raise
+    except BaseException as error:
+        if _unfinished(error):
+            raise Ended("todo", "not yet") from None
+        kind = f"stops with {type(error).__name__}"
+        raise Ended("wrong", f"your code stops with {_words(error)}", kind) from None
+
+
+def given(answer: Any, case: tuple) -> Any:
+    """What a function answers for one case, or the value itself; ends the examination where there is none yet."""
+    got = guarded(answer, *map(copied, case)) if callable(answer) else answer
+    if got is None or got is Ellipsis or got is NotImplemented:
+        raise Ended("todo", "not yet: no value is returned")
+    if inspect.iscoroutine(got):
+        got.close()
+        raise Ended("wrong", "the answer is a coroutine: write def, not async def", "not numeric")
+    return got
+
+
+def _array(got: Any) -> np.ndarray:
+    array = np.asarray(got)
+    if array.dtype.kind == "O":
+        array = array.astype(complex if any(isinstance(v, complex) for v in array.flat) else float)
+    return array
+
+
+def numbers(got: Any) -> np.ndarray:
+    """An answer as an array of floating-point numbers, a copy; ends the examination where it is none."""
+    try:
+        array = guarded(_array, got)
+    except Ended:
+        kind = type(got).__name__
+        raise Ended("wrong", f"the answer is not numeric but of type {kind}, or too large", "not numeric") from None
+    if array.dtype.kind == "c":
+        raise Ended("wrong", "the answer is complex; a real one is wanted", "complex")
+    if array.dtype.kind not in "iuf":
+        raise Ended("wrong", f"the answer is not numeric but of type {type(got).__name__}", "not numeric")
+    return np.array(array, dtype=float)
+
+
+def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """The numbers in the expected shape, and finite; a single number may come as an array of one."""
+    if shape == () and got.shape == (1,):
+        got = got.reshape(())
+    if got.shape != shape:
+        if got.ndim == 2 and got.shape == shape[::-1]:
+            raise Ended("wrong", f"the answer is transposed: shape {got.shape}, expected {shape}", "transposed")
+        extra = "; the number of entries is right, their order in rows and columns is not" * (
+            got.size == int(np.prod(shape)) and got.size > 1
+        )
+        raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
+    if not np.all(np.isfinite(got)):
+        raise Ended("wrong", "the answer holds NaN or infinity", "NaN or infinity")
+    return got

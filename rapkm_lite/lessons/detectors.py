@@ -1,0 +1,271 @@
+"""Names for mistakes: what turns the right answers of all cases into the given ones."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .quantities import entrywise, matrices, quantities
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Given and right answers of all cases, their arguments and the names of these.
+
+    slack : relative deviation up to which two answers count as the same.
+    """
+
+    got: list[np.ndarray]
+    want: list[np.ndarray]
+    cases: list[tuple]
+    names: tuple[str, ...]
+    slack: float = 1e-6
+
+    def same(self, model: list[np.ndarray]) -> bool:
+        """True when the model gives the same as the answer in every case."""
+        return all(alike(m, g, self.slack) for m, g in zip(model, self.got, strict=True))
+
+    def __iter__(self) -> Iterator[tuple]:
+        return zip(self.got, self.want, self.cases, strict=True)
+
+
+def alike(model, got: np.ndarray, slack: float) -> bool:
+    """True when two arrays have the same shape and numbers, relative to the largest entry."""
+    model = np.asarray(model, dtype=float)
+    if model.shape != got.shape or not np.all(np.isfinite(model)):
+        return False
+    return float(np.max(np.abs(model - got), initial=0.0)) <= slack * float(np.max(np.abs(model), initial=1e-300))
+
+
+# Factor -> what it tells.
+FACTORS = {
+    1000.0: "the answer is 1000 times too large: a factor of 1000, units (milli)",
+    1e-3: "the answer is 1000 times too small: a factor of 1000, units (milli)",
+    1e6: "the answer is 10^6 times too large: units (micro, or milli twice)",
+    1e-6: "the answer is 10^6 times too small: units (micro, or milli twice)",
+    100.0: "the answer is 100 times too large: units (centi, percent)",
+    0.01: "the answer is 100 times too small: units (centi, percent)",
+    180 / np.pi: "the answer is 180/pi times too large: units, degrees instead of radians",
+    np.pi / 180: "the answer is 180/pi times too small: units, radians taken for degrees",
+    2.0: "the answer is twice the right one: a factor of 2 too many",
+    0.5: "the answer is half the right one: a factor of 2 is missing",
+    2 * np.pi: "the answer is 2 pi times too large: a factor of 2 pi, turns against radians",
+    0.5 / np.pi: "the answer is 2 pi times too small: a factor of 2 pi is missing, turns against radians",
+    np.pi: "the answer is pi times too large: a factor of pi too many",
+    1 / np.pi: "the answer is pi times too small: a factor of pi is missing",
+    4.0: "the answer is 4 times too large: a factor of 4, perhaps a 2 that was squared",
+    0.25: "the answer is 4 times too small: a factor of 4 is missing, perhaps a 2 that was squared",
+    60.0: "the answer is 60 times too large: units, minutes against seconds",
+    1 / 60: "the answer is 60 times too small: units, minutes against seconds",
+}
+
+
+def _ratio(got: list[np.ndarray], want: list[np.ndarray]) -> float:
+    """The factor k for which k want is nearest to the answer."""
+    above = sum(float(np.sum(g * w)) for g, w in zip(got, want, strict=True))
+    below = sum(float(np.sum(w * w)) for w in want)
+    return above / below if below > 0.0 else 0.0
+
+
+def nothing(seen: Seen) -> str:
+    """Zero everywhere, or the same for different cases."""
+    if any(np.any(w) for w in seen.want) and not any(np.any(g) for g in seen.got):
+        return "the answer is zero"
+    first = seen.got[0]
+    varies = len(seen.got) > 1 and not all(alike(seen.want[0], w, 1e-3) for w in seen.want[1:])
+    if varies and all(g.shape == first.shape and np.array_equal(g, first) for g in seen.got):
+        return "the answer is the same for every case: it does not depend on the arguments"
+    return ""
+
+
+def sign(seen: Seen) -> str:
+    """Opposite, lost, or opposite in some entries."""
+    if seen.same([-w for w in seen.want]):
+        return "the answer has the opposite sign"
+    if seen.same([np.abs(w) for w in seen.want]):
+        return "the answer has lost its signs: it is the absolute value"
+    if not all(alike(np.abs(w), np.abs(g), seen.slack) for g, w, _ in seen):
+        return ""
+    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    flipped = {
+        tuple(int(i) for i in place) for g, w, _ in seen for place in np.argwhere(np.abs(g - w) > seen.slack * scale)
+    }
+    for axis, word in ((0, "row"), (1, "column")) if seen.want[0].ndim == 2 else ((0, "entry"),):
+        hit = sorted({place[axis] for place in flipped})
+        if len(hit) < seen.want[0].shape[axis] and len(hit) <= 2:
+            return f"the sign of {word} {' and '.join(str(i) for i in hit)} (counted from 0) is opposite"
+    return "the size of every entry is right, but some have the opposite sign"
+
+
+def known_factor(seen: Seen) -> str:
+    """A constant factor that has a meaning of its own."""
+    k = _ratio(seen.got, seen.want)
+    for factor, words in FACTORS.items():
+        if abs(abs(k) / factor - 1.0) < 1e-4 + seen.slack and seen.same([np.sign(k) * factor * w for w in seen.want]):
+            return words + ", and the sign is opposite" * (k < 0)
+    return ""
+
+
+def transposed(seen: Seen) -> str:
+    """A square matrix with rows and columns exchanged."""
+    if all(w.ndim >= 2 and w.shape[-1] == w.shape[-2] for w in seen.want):
+        for s, words in ((1, ""), (-1, ", and the sign is opposite")):
+            if seen.same([s * np.swapaxes(w, -1, -2) for w in seen.want]):
+                return "the answer is transposed: rows and columns are exchanged" + words
+    return ""
+
+
+def _reordered(got: np.ndarray, want: np.ndarray, slack: float) -> bool:
+    """True when the rows of one are the rows of the other in some order."""
+    left, limit = list(range(len(want))), slack * float(np.max(np.abs(want), initial=1e-300))
+    for row in got:
+        match = next((i for i in left if np.max(np.abs(want[i] - row), initial=0.0) <= limit), None)
+        if match is None:
+            return False
+        left.remove(match)
+    return True
+
+
+def order(seen: Seen) -> str:
+    """Rows, columns or entries exchanged."""
+    if not all(w.ndim in (1, 2) and w.size > 1 for w in seen.want):
+        return ""
+    for s, words in ((1, ""), (-1, ", and the sign is opposite")):
+        if all(_reordered(s * g, w, seen.slack) for g, w, _ in seen):
+            return ("the rows stand" if seen.want[0].ndim == 2 else "the entries stand") + " in another order" + words
+        if seen.want[0].ndim == 2 and all(_reordered(s * g.T, w.T, seen.slack) for g, w, _ in seen):
+            return "the columns stand in another order" + words
+    if all(_reordered(g.ravel(), w.ravel(), seen.slack) for g, w, _ in seen):
+        return "the numbers are right, but they stand in another order (rows and columns)"
+    return ""
+
+
+def another_frame(seen: Seen) -> str:
+    """Vectors of the plane, all turned by the same angle or mirrored."""
+    if not all(w.ndim in (1, 2) and w.shape[-1] == 2 for w in seen.want) or sum(w.size for w in seen.want) < 6:
+        return ""
+    got, want = (np.concatenate([v.reshape(-1, 2) for v in side]) for side in (seen.got, seen.want))
+    U, _, Vt = np.linalg.svd(want.T @ got)
+    turn = U @ Vt
+    if not alike(want @ turn, got, max(seen.slack, 1e-6)):
+        return ""
+    if np.linalg.det(turn) < 0:
+        return "the vectors are mirrored: x and y are exchanged, or one axis points the other way (another frame)"
+    angle = np.degrees(np.arctan2(turn[0, 1], turn[0, 0]))
+    return f"the vectors are all turned by {angle:.0f} degrees: they are given in another frame"
+
+
+def from_argument(seen: Seen) -> str:
+    """An argument itself, or its difference from or sum with the right answer."""
+    for k, name in enumerate(seen.names):
+        pairs = [
+            (case[k], w)
+            for case, w in zip(seen.cases, seen.want, strict=True)
+            if k < len(case) and isinstance(case[k], np.ndarray) and case[k].shape == w.shape
+        ]
+        if len(pairs) < len(seen.cases):
+            continue
+        tries = [
+            ([a for a, _ in pairs], f"the answer is {name} itself, unchanged"),
+            ([-a for a, _ in pairs], f"the answer is minus {name} itself"),
+            ([a - w for a, w in pairs], f"the answer is the complement: {name} minus the right answer"),
+            ([w - a for a, w in pairs], f"the answer differs from the right one by {name}: it is subtracted once more"),
+            ([a + w for a, w in pairs], f"the answer differs from the right one by {name}: it is added once more"),
+        ]
+        for model, words in tries:
+            if seen.same(model):
+                return words
+    if all(w.ndim == 2 and w.shape[0] == w.shape[1] for w in seen.want):
+        if seen.same([np.eye(len(w)) - w for w in seen.want]):
+            return "the answer is the complement: the identity minus the right answer"
+    return ""
+
+
+def shifted(seen: Seen) -> str:
+    """The right answer plus a constant."""
+    gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
+    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    if len(gaps) > 1 and np.ptp(gaps) <= seen.slack * max(scale, abs(gaps[0])):
+        return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
+    return ""
+
+
+def _power(p: float) -> str:
+    return {1.0: "", 2.0: " squared", 0.5: " (its root)"}[abs(p)]
+
+
+def argument_factor(seen: Seen) -> str:
+    """A factor per case, or per entry, that is a power of one of the arguments: missing or one too many."""
+    ratios = [_ratio([g], [w]) for g, w, _ in seen]
+    fits = seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)])
+    if fits and all(ratios):
+        for name, values in quantities(seen.names, seen.cases):
+            for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
+                rest = np.array(ratios) / np.asarray(values) ** p
+                if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
+                    continue
+                if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]) and abs(values[0] - 1.0) > 1e-6:
+                    word = "is missing" if p < 0 else "is one too many"
+                    more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
+                    return f"the factor {name}{_power(p)} {word}{more}"
+    for name, scales in entrywise(seen.names, seen.cases, seen.want):
+        for p in (-1.0, 1.0, -2.0, 2.0):
+            if seen.same([w * s**p for w, s in zip(seen.want, scales, strict=True)]):
+                return f"each entry has the factor {name}{_power(p)} {'missing' if p < 0 else 'once too many'}"
+    for name, models in matrices(seen.names, seen.cases, seen.want):
+        if seen.same(models):
+            return name
+    return ""
+
+
+def constant_factor(seen: Seen) -> str:
+    """Any other constant factor."""
+    k = _ratio(seen.got, seen.want)
+    if k != 0.0 and seen.same([k * w for w in seen.want]):
+        sign = ", and the sign is opposite" * (k < 0)
+        return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
+    ratios = [_ratio([g], [w]) for g, w, _ in seen]
+    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want)
+    if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
+        return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
+    return ""
+
+
+DETECTORS: tuple[Callable[[Seen], str], ...] = (
+    *(nothing, sign, known_factor, transposed, from_argument, order, another_frame),
+    *(argument_factor, constant_factor, shifted),
+)
+
+
+def named(seen: Seen) -> str:
+    """The first detector that explains all cases; an empty string when none does."""
+    if not all(g.shape == w.shape for g, w, _ in seen):
+        return ""
+    with np.errstate(all="ignore"):
+        return next(filter(None, (detect(seen) for detect in DETECTORS)), "")
+
+
+def where(seen: Seen, right: list[bool]) -> str:
+    """Words for where an answer is right and where it is not: kinds of cases, numbers of drives, single entries."""
+    bad = [case for case, good in zip(seen.cases, right, strict=True) if not good]
+    good = [case for case, fine in zip(seen.cases, right, strict=True) if fine]
+    if good:
+        labels = sorted({getattr(case, "label", "") for case in bad})
+        if all(labels) and not {getattr(case, "label", "") for case in good} & set(labels):
+            return f"it is right in {len(good)} of {len(right)} cases, and wrong for " + ", ".join(labels)
+        return f"it is right in {len(good)} of {len(right)} cases"
+    shapes = {w.shape for w in seen.want}
+    if len(shapes) > 1 or not all(g.shape == w.shape for g, w, _ in seen) or len(shape := shapes.pop()) not in (1, 2):
+        return ""
+    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    wrong = np.any([np.abs(g - w) > seen.slack * scale for g, w, _ in seen], axis=0)
+    for axis in range(len(shape)):
+        lines = wrong if wrong.ndim == 1 else wrong.any(axis=1 - axis)
+        hit = [str(i) for i in itertools.compress(range(len(lines)), lines)]
+        if len(hit) < len(lines):
+            word = "entry" if wrong.ndim == 1 else ("row", "column")[axis]
+            return f"only {word} {', '.join(hit)} (counted from 0) is wrong"
+    return ""

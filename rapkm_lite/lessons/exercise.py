@@ -1,0 +1,97 @@
+"""What an exercise is: the package's answer, the cases it is tried on, its hints and the mistakes that have a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+
+class Case(tuple):
+    """Arguments of one case with words for it that a verdict can say: Case("a nearly singular pose", A, c).
+
+    >>> Case("a nearly singular pose", 1.0, 2.0).label
+    'a nearly singular pose'
+    """
+
+    label: str
+
+    def __new__(cls, label: str, *arguments):
+        case = super().__new__(cls, arguments)
+        case.label = label
+        return case
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One measured number of a design beside its limit, at most (or at least) so much.
+
+    >>> print(Measured("largest error", 2.4, "mm", 2.0))
+    largest error 2.4 mm (at most 2 mm: missed)
+    """
+
+    what: str
+    value: float
+    unit: str
+    limit: float
+    at_most: bool = True
+
+    @property
+    def holds(self) -> bool:
+        return self.value <= self.limit if self.at_most else self.value >= self.limit
+
+    @property
+    def miss(self) -> float:
+        """How far beyond the limit, relative to it; zero where it holds."""
+        return 0.0 if self.holds else abs(self.value - self.limit) / max(abs(self.limit), 1e-300)
+
+    def __str__(self) -> str:
+        word = "most" if self.at_most else "least"
+        missed = "" if self.holds else ": missed"
+        return f"{self.what} {self.value:.4g} {self.unit} (at {word} {self.limit:.4g} {self.unit}{missed})"
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """One exercise.
+
+    reference : the package's answer, a function of the case; for a value, a function of nothing.  A design exercise
+        has an example that meets all limits: a function, or the value itself.
+    hints : three steps, what to think of, which quantity, the line.
+    unit : of the answer.
+    cases : rng -> list of argument tuples (or `Case`, whose words the verdict says); left out for a value.
+    invariant : (answer, *case) -> (measured number, sentence), a law of nature; the number stays below `tolerance`.
+    tolerance : largest deviation from the reference (never less than 1e-9 of its largest entry), and of the invariant.
+    close : deviations up to this share of the largest entry are "close": the method is right, accuracy is short.  Of a
+        design: the share of its limit by which a measured number may miss it.
+    improve : the sentence that says what would improve a close answer.
+    mistakes : sentence that names a mistake -> function of the case that makes it (of a design: function of the answer
+        that is true when the mistake was made).
+    judge : of a design: answer -> list of `Measured`, from runs in closed loop; cases, invariant and tolerance are
+        not used.
+    unique : False where many answers are right: only shape and invariant are judged.
+    secret : True where `check` must not hand out the package's answer.
+    points : what a right or close answer is worth.
+    """
+
+    reference: Callable | object
+    hints: tuple[str, ...] | str = ()
+    unit: str = ""
+    cases: Callable = lambda rng: [()]
+    invariant: Callable | None = None
+    tolerance: float = 1e-9
+    close: float = 0.0
+    improve: str = "ask more of your method: a smaller tolerance, more steps, more samples"
+    mistakes: dict[str, Callable] = field(default_factory=dict)
+    judge: Callable | None = None
+    unique: bool = True
+    secret: bool = False
+    points: float = 5.0
+    hint: str = ""
+
+    def __post_init__(self):
+        if isinstance(self.hints, str) or self.hint:
+            object.__setattr__(self, "hints", (self.hint or self.hints,) * 3)
+
+    def is_value(self, cases: list[tuple]) -> bool:
+        """True when the answer is a value, not a function."""
+        return not callable(self.reference) if self.judge else cases == [()]

@@ -1,0 +1,165 @@
+"""The verdict on an answer: against the package and a law of nature, or by the behaviour of a design."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .answers import Answer, Ended, Result, copied, fitting, given, guarded, numbers
+from .detectors import Seen, alike, named, where
+from .exercise import Exercise, Measured
+
+
+def judged(exercise: Exercise, answer: Any) -> Result:
+    """The verdict on one answer, whatever it is and does."""
+    try:
+        answer = _unwrapped(answer)
+        if exercise.judge:
+            return _behaviour(exercise, answer)
+        return _numbers(exercise, answer)
+    except Ended as end:
+        return end.result
+
+
+def _unwrapped(answer: Any) -> Any:
+    """What the student wrote, also when it is what `check` returned before; ends where there is nothing."""
+    if isinstance(answer, Answer):
+        answer = answer.own
+    if answer is None or answer is Ellipsis or answer is NotImplemented:
+        raise Ended("todo", "not yet")
+    return answer
+
+
+def _seeded(exercise: Exercise) -> list[tuple]:
+    return exercise.cases(np.random.default_rng(20_111_130))
+
+
+def _numbers(exercise: Exercise, answer: Any) -> Result:
+    cases = _seeded(exercise)
+    if not exercise.is_value(cases) and not callable(answer):
+        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
+    read = [numbers(given(answer, case)) for case in cases]
+    reference = exercise.reference
+    assert callable(reference)
+    want = [np.asarray(reference(*map(copied, case)), dtype=float) for case in cases]
+    names = tuple(inspect.signature(reference).parameters)
+    seen = Seen(read, want, cases, names)
+    _known_mistake(exercise, seen)
+    seen = Seen([fitting(g, w.shape) for g, w in zip(read, want, strict=True)], want, cases, names)
+    worst = [_deviation(g, w) for g, w, _ in seen] if exercise.unique else [0.0] * len(cases)
+    allowed = [max(exercise.tolerance, 1e-9 * _size(w)) for w in want]
+    right = [d <= a for d, a in zip(worst, allowed, strict=True)]
+    lawful, sentence = _law(exercise, seen)
+    if all(right) and lawful <= exercise.tolerance:
+        law = f"; {sentence}: below {exercise.tolerance:.0e}" if exercise.invariant else ""
+        near = f"within {exercise.tolerance:.0e} {exercise.unit} of the package at " if exercise.unique else ""
+        return Result("ok", f"{near}{len(cases)} case{'s'[: len(cases) > 1]}{law}")
+    if all(right):
+        raise Ended("wrong", f"{sentence}: {lawful:.3g} (allowed {exercise.tolerance:.0e})", sentence)
+    off = f"off by up to {max(worst):.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
+    share = max(d / max(_size(w), 1e-300) if not good else 0.0 for d, w, good in zip(worst, want, right, strict=True))
+    if share <= exercise.close:
+        return Result(
+            "close", f"the method is right, {off}, that is {100 * share:.2g} %. To improve: {exercise.improve}"
+        )
+    _explained(exercise, seen, right, off)
+    law = f"; {sentence}: {lawful:.3g}" if exercise.invariant and lawful > exercise.tolerance else ""
+    raise Ended("wrong", f"it is {off}{law}", "no name found")
+
+
+def _size(want: np.ndarray) -> float:
+    return float(np.max(np.abs(want), initial=0.0))
+
+
+def _deviation(got: np.ndarray, want: np.ndarray) -> float:
+    with np.errstate(over="ignore"):
+        return float(np.max(np.abs(got - want), initial=0.0))
+
+
+def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
+    """The largest number of the invariant over all cases, with its sentence."""
+    lawful, sentence = 0.0, ""
+    if exercise.invariant:
+        with np.errstate(all="ignore"):
+            for got, _, case in seen:
+                number, text = exercise.invariant(np.array(got)[()], *map(copied, case))
+                if not number < lawful:
+                    lawful, sentence = float(number), text
+    return (lawful if lawful == lawful else np.inf), sentence
+
+
+def _matches(mistake: Callable, seen: Seen) -> str:
+    """Words for the sign with which a mistake explains the answer in every case, or None where it does not."""
+    try:
+        with np.errstate(all="ignore"):
+            made = [np.asarray(mistake(*map(copied, case)), dtype=float) for case in seen.cases]
+    except Exception:
+        return "no"
+    if all(m.shape == w.shape and alike(m, w, 1e-9) for m, w in zip(made, seen.want, strict=True)):
+        return "no"
+    for sign, words in ((1, ""), (-1, ", and the sign is opposite")):
+        if seen.same([sign * m for m in made]):
+            return words
+    return "no"
+
+
+def _known_mistake(exercise: Exercise, seen: Seen) -> None:
+    """End the examination where the answer is that of a mistake the exercise knows by name."""
+    if exercise.unique and all(alike(w, g, max(seen.slack, 0.0)) for g, w, _ in seen):
+        return
+    for sentence, mistake in exercise.mistakes.items():
+        words = _matches(mistake, seen)
+        if words != "no":
+            off = ""
+            if all(g.shape == w.shape for g, w, _ in seen):
+                off = f"; off by up to {max(_deviation(g, w) for g, w, _ in seen):.3g} {exercise.unit}"
+            raise Ended("wrong", f"{sentence}{words}{off}", sentence)
+
+
+def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> None:
+    """End the examination with the name of the mistake, or with the place where it was made, if either is found."""
+    scale = max(map(_size, seen.want), default=0.0) or 1.0
+    loose = min(0.2, max(1e-6, exercise.close, 1.5 * exercise.tolerance / scale))
+    rough = Seen(seen.got, seen.want, seen.cases, seen.names, loose)
+    if loose > 1e-6:
+        _known_mistake(exercise, rough)
+    for trial in (seen, rough):
+        if words := named(trial):
+            raise Ended("wrong", f"{words}; {off}", words)
+    if words := where(seen, right):
+        raise Ended("wrong", f"{words}; {off}", words)
+
+
+def _behaviour(exercise: Exercise, answer: Any) -> Result:
+    """The verdict on a design: its measured numbers beside their limits."""
+    assert exercise.judge
+    if callable(answer) and not callable(exercise.reference):
+        raise Ended("wrong", "the answer is a function; a value is wanted", "not a value")
+    if not callable(answer) and callable(exercise.reference):
+        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
+    if callable(answer):
+        answer = Answer(answer) if inspect.isroutine(answer) else answer
+    else:
+        answer = fitting(numbers(answer), np.shape(exercise.reference))[()]  # type: ignore[arg-type]
+    for sentence, made in exercise.mistakes.items():
+        if _true(made, answer):
+            raise Ended("wrong", sentence, sentence)
+    measured: list[Measured] = guarded(exercise.judge, answer)
+    text = ", ".join(map(str, measured))
+    miss = max((m.miss if m.value == m.value else np.inf) for m in measured)
+    if miss == 0.0:
+        return Result("ok", text)
+    if miss <= exercise.close:
+        return Result("close", f"{text}. To improve: {exercise.improve}")
+    raise Ended("wrong", text, "; ".join(f"{m.what} misses its limit" for m in measured if m.miss > 0.0))
+
+
+def _true(made: Callable, answer: Any) -> bool:
+    """Whether a design shows a known mistake; what cannot be asked does not show it."""
+    try:
+        return bool(made(answer))
+    except Exception:
+        return False

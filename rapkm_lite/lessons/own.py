@@ -1,0 +1,41 @@
+"""A student's own wrong or close answer in the picture that it feeds: dashed, beside the package's in solid lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .checker import own_answer, verdict_of
+
+
+def draw_own(name: str, curve: Callable[[Any], tuple], ax, per_arm: bool = False) -> None:
+    """Draw what the student's own answer gives, dashed, when it is wrong or close, and print which line is which.
+
+    name : of the exercise.
+    curve : answer -> (x, y), as for ``ax.plot``; the answer is the student's value, or function, called with copies.
+    per_arm : one column of y for each arm, in its colour.
+
+    Nothing happens when the answer is right or not there yet; one that cannot be drawn ends in a sentence.
+    """
+    from ..figures.style import ALARM, arm_colour  # matplotlib is not needed for a check
+
+    own = own_answer(name)
+    if own is None:
+        return
+    try:
+        x, y = (np.asarray(v, dtype=float) for v in curve(own))
+        limits = ax.get_xlim(), ax.get_ylim()
+        lines = ax.plot(x, y, dashes=(3, 2), color=ALARM, linewidth=1.4, zorder=5)
+    except Exception as error:
+        print(f"Your own {name} cannot be drawn here ({type(error).__name__}); the lesson goes on with the package's.")
+        return
+    if not np.all(np.isfinite(y)) or np.max(np.abs(y), initial=0.0) > 20 * max(map(abs, limits[1])):
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+    if per_arm:
+        for i, line in enumerate(lines):
+            line.set_color(arm_colour(i))
+    word = {"close": "close", "wrong": "not yet right"}[verdict_of(name)]
+    print(f"Dashed: your own {name} ({word}). Solid: the package's, with which the lesson goes on.")

@@ -1,0 +1,87 @@
+"""Numbers that the arguments of an exercise hold, for naming a factor that is missing or one too many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..machine.manipulator import Manipulator
+from ..mechanics.trajectory import Trajectory
+
+
+def _of(name: str, value: Any) -> dict[str, float]:
+    """The numbers of one argument, each with words for it."""
+    if isinstance(value, Manipulator):
+        k_t, R_el = float(value.torque_constant[0]), float(value.resistance[0])
+        return {"k_t": k_t, "R_el": R_el, "R_el/k_t^2": R_el / k_t**2, "number of drives": float(value.n_arms)}
+    if isinstance(value, Trajectory):
+        return {"dt": float(value.dt), "duration": float(value.t[-1])}
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return {}
+    if array.ndim == 0:
+        return {name: float(array)}
+    if array.ndim == 1 and array.size > 1 and np.ptp(array) == 0.0:
+        return {name: float(array[0]), "length of " + name: float(array.size)}
+    found = {"norm of " + name: float(np.linalg.norm(array)), "length of " + name: float(len(array))}
+    if array.ndim == 1:
+        found["sum of " + name] = float(array.sum())
+    elif array.ndim == 2 and array.shape[0] == array.shape[1]:
+        found["trace of " + name] = float(np.trace(array))
+    return found
+
+
+def quantities(names: tuple[str, ...], cases: list[tuple]) -> Iterator[tuple[str, np.ndarray]]:
+    """Words and one number per case: numbers of single arguments that are positive in every case."""
+    for k, name in enumerate(names):
+        found = [_of(name, case[k]) if k < len(case) else {} for case in cases]
+        for words in found[0]:
+            if all(words in f for f in found):
+                values = np.array([f[words] for f in found])
+                if np.all(np.isfinite(values)) and np.all(values > 0.0):
+                    yield words, values
+
+
+def _vector(value: Any) -> np.ndarray | None:
+    """The entries of a vector or of a diagonal matrix."""
+    if not isinstance(value, np.ndarray):
+        return None
+    if value.ndim == 1:
+        return value
+    diagonal = value.ndim == 2 and value.shape[0] == value.shape[1] and not np.any(value - np.diag(np.diag(value)))
+    return np.diag(value) if diagonal else None
+
+
+def entrywise(
+    names: tuple[str, ...], cases: list[tuple], want: list[np.ndarray]
+) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Words and, per case, an array that scales the entries or rows of the right answer by those of an argument."""
+    for k, name in enumerate(names):
+        vectors = [_vector(case[k]) if k < len(case) else None for case in cases]
+        scales = [
+            v.reshape(-1, *[1] * (w.ndim - 1))
+            for v, w in zip(vectors, want, strict=True)
+            if v is not None and w.ndim and len(v) == len(w) and np.all(v)
+        ]
+        if len(scales) == len(cases):
+            yield name, scales
+
+
+def matrices(
+    names: tuple[str, ...], cases: list[tuple], want: list[np.ndarray]
+) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Words and, per case, the right answer with a square argument multiplied on, divided off, or transposed."""
+    for k, name in enumerate(names):
+        found = [case[k] for case in cases if k < len(case) and isinstance(case[k], np.ndarray)]
+        if len(found) < len(cases) or not all(
+            M.ndim == 2 and M.shape[0] == M.shape[1] and w.ndim and len(M) == len(w)
+            for M, w in zip(found, want, strict=True)
+        ):
+            continue
+        pairs = list(zip(found, want, strict=True))
+        yield f"the factor {name} is one too many", [M @ w for M, w in pairs]
+        if all(abs(np.linalg.det(M)) > 1e-12 for M in found):
+            yield f"the factor {name} is missing", [np.linalg.solve(M, w) for M, w in pairs]
