@@ -89,8 +89,10 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
         palette = sheet.quantize(colours, dither=Image.Dither.NONE)
         tones = np.reshape(palette.getpalette(), (-1, 3))
         tones[tones.sum(axis=1).argmax()] = 255  # the paper stays white
-        palette.putpalette(tones.ravel().tolist())
-        flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB") for shot in shots]
+        flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
+        for shot in flat:
+            shot.putpalette(tones.ravel().tolist())
+        flat = [shot.convert("RGB") for shot in flat]
         film = _file(
             flat[0],
             "WEBP",
