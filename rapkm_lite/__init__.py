@@ -14,7 +14,7 @@ from .control.sample import Controller, Sample
 from .control.stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
 from .machine.arguments import ConvergenceError
 from .machine.datafiles import data_path
-from .machine.logs import Log, mystery_run
+from .machine.logs import Log, mystery_run, read_log
 from .machine.manipulator import Manipulator, load
 from .machine.mjcf import to_mjcf
 from .mechanics.actuation import (
@@ -43,6 +43,7 @@ from .mechanics.antagonism import (
     steady_state_torque,
 )
 from .mechanics.at import At, at
+from .mechanics.calibration import Calibration, CalibrationError, calibrate
 from .mechanics.closure import close_loops, estimate_pose
 from .mechanics.dynamics import (
     constraint_rank,
@@ -92,11 +93,11 @@ __version__ = "0.1.0"
 
 # Spelled out, because editors read it.
 __all__ = [
-    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "CommandFilter", "CompiledLaw", "Controller",
+    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "Calibration", "CalibrationError", "CommandFilter", "CompiledLaw", "Controller",
     "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator",
     "OffsetJump", "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
     "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter", "antagonism_form",
-    "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "circle", "close_loops",
+    "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "calibrate", "circle", "close_loops",
     "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian",
     "constraint_jacobian_dot",
     "constraint_rank", "control_matrix", "control_vector_fields", "copper_loss", "coriolis_matrix", "data_path",
@@ -106,7 +107,7 @@ __all__ = [
     "inverse_kinematics", "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix",
     "measured_energies", "mechanical_work", "minimal_dynamics", "mystery_run", "null_basis", "null_vector",
     "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement", "orthogonal_complement_dot",
-    "polygon", "potential_energy", "prestress_projector", "reachable", "redundant_control_matrix",
+    "polygon", "potential_energy", "prestress_projector", "reachable", "read_log", "redundant_control_matrix",
     "redundant_dynamics", "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate",
     "singular_values", "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf",
     "triangle", "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",

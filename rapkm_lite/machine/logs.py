@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from .arguments import real_array
 from .datafiles import data_path
-from .values import Value
+from .values import Array, Value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log(Value):
     """A log of a run, one row per record; read-only.
 
-    t : (k,) s.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
+    t : (k,) s, increasing.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
     q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, with the noise of a current sensor.
+    Raises ValueError for shapes that do not fit, numbers that are not finite, or times that do not increase.
 
     >>> import rapkm_lite as rk
     >>> rk.mystery_run("offset_a").error.shape
@@ -23,10 +27,25 @@ class Log(Value):
     """
 
     name: str
-    t: np.ndarray
-    q_a: np.ndarray
-    q_a_desired: np.ndarray
-    c: np.ndarray
+    t: Array
+    q_a: Array
+    q_a_desired: Array
+    c: Array
+
+    def __post_init__(self):
+        t, q_a = real_array("t", self.t), real_array("q_a", self.q_a)
+        if t.ndim != 1 or len(t) == 0 or q_a.ndim != 2 or len(q_a) != len(t):
+            raise ValueError(f"t has shape {t.shape} and q_a {q_a.shape}; allowed: (k,) and (k, N) with k >= 1")
+        late = np.flatnonzero(np.diff(t) <= 0.0)
+        if len(late):
+            raise ValueError(f"t[{late[0] + 1}] = {t[late[0] + 1]:g} s follows {t[late[0]]:g} s; allowed: increasing")
+        given = {"t": t, "q_a": q_a}
+        for name in ("q_a_desired", "c"):
+            given[name] = real_array(name, getattr(self, name))
+            if given[name].shape != q_a.shape:
+                raise ValueError(f"{name} has shape {given[name].shape}; allowed: {q_a.shape}, as q_a")
+        self._set(**given)
+        super().__post_init__()
 
     @property
     def error(self) -> np.ndarray:
@@ -35,6 +54,70 @@ class Log(Value):
 
     def __repr__(self):
         return f"Log({self.name!r}, {len(self.t)} records, {self.t[-1]:g} s, {self.c.shape[1]} drives)"
+
+
+def columns(n_arms: int) -> list[str]:
+    """The header of a log file: time, measured and desired angles, torques, with their units."""
+    arms = range(1, n_arms + 1)
+    angles = [f"q{i} {what} in rad" for what in ("measured", "desired") for i in arms]
+    return ["t in s", *angles, *(f"c{i} in N m" for i in arms)]
+
+
+def read_log(source: str | Path) -> Log:
+    """A log from a CSV file with the columns and units of ``data/mystery_runs``, for any number of drives.
+
+    The header is ``t in s, q1 measured in rad, ..., q1 desired in rad, ..., c1 in N m, ...``; a line is a record.
+    Raises ValueError with file, line and column for a file that cannot be read so, also where a number is missing or
+    not finite, or where time does not increase.
+
+    >>> import rapkm_lite as rk
+    >>> rk.read_log(rk.data_path("mystery_runs/gain.csv"))
+    Log('gain', 901 records, 9 s, 3 drives)
+    """
+    if not isinstance(source, str | Path):
+        raise ValueError(f"source = {source!r}; allowed: the path of a CSV file")
+    path = Path(source)
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *lines = list(csv.reader(file)) or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "no text in UTF-8"
+        raise ValueError(f"the log {str(source)!r} cannot be read ({reason}); allowed: a CSV file") from None
+    N, rest = divmod(len(header) - 1, 3)
+    wanted = columns(max(N, 2))
+    header = [name.strip() for name in header]
+    if rest or header != wanted:
+        wrong = next((k for k, pair in enumerate(zip(header, wanted, strict=False)) if len(set(pair)) > 1), len(header))
+        got = repr(header[wrong]) if wrong < len(header) else "nothing"
+        raise ValueError(
+            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"
+        )
+    table = np.array([_numbers(path, header, number, line) for number, line in enumerate(lines, 2)])
+    if len(table) == 0:
+        raise ValueError(f"the log {path.name!r} has no record; allowed: one line or more below the header")
+    t, q_a, q_a_desired, c = np.split(table, [1, 1 + N, 1 + 2 * N], axis=1)
+    late = np.flatnonzero(np.diff(t[:, 0]) <= 0.0)
+    if len(late):
+        number = late[0] + 3
+        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
+    return Log(path.stem, t[:, 0], q_a, q_a_desired, c)
+
+
+def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> list[float]:
+    if len(line) != len(header):
+        raise ValueError(f"the log {path.name!r}, line {number} has {len(line)} columns; allowed: {len(header)}")
+    row = []
+    for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
+        try:
+            row.append(float(text))
+            fine = abs(row[-1]) < 1e100
+        except ValueError:
+            fine = False
+        if not fine:
+            raise ValueError(
+                f"the log {path.name!r}, line {number}, column {column} ({name}) holds {text!r}; allowed: numbers"
+            )
+    return row
 
 
 def mystery_run(name: str) -> Log:
@@ -50,6 +133,4 @@ def mystery_run(name: str) -> Log:
     known = ("offset_a", "offset_b", "offset_c", "gain")
     if name not in known:
         raise ValueError(f"name = {name!r}; allowed: {', '.join(known)}")
-    table = np.loadtxt(data_path(f"mystery_runs/{name}.csv"), delimiter=",", skiprows=1)
-    t, q_a, q_a_desired, c = np.split(table, [1, 4, 7], axis=1)
-    return Log(name, t[:, 0], q_a, q_a_desired, c)
+    return read_log(data_path(f"mystery_runs/{name}.csv"))

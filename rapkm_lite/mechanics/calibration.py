@@ -1,0 +1,277 @@
+"""Self-calibration: encoder offsets, link lengths and base points from the closure of redundant encoders.
+
+N encoders measure a pose of two coordinates, so every sample contradicts itself in N - 2 ways unless offsets and
+geometry are right.  With n_k a basis of the null space of A^T at the pose of sample k, the closure of its readings is
+n_k^T (q_k - offset - q_a(x_k)) = 0: no torque, no gain, no friction enters, and the machine may move.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+from ..machine.arguments import ConvergenceError, bounded, one_of, positive_number, real_array
+from ..machine.logs import Log, read_log
+from ..machine.manipulator import Manipulator
+from ..machine.values import Array, Value
+from .at import at
+from .encoders import changed, closure, equations, gauge, poses, rounding, unknown_names
+from .rests import Rests, fitted_gain, rests
+
+UNKNOWNS = ("offsets", "offsets+lengths", "all")
+GAUGE = ("scale", "rotation", "translation x", "translation y")
+
+
+class CalibrationError(ValueError):
+    """The samples do not determine the unknowns; nothing is estimated.
+
+    rank : how many combinations the samples determine.  needed : how many there are to find.
+    known : (rank, p) their coefficients, orthonormal rows, p unknowns in the order of `Calibration.names`.
+    value : (rank,) what these combinations are, rad and m.
+
+    >>> import rapkm_lite as rk
+    >>> try:
+    ...     rk.calibrate(rk.load(), rk.mystery_run("offset_c"))
+    ... except rk.CalibrationError as error:
+    ...     print(error.rank, "of", error.needed)
+    1 of 3
+    """
+
+    def __init__(self, sentence: str, rank: int, needed: int, known: np.ndarray, value: np.ndarray):
+        super().__init__(sentence)
+        self.rank, self.needed, self.known, self.value = rank, needed, known, value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Value):
+    """What `calibrate` found; read-only.
+
+    names : of the unknowns, in the order of the covariance.  estimate : (p,) rad and m.
+    offset : (N,) rad, measured minus true base angle.  lengths : (N, 2) m.  base : (N, 2) m.
+    covariance : (p, p) of the estimate for independent noise of the readings, by first order.
+    noise : rad, standard deviation of one reading that the covariance uses.
+    rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
+    unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.
+    residual : rad, root mean square of the closure that is left.  K_P : (N,) N m/rad fitted to the rests, or None.
+    corrected : the machine with the estimated lengths and base points.  note : sentences on what to mind.
+
+    >>> import rapkm_lite as rk
+    >>> found = rk.calibrate(rk.load(), rk.mystery_run("offset_a"))
+    >>> found.interval(0.95).shape, found.rank
+    ((2, 3), 3)
+    """
+
+    names: tuple[str, ...]
+    estimate: Array
+    offset: Array
+    lengths: Array
+    base: Array
+    covariance: Array
+    noise: float
+    rank: int
+    condition: float
+    unseen: tuple[str, ...]
+    residual: float
+    K_P: Any
+    corrected: Manipulator
+    note: str = field(default="")
+
+    def interval(self, level: float = 0.95) -> np.ndarray:
+        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1."""
+        level = positive_number("level", level)
+        if level >= 1.0:
+            raise ValueError(f"level = {level:g}; allowed: above 0 and below 1")
+        half = NormalDist().inv_cdf(0.5 + level / 2) * np.sqrt(np.diagonal(self.covariance))
+        return np.stack([self.estimate - half, self.estimate + half])
+
+    def __repr__(self):
+        offset = ", ".join(f"{o:.4g}" for o in 1e3 * self.offset)
+        return f"Calibration(offset [{offset}] mrad, rank {self.rank}, residual {1e3 * self.residual:.2g} mrad)"
+
+
+def calibrate(
+    robot: Manipulator, log, unknowns: str = "offsets", use: str = "angles", K_P=None, noise=None
+) -> Calibration:
+    """Encoder offsets, with link lengths and base points if asked for, from logged angles or torques.
+
+    Minimizes the closure of all samples over the unknowns: Gauss-Newton with the poses eliminated, as in variable
+    projection.
+    Equal readings count once, because a rest repeats one rounding however long it lasts.
+
+    log : a `Log`, several of one machine, the path of a CSV file (`read_log`), or measured base angles (k, N) in rad.
+    unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these four motions stay unseen,
+    scale, rotation and two translations of the whole machine.
+    use : "angles", every sample, moving or not; or "torques", those of the rests of PD drives under a known gain, of
+    which each says where its encoder stood, q_desired - c / K_P.
+    K_P : number or (N,) N m/rad, for torques; default: fitted to the rests of the log.
+    noise : rad, standard deviation of a reading; default: from the residual and the steps of the readings.
+    Raises `CalibrationError` where the samples do not determine the unknowns, with the combinations that they do, and
+    ValueError for two drives, a log that does not fit the machine, or angles that fit no pose.
+
+    >>> import rapkm_lite as rk
+    >>> rk.calibrate(rk.load(), rk.mystery_run("offset_b")).rank
+    3
+    """
+    if not isinstance(robot, Manipulator):
+        raise ValueError(f"robot = {robot!r}; allowed: a Manipulator")
+    one_of("unknowns", unknowns, UNKNOWNS)
+    one_of("use", use, ("angles", "torques"))
+    noise = None if noise is None else positive_number("noise", noise)
+    if robot.n_arms < 3:
+        raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
+    angles, logs = _read(robot, log)
+    stand = rests(logs) if logs else None
+    gain = fitted_gain(stand) if stand else None
+    notes = [] if gain is None or K_P is None else gain.objections(_per_drive(robot.n_arms, K_P))
+    if use == "torques":
+        angles, step = _angles_of_torques(robot, stand, gain, K_P, notes)
+    else:
+        step = rounding(angles)
+        angles = np.unique(angles, axis=0)
+    return _solved(robot, angles, unknowns, noise, step, None if gain is None else gain.K_P, notes)
+
+
+def _read(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
+    """All measured angles (k, N), and the logs they come from, none for bare angles."""
+    if isinstance(log, Log | str | Path):
+        log = [log]
+    if isinstance(log, list | tuple) and log and all(isinstance(part, Log | str | Path) for part in log):
+        logs = [part if isinstance(part, Log) else read_log(part) for part in log]
+        for part in logs:
+            if part.q_a.shape[1] != robot.n_arms:
+                raise ValueError(f"log = {part!r} has {part.q_a.shape[1]} drives; allowed: {robot.n_arms}")
+        return np.concatenate([part.q_a for part in logs]), logs
+    try:
+        angles = real_array("log", log, robot.n_arms)
+    except ValueError as error:
+        raise ValueError(f"{error}, a Log, a path, or a list of these") from None
+    if angles.ndim != 2 or len(angles) == 0:
+        raise ValueError(f"log has shape {angles.shape}; allowed: angles (k, {robot.n_arms}) with k >= 1, or a Log")
+    return angles, []
+
+
+def _per_drive(N: int, K_P) -> np.ndarray:
+    K_P = real_array("K_P", K_P)
+    if K_P.shape not in ((), (N,)):
+        raise ValueError(f"K_P has shape {K_P.shape}; allowed: one number or ({N},)")
+    return np.broadcast_to(K_P, (N,))
+
+
+def _angles_of_torques(
+    robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]
+) -> tuple[np.ndarray, float]:
+    """Readings at the rests from their torques, one row a rest, and the standard deviation of one of them."""
+    if stand is None:
+        raise ValueError("use = 'torques' needs logs with torques; allowed: a Log, a path, or a list of these")
+    if K_P is None:
+        if gain is None:
+            raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
+        K_P = gain.K_P
+    K_P = bounded("K_P", _per_drive(robot.n_arms, K_P), 0.0, strict=True)
+    angles = stand.desired - stand.c / K_P
+    spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
+    felt, seen = (np.abs(closure(robot, poses(robot, a), a)).max() for a in (angles, stand.q_a))
+    if felt < 0.1 * seen and seen > 5 * spread:
+        notes.append(
+            f"the torques are mute: the angles contradict each other by {1e3 * seen:.3g} mrad, the torques by "
+            f"{1e3 * felt:.2g} mrad, as under an antagonism filter; use the angles"
+        )
+    return angles, spread
+
+
+def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
+    N = robot.n_arms
+    nominal = np.concatenate([np.zeros(N), robot.lengths.ravel(), robot.base.ravel()])
+    count = N * {"offsets": 1, "offsets+lengths": 3, "all": 5}[unknowns]
+    # Steps z of equal size: one for an angle of 1 rad or for the longest link; the gauge of the base points stands.
+    basis = np.diag(np.concatenate([np.ones(N), np.full(4 * N, robot.lengths.max())])[:count])
+    if unknowns == "all":
+        free = np.linalg.svd(gauge(robot).T)[2][4:].T
+        basis = np.block([[basis[:, : 3 * N], np.vstack([np.zeros((3 * N, 2 * N - 4)), robot.lengths.max() * free])]])
+    p, machine, guess = nominal[:count], robot, None
+    for _ in range(50):
+        q = poses(machine, angles - p[:N], guess)
+        guess = at(machine, q).x
+        left = closure(machine, q, angles - p[:N]).ravel() / math.sqrt(len(angles))
+        rows = equations(machine, q, count) @ basis / math.sqrt(len(angles))
+        U, sigma, Vt = np.linalg.svd(rows, full_matrices=False)
+        explained = U.T @ left
+        # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
+        unexplained = math.sqrt(max(left @ left - explained @ explained, 0.0))
+        rank = int(np.sum(sigma > max(1e-8, 10 * max(step, noise or 0.0, unexplained)) * sigma[0]))
+        if rank < basis.shape[1]:
+            raise _refusal(unknown_names(N)[:count], basis, sigma, Vt, explained, rank)
+        move = -Vt.T @ (explained / sigma)
+        p = p + basis @ move
+        machine = changed(robot, p)
+        if np.abs(move).max() < 1e-13:
+            break
+    else:
+        raise ConvergenceError(
+            f"calibrate did not converge: a last step of {np.abs(move).max():.3g} at offsets {p[:N].tolist()} rad; "
+            "allowed: a log of this machine, whose angles are near a pose"
+        )
+    spare, total = len(left) - len(sigma), float(left @ left) * len(angles)
+    spread = math.sqrt(total / spare) if spare else 0.0
+    used = max(spread, step) if noise is None else noise
+    half = basis @ (Vt.T / sigma)
+    condition = float(sigma[0] / sigma[-1])
+    notes = [*notes, *_cautions(guess, robot, condition, spread, step if noise is None else noise)]
+    if unknowns == "all":
+        notes.append(f"{', '.join(GAUGE)} of the whole machine are held: no reading shows them")
+    return Calibration(
+        names=unknown_names(N)[: len(p)],
+        estimate=p,
+        offset=p[:N],
+        lengths=machine.lengths,
+        base=machine.base,
+        covariance=half @ half.T * used**2 / len(angles),
+        noise=used,
+        rank=rank,
+        condition=condition,
+        unseen=GAUGE if unknowns == "all" else (),
+        residual=math.sqrt(total / len(left)),
+        K_P=K_P,
+        corrected=machine,
+        note="; ".join(notes),
+    )
+
+
+def _cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, noise: float) -> list[str]:
+    """What to mind: a residual (rad) above the noise where that is known, and places x (k, 2) close together."""
+    said = []
+    if noise and spread > 3 * noise:
+        said.append(
+            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else is wrong, "
+            "such as a length or a base point"
+        )
+    extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
+    if extent < 0.25 * robot.lengths.max():
+        said.append(f"all places lie within {extent:.2g} m of their centre, close together: spread them")
+    if condition > 50:
+        said.append(f"the equations have the condition {condition:.3g}, which multiplies what noise there is")
+    return said
+
+
+def _refusal(names, basis, sigma, Vt, explained, rank: int) -> CalibrationError:
+    needed = basis.shape[1]
+    known = Vt[:rank] @ np.linalg.pinv(basis)
+    size = np.linalg.norm(known, axis=-1)
+    known, value = known / size[:, None], -explained[:rank] / sigma[:rank] / size
+    sums = []
+    for row, number in zip(known[:3], value, strict=False):
+        terms = " ".join(f"{c:+.3f} {name}" for c, name in zip(row, names, strict=True) if abs(c) > 5e-4)
+        sums.append(f"{terms} = {number:.4g}")
+    return CalibrationError(
+        f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so places further apart, "
+        f"or fewer unknowns. Known to first order, in rad and m: {'; '.join(sums)}",
+        rank,
+        needed,
+        known,
+        value,
+    )

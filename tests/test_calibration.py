@@ -1,0 +1,260 @@
+"""Self-calibration: made-up truths found again, logs with hidden offsets, ranks by counting, refusals, bad logs."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
+
+import rapkm_lite as rk
+from rapkm_lite.lessons.mystery import hidden
+from rapkm_lite.mechanics.encoders import closure, equations, poses
+
+OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
+NAMES = ("testbed", "four_arms")
+
+
+def readings(robot, count=40, seed=3, bend=0.3):
+    """Base angles (count, N) of a machine with offsets, at random places."""
+    x = random_points(robot, count, seed, bend)
+    return rk.inverse_kinematics(robot, x)[:, : robot.n_arms] + OFFSET[: robot.n_arms]
+
+
+def disturbed(robot, seed=0):
+    rng = np.random.default_rng(seed)
+    lengths = robot.lengths + rng.normal(0, 2e-4, robot.lengths.shape)
+    return robot.replace(lengths=lengths), lengths
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_offsets_are_found_exactly(name):
+    robot = MACHINES[name]
+    found = rk.calibrate(robot, readings(robot))
+    assert_allclose(found.offset, OFFSET[: robot.n_arms], rtol=0, atol=1e-14)
+    assert found.rank == robot.n_arms and found.residual < 1e-14 and found.corrected == robot
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lengths_are_found_exactly(name):
+    robot = MACHINES[name]
+    true, lengths = disturbed(robot)
+    found = rk.calibrate(robot, readings(true), "offsets+lengths")
+    assert_allclose(found.offset, OFFSET[: robot.n_arms], rtol=0, atol=1e-12)
+    assert_allclose(found.corrected.lengths, lengths, rtol=0, atol=1e-12)
+    assert found.rank == 3 * robot.n_arms and found.unseen == ()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_base_points_are_found_but_for_a_similarity_of_the_plane(name):
+    robot = MACHINES[name]
+    true, _ = disturbed(robot)
+    true = true.replace(base=true.base + np.random.default_rng(5).normal(0, 2e-4, true.base.shape))
+    found = rk.calibrate(robot, readings(true), "all")
+    N = robot.n_arms
+    assert found.rank == 5 * N - 4 and found.unseen == ("scale", "rotation", "translation x", "translation y")
+    # Ratios of lengths, and differences of offsets, do not change with scale, rotation and translation.
+    sides = lambda base: np.linalg.norm(base[:, None] - base, axis=-1)  # noqa: E731
+    scale = sides(found.base).max() / sides(true.base).max()
+    assert_allclose(sides(found.base), scale * sides(true.base), rtol=0, atol=1e-11)
+    assert_allclose(found.lengths, scale * true.lengths, rtol=0, atol=1e-11)
+    assert_allclose(np.diff(found.offset), np.diff(OFFSET[:N]), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("name", "ranks"), [("testbed", (3, 9, 11)), ("four_arms", (4, 12, 16))])
+def test_ranks(name, ranks):
+    """N offsets and 2N lengths are seen, of all 5N unknowns all but a similarity of the plane (reference values)."""
+    robot = MACHINES[name]
+    q = rk.inverse_kinematics(robot, random_points(robot, 60, bend=0.3))
+    for unknowns, rank in zip((1, 3, 5), ranks, strict=True):
+        rows = equations(robot, q, unknowns * robot.n_arms)
+        assert np.linalg.matrix_rank(rows, tol=1e-9) == rank
+
+
+def test_equations_are_the_derivative_of_the_closure():
+    robot = MACHINES["asymmetric"]
+    N, angles = robot.n_arms, readings(robot, 5)
+    angles = angles - OFFSET[:N]
+    q = poses(robot, angles)
+    rows = equations(robot, q, 5 * N)
+    for k in range(5 * N):
+        values = []
+        for step in (1e-6, -1e-6):
+            p = np.concatenate([np.zeros(N), robot.lengths.ravel(), robot.base.ravel()])
+            p[k] += step
+            changed = robot.replace(lengths=p[N : 3 * N].reshape(N, 2), base=p[3 * N :].reshape(N, 2))
+            values.append(closure(changed, poses(changed, angles - p[:N]), angles - p[:N]).ravel())
+        assert_allclose((values[0] - values[1]) / 2e-6, rows[:, k], rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("name", "by_angles", "by_torques"), [("offset_a", 0.01, 0.1), ("gain", 0.01, 0.1)])
+def test_mystery_logs(name, by_angles, by_torques):
+    """Bounds in mrad: the roundings and the noise of the files, of which reference tables quote 0.007 and 0.08."""
+    log, (offset, gains) = rk.mystery_run(name), hidden(name)
+    assert np.abs(rk.calibrate(TESTBED, log).offset - offset).max() < 1e-3 * by_angles
+    found = rk.calibrate(TESTBED, log, use="torques")
+    assert np.abs(found.offset - offset).max() < 1e-3 * by_torques
+    assert_allclose(found.K_P, gains, rtol=0.02)
+
+
+def test_places_close_together_are_said_and_cost_accuracy():
+    near, far = (rk.calibrate(TESTBED, rk.mystery_run(name)) for name in ("offset_b", "offset_a"))
+    assert "close together" in near.note and "close together" not in far.note
+    assert near.condition > 5 * far.condition
+    assert np.abs(near.offset - hidden("offset_b")[0]).max() < 1e-5
+
+
+def test_one_place_is_refused_with_what_it_does_say():
+    with pytest.raises(rk.CalibrationError, match="determines 1 of 3 unknowns") as caught:
+        rk.calibrate(TESTBED, rk.mystery_run("offset_c"))
+    error = caught.value
+    assert error.rank == 1 and error.needed == 3
+    # One number is known, to second order in offsets of some milliradians.
+    assert_allclose(error.known @ hidden("offset_c")[0], error.value, rtol=0, atol=2e-4)
+
+
+def test_what_is_known_of_one_place_is_exact_to_second_order():
+    q_a = rk.inverse_kinematics(TESTBED, [0.03, -0.04])[:3]
+    gaps = []
+    for offset in (OFFSET[:3], OFFSET[:3] / 2):
+        with pytest.raises(rk.CalibrationError) as caught:
+            rk.calibrate(TESTBED, [q_a + offset])
+        gaps.append(abs((caught.value.known @ offset - caught.value.value)[0]))
+    assert gaps[0] / gaps[1] > 3.5
+
+
+def test_noise_at_one_place_is_no_information():
+    rng = np.random.default_rng(2)
+    q_a = rk.inverse_kinematics(TESTBED, [0.03, -0.04])[:3] + OFFSET[:3]
+    with pytest.raises(rk.CalibrationError, match="determines 1 of 3"):
+        rk.calibrate(TESTBED, q_a + rng.normal(0, 1e-4, (500, 3)))
+
+
+def test_a_wrong_gain_is_named_and_biases_the_torque_way():
+    log = rk.mystery_run("gain")
+    found = rk.calibrate(TESTBED, log, use="torques", K_P=7.05)
+    assert "K_P = 4.01 N m/rad for drive 1, not 7.05" in found.note
+    assert 1e-3 < np.abs(found.offset - hidden("gain")[0]).max() < 2e-3
+
+
+def test_covariance_is_that_of_a_hundred_repetitions():
+    rng, exact = np.random.default_rng(8), readings(TESTBED, 30)
+    noise = 1e-5
+    found = [rk.calibrate(TESTBED, exact + rng.normal(0, noise, exact.shape), noise=noise) for _ in range(100)]
+    estimates = np.array([c.offset for c in found])
+    # A variance from 100 draws has a relative standard deviation of sqrt(2 / 99) = 0.14.
+    ratio = np.var(estimates, axis=0, ddof=1) / np.diagonal(found[0].covariance)
+    assert np.all(np.abs(ratio - 1) < 4 * 0.142)
+    low, high = np.array([c.interval(0.9) for c in found]).swapaxes(0, 1)
+    inside = np.mean((low < OFFSET[:3]) & (OFFSET[:3] < high))
+    assert abs(inside - 0.9) < 4 * np.sqrt(0.09 / 300)
+
+
+def test_a_moving_triangle_beats_coarse_counts():
+    path = rk.triangle(TESTBED)
+    run = rk.simulate(TESTBED, rk.PD(7.05, 0.225), path, OFFSET[:3], encoder=2000)
+    count = 2 * np.pi / 2000
+    seen = np.rint((run.q_a + OFFSET[:3]) / count) * count
+    assert np.abs(rk.calibrate(TESTBED, seen).offset - OFFSET[:3]).max() < 0.25e-3
+
+
+def log_of(run, path, offset):
+    return rk.Log("run", run.t, run.q_a + offset, path.q_a, run.c)
+
+
+def test_under_the_filter_torques_are_mute_and_angles_are_not():
+    corners = 0.12 * np.array([[-0.9, -0.5], [-0.9, -0.5], [0.9, -0.5], [0.9, -0.5], [0.0, 1.0], [0.0, 1.0]])
+    path = rk.polygon(FRICTIONLESS, corners, duration=9.0)
+    law = rk.AntagonismFilter(rk.PD(7.05, 0.225))
+    log = log_of(rk.simulate(FRICTIONLESS, law, path, OFFSET[:3]), path, OFFSET[:3])
+    assert_allclose(rk.calibrate(FRICTIONLESS, log).offset, OFFSET[:3], rtol=0, atol=1e-7)
+    assert "mute" in rk.calibrate(FRICTIONLESS, log, use="torques", K_P=7.05).note
+
+
+@pytest.mark.parametrize(("radius", "reference"), [(0.03, 27.0), (0.08, 8.4), (0.12, 4.5)])
+def test_small_discs_are_ill_conditioned_and_a_small_residual_certifies_nothing(radius, reference):
+    """24 places in a disc: the median condition of 20 draws; lengths wrong by 1e-3 hide in the offsets."""
+    rng, condition, bias, residual = np.random.default_rng(0), [], [], []
+    for _ in range(20):
+        angle, r = rng.uniform(0, 2 * np.pi, 24), radius * np.sqrt(rng.uniform(0, 1, 24))
+        x = r[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        true = TESTBED.replace(lengths=TESTBED.lengths * (1 + 1e-3 * rng.normal(size=(3, 2))))
+        found = rk.calibrate(TESTBED, rk.inverse_kinematics(true, x)[:, :3] + OFFSET[:3], noise=1e-6)
+        condition.append(found.condition)
+        bias.append(np.abs(found.offset - OFFSET[:3]).max())
+        residual.append(found.residual)
+        assert "exceeds the noise" in found.note
+    assert_allclose(np.median(condition), reference, rtol=0.1)
+    assert np.median(bias) > 0.7e-3 and np.median(bias) > 5 * np.median(residual)
+
+
+def test_calibrated_offsets_save_what_the_filter_saves():
+    """Zero residual offset: within 0.2 % of the filtered energy; (1, 1, 1) mrad left: a fifth more (reference)."""
+    law, path = rk.PD(7.05, 0.225), rk.triangle(TESTBED)
+    rest = rk.calibrate(TESTBED, rk.mystery_run("offset_a")).offset - hidden("offset_a")[0]
+    after = rk.simulate(TESTBED, law, path, rest).energy.sum()
+    assert_allclose(after, rk.simulate(TESTBED, law, path).energy.sum(), rtol=1e-4)
+
+
+def test_several_logs_and_paths():
+    log, path = rk.mystery_run("offset_a"), rk.data_path("mystery_runs/offset_a.csv")
+    assert_allclose(rk.calibrate(TESTBED, path).offset, rk.calibrate(TESTBED, [log, log]).offset, rtol=0, atol=1e-12)
+
+
+HEADER = ",".join(
+    ["t in s", *(f"q{i} {w} in rad" for w in ("measured", "desired") for i in (1, 2, 3))]
+    + [f"c{i} in N m" for i in (1, 2, 3)]
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "line 1, column 1 holds ''|line 1, column 1 holds nothing"),
+        ("a,b\n1,2\n", "line 1, column 1 holds 'a'"),
+        (HEADER.replace("c1 in N m", "c1 in mN m") + "\n", "line 1, column 8 holds 'c1 in mN m'"),
+        (HEADER + "\n", "has no record"),
+        (HEADER + "\n0,1,2,3\n", "line 2 has 4 columns; allowed: 10"),
+        (
+            HEADER + "\n0,1,2,3,1,2,3,0,0,0\n0.1,1,x,3,1,2,3,0,0,0\n",
+            r"line 3, column 3 \(q2 measured in rad\) holds 'x'",
+        ),
+        (HEADER + "\n0,1,2,,1,2,3,0,0,0\n", "line 2, column 4"),
+        (HEADER + "\n0,1,2,nan,1,2,3,0,0,0\n", "line 2, column 4"),
+        (HEADER + "\n" + 2 * "0,1,2,3,1,2,3,0,0,0\n", "line 3, column 1: time does not increase"),
+    ],
+)
+def test_bad_files_are_refused_by_line_and_column(tmp_path, text, sentence):
+    file = tmp_path / "log.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=sentence):
+        rk.calibrate(TESTBED, file)
+
+
+def test_what_cannot_be_read_is_refused(tmp_path):
+    (tmp_path / "image.csv").write_bytes(b"\xff\xfe\x00")
+    for path in (tmp_path / "image.csv", tmp_path / "none.csv", tmp_path):
+        with pytest.raises(ValueError, match="cannot be read"):
+            rk.calibrate(TESTBED, path)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"robot": rk.load("five_bar"), "log": [[0.0, 1.0]]}, "2 drives"),
+        ({"robot": 3}, "robot = 3"),
+        ({"log": 3}, "log"),
+        ({"log": []}, "log"),
+        ({"log": [[0.0, 0.0]]}, "log has shape"),
+        ({"log": [[2.0, 2.0, 2.0]]}, "fit no pose"),
+        ({"log": rk.Log("run", [0.0], [4 * [0.0]], [4 * [0.0]], [4 * [0.0]])}, "4 drives; allowed: 3"),
+        ({"unknowns": "lengths"}, "unknowns = 'lengths'"),
+        ({"use": "both"}, "use = 'both'"),
+        ({"noise": -1.0}, "noise"),
+        ({"use": "torques", "log": [[0.0, 0.0, 0.0]]}, "needs logs with torques"),
+        ({"use": "torques", "K_P": -1.0}, "K_P"),
+        ({"use": "torques", "K_P": [1.0, 2.0]}, "K_P"),
+    ],
+)
+def test_bad_arguments(change, sentence):
+    given = {"robot": TESTBED, "log": rk.mystery_run("offset_a")} | change
+    with pytest.raises(ValueError, match=sentence):
+        rk.calibrate(**given)
