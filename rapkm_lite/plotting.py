@@ -46,6 +46,9 @@ from .figures.style import (
     axes_or_new,
     use_style,
 )
+from .figures.tables import (
+    table,
+)
 from .lessons.lesson00.figures import (
     plot_working_modes,
 )
@@ -180,5 +183,6 @@ __all__ = [
     "plot_torques_and_errors",
     "plot_working_modes",
     "plot_workspace",
+    "table",
     "use_style",
 ]
