@@ -87,9 +87,9 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
     sheet = Image.fromarray(np.concatenate([np.asarray(shot) for shot in some]))
     for colours in (48, 24):
         palette = sheet.quantize(colours, dither=Image.Dither.NONE)
-        tones = np.reshape(palette.getpalette(), (-1, 3))
-        tones[tones.sum(axis=1).argmax()] = 255  # the paper stays white
         flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
+        tones = np.reshape(palette.getpalette(), (-1, 3))
+        tones[flat[0].getpixel((0, 0))] = shots[0].getpixel((0, 0))  # the paper stays white
         for shot in flat:
             shot.putpalette(tones.ravel().tolist())
         flat = [shot.convert("RGB") for shot in flat]
