@@ -88,8 +88,8 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
     for colours in (48, 24):
         palette = sheet.quantize(colours, dither=Image.Dither.NONE)
         flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]
-        tones = np.reshape(palette.getpalette(), (-1, 3))
-        tones[flat[0].getpixel((0, 0))] = shots[0].getpixel((0, 0))  # the paper stays white
+        tones = np.reshape(palette.getpalette() or [], (-1, 3))
+        tones[np.asarray(flat[0])[0, 0]] = np.asarray(shots[0])[0, 0]  # the paper stays white
         for shot in flat:
             shot.putpalette(tones.ravel().tolist())
         flat = [shot.convert("RGB") for shot in flat]
