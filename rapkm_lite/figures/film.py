@@ -14,9 +14,9 @@ import matplotlib.style
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from PIL import Image
+from PIL import Image, ImageColor
 
-from .style import STYLE
+from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
 
@@ -83,8 +83,11 @@ def _shots(draw: Callable, steps: list, panels: int, figsize: tuple[float, float
 
 def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes:
     """The animated WebP: lines and flat colours are smallest without loss in few colours, one set for all frames."""
-    some = shots[:: max(1, len(shots) // 6)] + shots[-1:]
-    sheet = Image.fromarray(np.concatenate([np.asarray(shot) for shot in some]))
+    some = [np.asarray(shot) for shot in shots[:: max(1, len(shots) // 6)] + shots[-1:]]
+    # Thin lines have few pixels: without a stripe of its own an arm's colour would be merged with another one.
+    stripes = np.array([ImageColor.getrgb(colour) for colour in ARM_COLOURS], dtype=np.uint8)
+    stripes = np.resize(np.repeat(stripes, 40, axis=0), (len(some[0]) // 4, some[0].shape[1], 3))
+    sheet = Image.fromarray(np.concatenate([*some, stripes]))
     for colours in (48, 24):
         palette = sheet.quantize(colours, dither=Image.Dither.NONE)
         flat = [shot.quantize(palette=palette, dither=Image.Dither.NONE) for shot in shots]

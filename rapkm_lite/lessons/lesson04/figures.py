@@ -10,7 +10,7 @@ import numpy as np
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
 from ...figures.runs import lines_per_drive
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...mechanics.actuation import drive_pairs
 from ...mechanics.antagonism import null_vector
 from ...mechanics.closure import estimate_pose
@@ -179,6 +179,37 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
     ax.legend(loc="upper left", ncols=2)
     return ax
+
+
+def plot_filter_share(run, share: float, axes=None):
+    """A log while the filter is turned on: torques c - share N_{A^T} c over time, and their points in the torque plane.
+
+    share : 0 without, 1 with the filter.  Left the torques of every drive, right each sample as in `plot_torque_plane`;
+    pale the samples without filter.  Returns both axes.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
+    >>> left, right = plot_filter_share(run, 0.5)
+    """
+    axes = plt.subplots(1, 2, figsize=(8.0, 3.2))[1] if axes is None else axes
+    fight = antagonistic_torque(run)
+    c = 1e3 * (run.c - share * fight)
+    for i in range(run.robot.n_arms):
+        axes[0].plot(run.t[::10], c[::10, i], label=f"drive {i + 1}", **arm_line(i))
+    reach = 1.45e3 * np.abs(run.c).max()
+    axes[0].set(xlabel="time in s", ylabel="torque in mN m", xlim=(0, run.t[-1]), ylim=(-reach, reach))
+    axes[0].set_title(f"filter {100 * share:.0f} %")
+    axes[0].legend(ncols=run.robot.n_arms, loc="upper right")
+    along = 1e3 * np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)[::25]
+    moving = 1e3 * np.linalg.norm(run.c - fight, axis=-1)[::25]
+    axes[1].plot(along, moving, "o", color="#DDDDDD", ms=4)
+    axes[1].plot((1 - share) * along, moving, ".", color=AFTER, ms=5)
+    axes[1].axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
+    wide, high = 1.1 * max(np.abs(along).max(), 10.0), 1.15 * moving.max()
+    low = min(-10.0, 1.1 * along.min())
+    axes[1].set(xlim=(low, max(10.0, 1.1 * along.max())), ylim=(0, max(high, 0.5 * wide)))
+    axes[1].set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, in mN m")
+    return axes
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):

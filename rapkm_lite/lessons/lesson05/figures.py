@@ -121,6 +121,37 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
     return axes
 
 
+def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054)):
+    """Sample k of a run that a law in the angles of `pair` drives, beside the desired point and its mirror line.
+
+    Left the machine, the third arm pale; right the box `zoom` in m: the wanted point and the run up to here, the pair's
+    curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both axes.
+
+    >>> import rapkm_lite as rk
+    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
+    >>> left, right = plot_mirror(run, 1400, (0, 1))
+    """
+    axes = plt.subplots(1, 2, figsize=(8.0, 3.6), width_ratios=[1, 1.2])[1] if axes is None else axes
+    robot, desired = run.robot, run.trajectory.x
+    others = [i for i in range(robot.n_arms) if i not in pair]
+    plot_machine(robot, run.q[k], axes[0], arms=others, alpha=0.18, labels=False)
+    plot_machine(robot, run.q[k], axes[0], arms=pair, labels=False)
+    elbows = (robot.base + arm_vectors(robot, run.q[k])[0])[list(pair)]
+    for ax in axes:
+        plot_path(run.trajectory, ax, color="#BBBBBB", lw=1.5 if ax is axes[0] else 5)
+        plot_pair_curves(robot, ax, pairs=[pair], n=160)
+        ax.axline(*elbows, color=NEUTRAL, ls=":", lw=1.2, zorder=2)
+    axes[1].plot(*run.x[: k + 1].T, zorder=4, **_LAW_LINES["fixed pair"])
+    axes[1].plot(*np.stack([run.x[k], desired[k]]).T, color=NEUTRAL, lw=1.0, zorder=4)
+    axes[1].plot(*run.x[k], "s", color=ALARM, ms=8, zorder=6, label="end-effector")
+    axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="wanted")
+    axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
+    axes[0].set(xlim=(-0.31, 0.31), ylim=(-0.31, 0.31), title=f"{run.t[k]:.2f} s")
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", title="enlarged")
+    axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
+    return axes
+
+
 def plot_pairs(run, ax=None):
     """The pair of independent joints in use over time, one bar per pair."""
     ax = axes_or_new(ax, figsize=(8.0, 1.6))
