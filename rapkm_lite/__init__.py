@@ -74,6 +74,14 @@ from .mechanics.kinematics import (
     working_modes,
 )
 from .mechanics.maps import actuation_map, sampling_box, switching_map, workspace_grid
+from .mechanics.matrices import (
+    complement,
+    complement_dot,
+    minimal_terms,
+    projector,
+    projector_dot,
+    redundant_terms,
+)
 from .mechanics.partition import explicit_pseudoinverse, select_independent
 from .mechanics.trajectory import Desired, Trajectory, circle, follow, hold, polygon, triangle
 from .simulation.energy import (
@@ -93,24 +101,24 @@ __version__ = "0.1.0"
 
 # Spelled out, because editors read it.
 __all__ = [
-    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "Calibration", "CalibrationError", "CommandFilter", "CompiledLaw", "Controller",
-    "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law", "Log", "Manipulator",
-    "OffsetJump", "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError", "Sweep", "SwitchedCTC",
-    "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter", "antagonism_form",
-    "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "calibrate", "circle", "close_loops",
-    "closed_loop_projector", "command_filter", "common_sign", "compiled", "constraint_jacobian",
-    "constraint_jacobian_dot",
-    "constraint_rank", "control_matrix", "control_vector_fields", "copper_loss", "coriolis_matrix", "data_path",
-    "degree_of_actuation", "degree_of_freedom", "distal_cross_products", "drive_pairs", "effective_gain",
-    "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow", "force_polygon",
-    "forward_dynamics", "forward_kinematics", "generalized_forces", "hold", "inverse_dynamics",
+    "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "Calibration", "CalibrationError", "CommandFilter",
+    "CompiledLaw", "Controller", "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law",
+    "Log", "Manipulator", "OffsetJump", "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError",
+    "Sweep", "SwitchedCTC", "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter",
+    "antagonism_form", "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "calibrate", "circle",
+    "close_loops", "closed_loop_projector", "command_filter", "common_sign", "compiled", "complement", "complement_dot",
+    "constraint_jacobian", "constraint_jacobian_dot", "constraint_rank", "control_matrix", "control_vector_fields",
+    "copper_loss", "coriolis_matrix", "data_path", "degree_of_actuation", "degree_of_freedom", "distal_cross_products",
+    "drive_pairs", "effective_gain", "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow",
+    "force_polygon", "forward_dynamics", "forward_kinematics", "generalized_forces", "hold", "inverse_dynamics",
     "inverse_kinematics", "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix",
-    "measured_energies", "mechanical_work", "minimal_dynamics", "mystery_run", "null_basis", "null_vector",
-    "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement", "orthogonal_complement_dot",
-    "polygon", "potential_energy", "prestress_projector", "reachable", "read_log", "redundant_control_matrix",
-    "redundant_dynamics", "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate",
-    "singular_values", "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf",
-    "triangle", "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",
+    "measured_energies", "mechanical_work", "minimal_dynamics", "minimal_terms", "mystery_run", "null_basis",
+    "null_vector", "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement",
+    "orthogonal_complement_dot", "polygon", "potential_energy", "prestress_projector", "projector", "projector_dot",
+    "reachable", "read_log", "redundant_control_matrix", "redundant_dynamics", "redundant_terms", "required_wrench",
+    "rest_exists", "sampling_box", "select_independent", "simulate", "singular_values", "steady_state_error",
+    "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf", "triangle", "weighted_pseudoinverse",
+    "working_mode", "working_modes", "workspace_grid",
 ]  # fmt: skip
 
 

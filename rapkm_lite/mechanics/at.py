@@ -197,12 +197,12 @@ class At(Value):
     # Redundant coordinates.
     @quantity
     def _row_space(self):
-        return cores.row_space(self.robot.tree, self.J)
+        return cores.row_space(self.J, self.robot.tree.longest)
 
     @quantity
     def N(self) -> np.ndarray:
         """N_J = I - J^+ J of section 4.3, the orthogonal projector onto the tangent space of V, (..., 2N, 2N)."""
-        return cores.projector(self._row_space[0])
+        return cores.projector(*self._row_space)
 
     @rate
     def N_dot(self) -> np.ndarray:

@@ -103,17 +103,17 @@ def over_lever_dot(tree: Tree, v, lever, over, rates, qd) -> np.ndarray:
 
 
 def joint_complement(J: np.ndarray, independent) -> np.ndarray:
-    """F of (5) for two joints as q2: the identity in their rows, -J1^-1 J2 in the others, (..., 2N, 2)."""
-    dependent = _others(J.shape[-1], independent)
+    """F of (5) for delta = n - r joints as q2: the identity in their rows, -J1^-1 J2 in the others, (..., n, delta)."""
+    dependent, delta = _others(J.shape[-1], independent), len(independent)
     J1 = J[..., dependent]
     measure = np.linalg.svd(J1, compute_uv=False)[..., -1] / np.linalg.svd(J, compute_uv=False)[..., 0]
     if np.any(measure < 1e-12):
         raise ValueError(
             f"independent = {tuple(independent)} is singular here: its measure sigma_min(J1)/sigma_max(J) is "
-            f"{np.min(measure):.3g}, needed: >= 1e-12; choose another pair, or None for the end-effector position"
+            f"{np.min(measure):.3g}, needed: >= 1e-12; choose other joints, or None for the end-effector position"
         )
-    F = np.zeros((*J.shape[:-2], J.shape[-1], 2))
-    F[..., independent, [0, 1]] = 1.0
+    F = np.zeros((*J.shape[:-2], J.shape[-1], delta))
+    F[..., independent, np.arange(delta)] = 1.0
     F[..., dependent, :] = -np.linalg.solve(J1, J[..., independent])
     return F
 
@@ -122,7 +122,7 @@ def joint_complement_dot(J, J_dot, F, independent) -> np.ndarray:
     """dF/dt of `joint_complement`: from J F = 0 the dependent rows are -J1^-1 Jdot F."""
     dependent = _others(J.shape[-1], independent)
     rows = -np.linalg.solve(J[..., dependent], J_dot @ F)
-    F_dot = np.zeros((*rows.shape[:-2], J.shape[-1], 2))
+    F_dot = np.zeros((*rows.shape[:-2], J.shape[-1], rows.shape[-1]))
     F_dot[..., dependent, :] = rows
     return F_dot
 
@@ -146,32 +146,33 @@ def generalized_forces(tree: Tree, v: np.ndarray, qd: np.ndarray, v0: float) -> 
     return linear(v, tree.weight) + tree.friction * np.tanh(qd / v0)
 
 
-def row_space(tree: Tree, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Q1 (..., 2N, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
+def row_space(J: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Q1 (..., n, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
 
-    Raises ValueError where J lacks full rank.
+    Raises ValueError where J, whose entries are of the order of `size`, lacks full rank.
     """
     Q, R = orthogonal(J.mT, complete=J.ndim == 2)
-    size = pivots(R)[0] / tree.longest
-    if size < 1e-12:
+    smallest = pivots(R)[0] / size
+    if smallest < 1e-12:
         raise ValueError(
-            f"q is a c-space singularity: J has lost rank (relative pivot {size:.3g}); allowed: configurations with "
-            f"rank J = r = {tree.r}"
+            f"q is a c-space singularity: J has lost rank (relative pivot {smallest:.3g}); allowed: configurations "
+            f"with rank J = r = {J.shape[-2]}"
         )
     return Q, R
 
 
 def tangent(Q: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Orthonormal basis T of the tangent space of V, (..., 2N, 2), from `row_space`."""
+    """Orthonormal basis T of the tangent space of V, (..., n, n - r), from `row_space`."""
     if J.ndim > 2:
         Q, _ = orthogonal(J.mT, complete=True)
-    return Q[..., -2:]
+    return Q[..., J.shape[-2] :]
 
 
-def projector(Q: np.ndarray) -> np.ndarray:
-    """N_J = T T^T = I - Q1 Q1^T, from `row_space`, (..., 2N, 2N)."""
+def projector(Q: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """N_J = T T^T = I - Q1 Q1^T, from `row_space`, (..., n, n)."""
     if Q.ndim == 2:
-        return product(Q[:, -2:], Q[:, -2:].T)
+        T = Q[:, R.shape[-1] :]
+        return product(T, T.T)
     return np.eye(Q.shape[-2]) - Q @ Q.mT
 
 

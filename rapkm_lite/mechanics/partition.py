@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from ..machine.arguments import joint_indices, one_of, wide_matrix
+from ..machine.arguments import joint_indices, one_of, whole_number, wide_matrix
 from . import cores
 from .linalg import product
 
@@ -19,7 +19,8 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     bottom = (I_{m-delta} + B^T B)^-1 B^T (A~_1^T)^+,   B = (A~_1^T)^+ A~_2^T, (delta, m - delta), so A~_2 = B^T A~_1.
     Its point: the only new inverse is (m - delta) x (m - delta), a number for three drives.  Every partition with
     regular A~_1 gives the same result.
-    A_tilde : (..., m, n).  rows : the delta = 2 row indices of A~_1, a pair or (..., 2).
+    A_tilde : (..., m, n).  rows : the delta row indices of A~_1, (delta,) or (..., delta), with delta the rank of A~,
+    which is 2 for every `Manipulator`.
     Raises ValueError where A~_1 has lost rank.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
@@ -51,19 +52,20 @@ def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
 
 
 def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Row indices of A~_1, (2,) or (..., 2), of A~_2, and where each row of A~ stands in these."""
+    """Row indices of A~_1, (delta,) or (..., delta), of A~_2, and where each row of A~ stands in these."""
     m = A_tilde.shape[-2]
     if np.ndim(rows) < 2:
         rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
-        return _fixed_partition(joint_indices("rows", rows, m), m)
+        count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
+        return _fixed_partition(joint_indices("rows", rows, m, count), m)
     rows = _row_choice(rows, A_tilde)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
-    others = np.argsort(taken, axis=-1, kind="stable")[..., : m - 2]
+    others = np.argsort(taken, axis=-1, kind="stable")[..., : m - rows.shape[-1]]
     return rows, others, np.argsort(np.concatenate([rows, others], axis=-1), axis=-1)
 
 
 @functools.cache
-def _fixed_partition(first: tuple[int, int], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _fixed_partition(first: tuple[int, ...], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     others = [i for i in range(m) if i not in first]
     return np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
 
@@ -71,36 +73,45 @@ def _fixed_partition(first: tuple[int, int], m: int) -> tuple[np.ndarray, np.nda
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
     rows = np.asarray(rows)
-    if rows.dtype.kind not in "iu" or rows.shape != (*lead, 2):
-        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: a pair of indices or {(*lead, 2)}")
-    bad = np.any((rows < 0) | (rows >= m), axis=-1) | (rows[..., 0] == rows[..., 1])
+    if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
+        raise ValueError(
+            f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,) or {(*lead, 'delta')}"
+        )
+    ordered = np.sort(rows, axis=-1)
+    bad = np.any((rows < 0) | (rows >= m), axis=-1) | np.any(np.diff(ordered, axis=-1) == 0, axis=-1)
     if np.any(bad):
-        raise ValueError(f"rows holds the pair {rows[bad][0].tolist()}; allowed: two different ones from 0 to {m - 1}")
+        raise ValueError(f"rows holds {rows[bad][0].tolist()}; allowed: different indices from 0 to {m - 1}")
     return rows
 
 
-def _inverse_condition(A: np.ndarray) -> np.ndarray:
-    sigma = cores.singular_values(A)
-    return sigma[..., 1] / np.maximum(sigma[..., 0], 1e-300)
+def _spectrum(A1: np.ndarray) -> np.ndarray:
+    """Singular values of the rows A~_1 (..., delta, n), largest first."""
+    return cores.singular_values(A1.mT) if A1.shape[-2] == 2 else np.linalg.svd(A1, compute_uv=False)
+
+
+def _inverse_condition(A1: np.ndarray) -> np.ndarray:
+    sigma = _spectrum(A1)
+    return sigma[..., -1] / np.maximum(sigma[..., 0], 1e-300)
 
 
 PARTITION_RULES = {
-    "sigma_min": lambda A1: cores.singular_values(A1.mT)[..., 1],
-    "condition": lambda A1: _inverse_condition(A1.mT),
+    "sigma_min": lambda A1: _spectrum(A1)[..., -1],
+    "condition": _inverse_condition,
     "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
 }
 
 
 @functools.cache
-def _pairs(m: int) -> np.ndarray:
-    return np.array(list(itertools.combinations(range(m), 2)))
+def _choices(m: int, delta: int) -> np.ndarray:
+    return np.array(list(itertools.combinations(range(m), delta)))
 
 
-def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
-    """Rows (..., 2) of A~ (..., m, n) that make the best A~_1 in the partition (26), for (27).
+def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.ndarray:
+    """Rows (..., delta) of A~ (..., m, n) that make the best A~_1 in the partition (26), for (27).
 
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
+    delta : how many, the rank of A~; 2 for the machines of `Manipulator`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.select_independent(rk.redundant_control_matrix(robot, q))
@@ -108,5 +119,8 @@ def select_independent(A_tilde, rule: str = "sigma_min") -> np.ndarray:
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
     one_of("rule", rule, PARTITION_RULES)
-    pairs = _pairs(A_tilde.shape[-2])
-    return pairs[np.argmax(PARTITION_RULES[rule](A_tilde.take(pairs, axis=-2)), axis=-1)]
+    m, delta = A_tilde.shape[-2], whole_number("delta", delta, 1)
+    if delta > m:
+        raise ValueError(f"delta = {delta}; allowed: at most the {m} rows of A_tilde")
+    choices = _choices(m, delta)
+    return choices[np.argmax(PARTITION_RULES[rule](A_tilde.take(choices, axis=-2)), axis=-1)]

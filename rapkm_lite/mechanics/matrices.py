@@ -1,0 +1,123 @@
+"""The theory for any mechanism: what (4)-(7) and (21)-(24) need of it are matrices.
+
+J (..., r, n) constraint Jacobian of full rank, G and C (..., n, n), Q (..., n) of the tree (2).  Further functions that
+take matrices of any mechanism: `weighted_pseudoinverse`, `prestress_projector`, `antagonism_filter`, `command_filter`,
+`null_basis`, `steady_state_error` for A (..., m, delta); `explicit_pseudoinverse` and `select_independent` for A~
+(..., m, n).  The functions of a `Manipulator` evaluate the same formulas.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..machine.arguments import check_leading, joint_indices, real_array
+from . import cores
+
+
+def complement(J, independent) -> np.ndarray:
+    """F of (5), qd = F q2d with J F = 0, (..., n, n - r), for any mechanism.
+
+    independent : the n - r indices of q2, 0-based; the columns of F follow them, the rows the order of q.
+    Raises ValueError where J1, the other columns of J, is singular.
+
+    >>> complement([[1.0, 1.0, 0.0]], independent=(1, 2))
+    array([[-1., -0.],
+           [ 1.,  0.],
+           [ 0.,  1.]])
+    """
+    J = _jacobian(J)
+    return cores.joint_complement(J, _independent(J, independent))
+
+
+def complement_dot(J, J_dot, independent) -> np.ndarray:
+    """dF/dt of `complement`, (..., n, n - r); from J F = 0 the dependent rows are -J1^-1 Jdot F.
+
+    J_dot : (..., r, n), dJ/dt.
+
+    >>> complement_dot([[1.0, 1.0, 0.0]], [[0.0, 2.0, 0.0]], independent=(1, 2))
+    array([[-2., -0.],
+           [ 0.,  0.],
+           [ 0.,  0.]])
+    """
+    J, J_dot = _jacobians(J, J_dot)
+    independent = _independent(J, independent)
+    return cores.joint_complement_dot(J, J_dot, cores.joint_complement(J, independent), independent)
+
+
+def projector(J) -> np.ndarray:
+    """N_J = I - J^+ J of section 4.3, (..., n, n): orthogonal onto the null space of J, for any mechanism.
+
+    Where the joints have different units, so have its entries, and feedback through it depends on their choice.
+    Raises ValueError where J lacks full rank.
+
+    >>> projector([[1.0, 0.0, 0.0]]) @ [1.0, 2.0, 3.0]
+    array([0., 2., 3.])
+    """
+    J = _jacobian(J)
+    return cores.projector(*cores.row_space(J, _size(J)))
+
+
+def projector_dot(J, J_dot) -> np.ndarray:
+    """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., n, n), of the text after (24), which prints B for J.
+
+    >>> float(projector_dot([[1.0, 0.0]], [[0.0, 2.0]])[0, 1])
+    -2.0
+    """
+    J, J_dot = _jacobians(J, J_dot)
+    Q, R = cores.row_space(J, _size(J))
+    return cores.projector_dot(Q, R, J_dot, cores.projector(Q, R))
+
+
+def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gbar, Cbar, Qbar of (7) from F, its rate and the tree: (..., delta, delta) twice, (..., delta).
+
+    >>> Gbar, Cbar, Qbar = minimal_terms([[1.0], [2.0]], [[0.0], [0.0]], np.eye(2), np.zeros((2, 2)), [0.0, 1.0])
+    >>> Gbar, Qbar
+    (array([[5.]]), array([2.]))
+    """
+    F, F_dot = real_array("F", F), real_array("F_dot", F_dot)
+    if F.ndim < 2 or F_dot.shape != F.shape:
+        raise ValueError(f"F has shape {F.shape} and F_dot {F_dot.shape}; allowed: (..., n, delta), both the same")
+    return cores.minimal(F, F_dot, *_tree(F.shape[-2], F.shape[:-2], G, C, Q))
+
+
+def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """G~, C~, Q~ of (24) from N_J, its rate and the tree: (..., n, n) twice, (..., n).
+
+    >>> N = projector([[1.0, 0.0]])
+    >>> redundant_terms(N, 0 * N, np.eye(2), np.zeros((2, 2)), [1.0, 1.0])[2]
+    array([0., 1.])
+    """
+    N, N_dot = real_array("N", N), real_array("N_dot", N_dot)
+    if N.ndim < 2 or N.shape[-1] != N.shape[-2] or N_dot.shape != N.shape:
+        raise ValueError(f"N has shape {N.shape} and N_dot {N_dot.shape}; allowed: (..., n, n), both the same")
+    return cores.redundant(N, N_dot, *_tree(N.shape[-1], N.shape[:-2], G, C, Q))
+
+
+def _jacobian(J) -> np.ndarray:
+    J = real_array("J", J)
+    if J.ndim < 2 or not 1 <= J.shape[-2] < J.shape[-1]:
+        raise ValueError(f"J has shape {J.shape}; allowed: (..., r, n) with 1 <= r < n")
+    return J
+
+
+def _jacobians(J, J_dot) -> tuple[np.ndarray, np.ndarray]:
+    J, J_dot = _jacobian(J), real_array("J_dot", J_dot)
+    if J_dot.shape != J.shape:
+        raise ValueError(f"J_dot has shape {J_dot.shape}; allowed: {J.shape}, as J")
+    return J, J_dot
+
+
+def _independent(J: np.ndarray, independent) -> list[int]:
+    n = J.shape[-1]
+    return list(joint_indices("independent", independent, n, n - J.shape[-2]))
+
+
+def _size(J: np.ndarray) -> float:
+    return max(float(np.abs(J).max(initial=0.0)), 1e-300)
+
+
+def _tree(n: int, lead: tuple[int, ...], G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    G, C, Q = real_array("G", G, n, n), real_array("C", C, n, n), real_array("Q", Q, n)
+    check_leading(motion=lead, G=G.shape[:-2], C=C.shape[:-2], Q=Q.shape[:-1])
+    return G, C, Q

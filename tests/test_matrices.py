@@ -1,0 +1,116 @@
+"""The theory on matrices of any mechanism: the machine's own functions, and identities for delta = 3, m = 4."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import FRICTIONLESS, MACHINES, machines, random_motion
+
+import rapkm_lite as rk
+
+
+@machines
+def test_they_are_the_formulas_of_the_machine(robot):
+    q, qd, _, _ = random_motion(robot, 20, bend=0.2)
+    J, J_dot = rk.constraint_jacobian(robot, q), rk.constraint_jacobian_dot(robot, q, qd)
+    pair = (0, robot.n_arms)
+    F, F_dot = rk.complement(J, pair), rk.complement_dot(J, J_dot, pair)
+    N, N_dot = rk.projector(J), rk.projector_dot(J, J_dot)
+    tree = rk.mass_matrix(robot, q), rk.coriolis_matrix(robot, q, qd), rk.generalized_forces(robot, q, qd)
+    same = [
+        (F, rk.orthogonal_complement(robot, q, pair)),
+        (F_dot, rk.orthogonal_complement_dot(robot, q, qd, pair)),
+        (N, rk.nullspace_projector(robot, q)),
+        (N_dot, rk.nullspace_projector_dot(robot, q, qd)),
+        *zip(rk.minimal_terms(F, F_dot, *tree), rk.minimal_dynamics(robot, q, qd, pair), strict=True),
+        *zip(rk.redundant_terms(N, N_dot, *tree), rk.redundant_dynamics(robot, q, qd), strict=True),
+    ]
+    for ours, theirs in same:
+        assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12 * np.abs(theirs).max())
+
+
+# A made-up mechanism with delta = 3, m = 4, as a planar 4RRR machine has: n = 9, r = 6, J(t) = J0 + t J1.
+RNG = np.random.default_rng(4)
+J0, J1 = RNG.normal(size=(2, 6, 9))
+PAIRWISE = (0, 1, 8)
+
+
+def test_complement_and_projector_for_three_degrees_of_freedom():
+    F, N = rk.complement(J0, PAIRWISE), rk.projector(J0)
+    assert_allclose(J0 @ F, 0, atol=1e-13)
+    assert_allclose(F[list(PAIRWISE)], np.eye(3), atol=0)
+    assert_allclose(N @ N, N, atol=1e-14)
+    assert_allclose(N, np.eye(9) - np.linalg.pinv(J0) @ J0, atol=1e-13)
+    assert_allclose(rk.projector(np.stack([J0, J1]))[0], N, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "rate"),
+    [
+        (lambda J: rk.complement(J, PAIRWISE), rk.complement_dot(J0, J1, PAIRWISE)),
+        (rk.projector, rk.projector_dot(J0, J1)),
+    ],
+)
+def test_rates_are_derivatives(matrix, rate):
+    step = 1e-6
+    difference = (matrix(J0 + step * J1) - matrix(J0 - step * J1)) / (2 * step)
+    assert_allclose(rate, difference, rtol=0, atol=1e-8 * np.abs(rate).max())
+
+
+def test_motion_equations_in_both_coordinates_agree():
+    """(23) is (6) lifted: F^T times it, for a tangent motion, gives (6) of the same motion."""
+    G = RNG.normal(size=(9, 9))
+    G, C, Q = G @ G.T, RNG.normal(size=(9, 9)), RNG.normal(size=9)
+    F, F_dot = rk.complement(J0, PAIRWISE), rk.complement_dot(J0, J1, PAIRWISE)
+    q2d, q2dd = RNG.normal(size=(2, 3))
+    qd, qdd = F @ q2d, F @ q2dd + F_dot @ q2d
+    Gbar, Cbar, Qbar = rk.minimal_terms(F, F_dot, G, C, Q)
+    Gt, Ct, Qt = rk.redundant_terms(rk.projector(J0), rk.projector_dot(J0, J1), G, C, Q)
+    assert_allclose(F.T @ (Gt @ qdd + Ct @ qd + Qt), Gbar @ q2dd + Cbar @ q2d + Qbar, rtol=1e-11)
+
+
+def test_explicit_pseudoinverse_for_three_degrees_of_freedom():
+    A_tilde = rk.projector(J0)[[0, 1, 2, 3]]
+    best = rk.select_independent(A_tilde, delta=3)
+    truth = np.linalg.pinv(A_tilde.T, rcond=1e-9)
+    for rows in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3], best):
+        assert_allclose(rk.explicit_pseudoinverse(A_tilde, rows), truth, atol=1e-10)
+    sigma = [np.linalg.svd(A_tilde[list(rows)])[1][2] for rows in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3])]
+    assert_allclose(np.linalg.svd(A_tilde[best])[1][2], max(sigma))
+    many = np.stack([A_tilde, A_tilde[::-1]])
+    rows = np.stack([best, [0, 1, 2]])
+    assert_allclose(rk.explicit_pseudoinverse(many, rows)[0], truth, atol=1e-10)
+
+
+def test_the_filter_of_three_degrees_of_freedom_leaves_nothing():
+    A = rk.complement(J0, PAIRWISE)[:4]
+    R, n, c = rk.antagonism_filter(A), rk.null_basis(A), RNG.normal(size=4)
+    assert_allclose(A.T @ R @ c, A.T @ c, atol=1e-12)
+    assert np.abs(n.T @ R @ c).max() < 5e-15 * np.linalg.norm(c)
+    e = rk.steady_state_error(A, np.full(4, 7.0), 1e-3 * c)
+    assert_allclose(A.T @ (7.0 * (e + 1e-3 * c)), 0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: rk.complement(J0, (0, 1)), "independent = .*allowed: 3 different"),
+        (lambda: rk.complement(np.eye(3), (0,)), r"J has shape \(3, 3\)"),
+        (lambda: rk.complement([[1.0, 0.0, 0.0]], (0, 1)), "singular"),
+        (lambda: rk.projector(np.zeros((2, 4))), "lost rank"),
+        (lambda: rk.projector_dot(J0, J1[:2]), "J_dot has shape"),
+        (lambda: rk.minimal_terms(np.ones((9, 3)), np.ones((9, 2)), *3 * [np.eye(9)]), "F_dot"),
+        (lambda: rk.redundant_terms(np.eye(9), np.eye(9), np.eye(9), np.eye(9), np.ones(8)), "Q has shape"),
+        (lambda: rk.select_independent(np.eye(4), delta=5), "delta = 5"),
+        (lambda: rk.explicit_pseudoinverse(np.eye(4), (0, 0)), "rows"),
+    ],
+)
+def test_bad_matrices(call, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        call()
+
+
+def test_machines_are_unchanged_by_it():
+    q = rk.inverse_kinematics(FRICTIONLESS, [0.03, 0.02])
+    A = rk.redundant_control_matrix(MACHINES["four_arms"], rk.inverse_kinematics(MACHINES["four_arms"], [0.03, 0.02]))
+    assert_allclose(rk.explicit_pseudoinverse(A, rk.select_independent(A)), np.linalg.pinv(A.T, rcond=1e-9), atol=1e-12)
+    assert rk.nullspace_projector(FRICTIONLESS, q).shape == (6, 6)
