@@ -112,6 +112,8 @@ def given(answer: Any, case: tuple) -> Any:
 
 
 def _array(got: Any) -> np.ndarray:
+    if isinstance(got, np.ma.MaskedArray):
+        got = np.ma.filled(got.astype(float), np.nan)
     array = np.asarray(got)
     if array.dtype.kind == "O":
         array = array.astype(complex if any(isinstance(v, complex) for v in array.flat) else float)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .answers import Answer, Result, tidied
+from .answers import Answer, Ended, Result, fitting, given, numbers, tidied
 from .exercise import Case, Exercise, Measured
 from .judging import judged
 
@@ -102,12 +102,9 @@ def _going_on(exercise: Exercise, word: str, own: Any) -> Any:
 def _own_value(own: Any, package: Any) -> Any:
     """The student's own value, as numbers of the right shape, or NaN where it has none."""
     try:
-        mine = tidied(own() if callable(own) else own)
-        if np.shape(mine) == np.shape(package) and np.asarray(mine).dtype.kind == "f":
-            return mine
-    except Exception:
-        pass
-    return np.full(np.shape(package), np.nan)[()]
+        return fitting(numbers(given(own, ())), np.shape(package))[()]
+    except Ended:
+        return np.full(np.shape(package), np.nan)[()]
 
 
 def own_answer(name: str) -> Any:

@@ -3,42 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
-from .quantities import entrywise, matrices, quantities
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Given and right answers of all cases, their arguments and the names of these.
-
-    slack : relative deviation up to which two answers count as the same.
-    """
-
-    got: list[np.ndarray]
-    want: list[np.ndarray]
-    cases: list[tuple]
-    names: tuple[str, ...]
-    slack: float = 1e-6
-
-    def same(self, model: list[np.ndarray]) -> bool:
-        """True when the model gives the same as the answer in every case."""
-        return all(alike(m, g, self.slack) for m, g in zip(model, self.got, strict=True))
-
-    def __iter__(self) -> Iterator[tuple]:
-        return zip(self.got, self.want, self.cases, strict=True)
-
-
-def alike(model, got: np.ndarray, slack: float) -> bool:
-    """True when two arrays have the same shape and numbers, relative to the largest entry."""
-    model = np.asarray(model, dtype=float)
-    if model.shape != got.shape or not np.all(np.isfinite(model)):
-        return False
-    return float(np.max(np.abs(model - got), initial=0.0)) <= slack * float(np.max(np.abs(model), initial=1e-300))
-
+from .algebra import argument_factor, combination, constant_factor, from_argument, function_of, mixture, shifted
+from .seen import Seen, alike, ratio_of
 
 # Factor -> what it tells.
 FACTORS = {
@@ -61,13 +31,6 @@ FACTORS = {
     60.0: "the answer is 60 times too large: units, minutes against seconds",
     1 / 60: "the answer is 60 times too small: units, minutes against seconds",
 }
-
-
-def _ratio(got: list[np.ndarray], want: list[np.ndarray]) -> float:
-    """The factor k for which k want is nearest to the answer."""
-    above = sum(float(np.sum(g * w)) for g, w in zip(got, want, strict=True))
-    below = sum(float(np.sum(w * w)) for w in want)
-    return above / below if below > 0.0 else 0.0
 
 
 def nothing(seen: Seen) -> str:
@@ -102,7 +65,7 @@ def sign(seen: Seen) -> str:
 
 def known_factor(seen: Seen) -> str:
     """A constant factor that has a meaning of its own."""
-    k = _ratio(seen.got, seen.want)
+    k = ratio_of(seen.got, seen.want)
     for factor, words in FACTORS.items():
         if abs(abs(k) / factor - 1.0) < 1e-4 + seen.slack and seen.same([np.sign(k) * factor * w for w in seen.want]):
             return words + ", and the sign is opposite" * (k < 0)
@@ -158,85 +121,9 @@ def another_frame(seen: Seen) -> str:
     return f"the vectors are all turned by {angle:.0f} degrees: they are given in another frame"
 
 
-def from_argument(seen: Seen) -> str:
-    """An argument itself, or its difference from or sum with the right answer."""
-    for k, name in enumerate(seen.names):
-        pairs = [
-            (case[k], w)
-            for case, w in zip(seen.cases, seen.want, strict=True)
-            if k < len(case) and isinstance(case[k], np.ndarray) and case[k].shape == w.shape
-        ]
-        if len(pairs) < len(seen.cases):
-            continue
-        tries = [
-            ([a for a, _ in pairs], f"the answer is {name} itself, unchanged"),
-            ([-a for a, _ in pairs], f"the answer is minus {name} itself"),
-            ([a - w for a, w in pairs], f"the answer is the complement: {name} minus the right answer"),
-            ([w - a for a, w in pairs], f"the answer differs from the right one by {name}: it is subtracted once more"),
-            ([a + w for a, w in pairs], f"the answer differs from the right one by {name}: it is added once more"),
-        ]
-        for model, words in tries:
-            if seen.same(model):
-                return words
-    if all(w.ndim == 2 and w.shape[0] == w.shape[1] for w in seen.want):
-        if seen.same([np.eye(len(w)) - w for w in seen.want]):
-            return "the answer is the complement: the identity minus the right answer"
-    return ""
-
-
-def shifted(seen: Seen) -> str:
-    """The right answer plus a constant."""
-    gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
-    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
-    if len(gaps) > 1 and np.ptp(gaps) <= seen.slack * max(scale, abs(gaps[0])):
-        return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
-    return ""
-
-
-def _power(p: float) -> str:
-    return {1.0: "", 2.0: " squared", 0.5: " (its root)"}[abs(p)]
-
-
-def argument_factor(seen: Seen) -> str:
-    """A factor per case, or per entry, that is a power of one of the arguments: missing or one too many."""
-    ratios = [_ratio([g], [w]) for g, w, _ in seen]
-    fits = seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)])
-    if fits and all(ratios):
-        for name, values in quantities(seen.names, seen.cases):
-            for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
-                rest = np.array(ratios) / np.asarray(values) ** p
-                if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
-                    continue
-                if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]) and abs(values[0] - 1.0) > 1e-6:
-                    word = "is missing" if p < 0 else "is one too many"
-                    more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
-                    return f"the factor {name}{_power(p)} {word}{more}"
-    for name, scales in entrywise(seen.names, seen.cases, seen.want):
-        for p in (-1.0, 1.0, -2.0, 2.0):
-            if seen.same([w * s**p for w, s in zip(seen.want, scales, strict=True)]):
-                return f"each entry has the factor {name}{_power(p)} {'missing' if p < 0 else 'once too many'}"
-    for name, models in matrices(seen.names, seen.cases, seen.want):
-        if seen.same(models):
-            return name
-    return ""
-
-
-def constant_factor(seen: Seen) -> str:
-    """Any other constant factor."""
-    k = _ratio(seen.got, seen.want)
-    if k != 0.0 and seen.same([k * w for w in seen.want]):
-        sign = ", and the sign is opposite" * (k < 0)
-        return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
-    ratios = [_ratio([g], [w]) for g, w, _ in seen]
-    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want)
-    if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
-        return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
-    return ""
-
-
 DETECTORS: tuple[Callable[[Seen], str], ...] = (
     *(nothing, sign, known_factor, transposed, from_argument, order, another_frame),
-    *(argument_factor, constant_factor, shifted),
+    *(argument_factor, constant_factor, shifted, function_of, combination, mixture),
 )
 
 

@@ -45,14 +45,16 @@ def quantities(names: tuple[str, ...], cases: list[tuple]) -> Iterator[tuple[str
                     yield words, values
 
 
-def _vector(value: Any) -> np.ndarray | None:
-    """The entries of a vector or of a diagonal matrix."""
+def _vectors(name: str, value: Any) -> dict[str, np.ndarray]:
+    """Vectors of one argument, each with words for it: itself, a diagonal, the motors of a machine."""
+    if isinstance(value, Manipulator):
+        return {"R_el": value.resistance, "k_t": value.torque_constant, "l_1": value.lengths[:, 0]}
     if not isinstance(value, np.ndarray):
-        return None
+        return {}
     if value.ndim == 1:
-        return value
+        return {name: value}
     diagonal = value.ndim == 2 and value.shape[0] == value.shape[1] and not np.any(value - np.diag(np.diag(value)))
-    return np.diag(value) if diagonal else None
+    return {name: np.diag(value)} if diagonal else {}
 
 
 def entrywise(
@@ -60,14 +62,15 @@ def entrywise(
 ) -> Iterator[tuple[str, list[np.ndarray]]]:
     """Words and, per case, an array that scales the entries or rows of the right answer by those of an argument."""
     for k, name in enumerate(names):
-        vectors = [_vector(case[k]) if k < len(case) else None for case in cases]
-        scales = [
-            v.reshape(-1, *[1] * (w.ndim - 1))
-            for v, w in zip(vectors, want, strict=True)
-            if v is not None and w.ndim and len(v) == len(w) and np.all(v)
-        ]
-        if len(scales) == len(cases):
-            yield name, scales
+        vectors = [_vectors(name, case[k]) if k < len(case) else {} for case in cases]
+        for words in vectors[0]:
+            scales = [
+                v[words].reshape(-1, *[1] * (w.ndim - 1))
+                for v, w in zip(vectors, want, strict=True)
+                if words in v and w.ndim and len(v[words]) == len(w) and np.all(v[words])
+            ]
+            if len(scales) == len(cases):
+                yield words, scales
 
 
 def matrices(

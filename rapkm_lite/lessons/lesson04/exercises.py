@@ -148,7 +148,7 @@ EXERCISES = {
         cases=_torque_cases,
         invariant=_torque_law,
         tolerance=1e-10,
-        close=1e-3,
+        close=3e-2,
         improve="solve the two equations for f directly instead of searching for them",
         mistakes={
             "this is the complement, the antagonistic part of the torques: the filter keeps the rest, c minus this": (
@@ -160,6 +160,12 @@ EXERCISES = {
                 lambda A, c: np.linalg.solve(A.T @ A, A.T @ c)
             ),
             "the columns of A are not at right angles: their parts cannot be added one by one": _one_by_one,
+            "the null vector is not divided by its norm: c - n (n c) needs a unit vector n": (
+                lambda A, c: c - np.cross(*A.T) * (np.cross(*A.T) @ c)
+            ),
+            "the last drive is switched off: the force is the same, but other torques give it with a smaller norm": (
+                lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0)
+            ),
             "the mean of the torques is removed, as if the null vector were (1, 1, 1): it turns with the pose": (
                 _mean_removed
             ),
@@ -194,7 +200,14 @@ EXERCISES = {
                 _command_with(lambda R, R_K, K, q, d: R_K @ (q - d))
             ),
             "the angles themselves are filtered; only the error may be": _command_with(lambda R, R_K, K, q, d: R_K @ d),
-            "the complement of the filter is used: the error along the null vector is kept, the rest removed": (
+            "the measured angles themselves are filtered; only the error may be": (
+                _command_with(lambda R, R_K, K, q, d: R_K @ q)
+            ),
+            "the gains are under a root in the filter: this is no projection that keeps the force": (
+                lambda A, K_P, q, d: q - antagonism.antagonism_filter(np.sqrt(K_P)[:, None] * A) @ (q - d)
+            ),
+            "measured and desired angles are exchanged, or the complement of the filter is used: the error along the "
+            "null vector is kept and the rest removed": (
                 _command_with(lambda R, R_K, K, q, d: q - (q - d) + R_K @ (q - d))
             ),
             "the torques are filtered and divided by the gains: (17) projects the error with K_P A, not the torque": (
@@ -205,9 +218,6 @@ EXERCISES = {
             ),
             "A is divided by the gains instead of multiplied": (
                 lambda A, K_P, q, d: q - antagonism.antagonism_filter(A / K_P[:, None]) @ (q - d)
-            ),
-            "measured and desired angles are exchanged": (
-                lambda A, K_P, q, d: d - antagonism.command_filter(A, K_P) @ (d - q)
             ),
         },
     ),

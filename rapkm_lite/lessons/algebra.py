@@ -1,0 +1,143 @@
+"""Names for mistakes of algebra: a factor, a term or a basis that does not belong there, or is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .quantities import entrywise, matrices, quantities
+from .seen import Seen, alike, ratio_of
+
+
+def from_argument(seen: Seen) -> str:
+    """An argument itself, or its difference from or sum with the right answer."""
+    for k, name in enumerate(seen.names):
+        pairs = [
+            (case[k], w)
+            for case, w in zip(seen.cases, seen.want, strict=True)
+            if k < len(case) and isinstance(case[k], np.ndarray) and case[k].shape == w.shape
+        ]
+        if len(pairs) < len(seen.cases):
+            continue
+        tries = [
+            ([a for a, _ in pairs], f"the answer is {name} itself, unchanged"),
+            ([-a for a, _ in pairs], f"the answer is minus {name} itself"),
+            ([a - w for a, w in pairs], f"the answer is the complement: {name} minus the right answer"),
+            ([w - a for a, w in pairs], f"the answer differs from the right one by {name}: it is subtracted once more"),
+            ([a + w for a, w in pairs], f"the answer differs from the right one by {name}: it is added once more"),
+        ]
+        for model, words in tries:
+            if seen.same(model):
+                return words
+    if all(w.ndim == 2 and w.shape[0] == w.shape[1] for w in seen.want):
+        if seen.same([np.eye(len(w)) - w for w in seen.want]):
+            return "the answer is the complement: the identity minus the right answer"
+    return ""
+
+
+def _power(p: float) -> str:
+    return {1.0: "", 2.0: " squared", 0.5: " (its root)"}[abs(p)]
+
+
+def argument_factor(seen: Seen) -> str:
+    """A factor per case, or per entry, that is a power of one of the arguments: missing or one too many."""
+    ratios = [ratio_of([g], [w]) for g, w, _ in seen]
+    fits = seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)])
+    if fits and all(ratios):
+        for name, values in quantities(seen.names, seen.cases):
+            for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
+                rest = np.array(ratios) / np.asarray(values) ** p
+                if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
+                    continue
+                if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]) and abs(values[0] - 1.0) > 1e-6:
+                    word = "is missing" if p < 0 else "is one too many"
+                    more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
+                    return f"the factor {name}{_power(p)} {word}{more}"
+    for name, scales in entrywise(seen.names, seen.cases, seen.want):
+        for p in (-1.0, 1.0, -2.0, 2.0):
+            if seen.same([w * s**p for w, s in zip(seen.want, scales, strict=True)]):
+                return f"each entry has the factor {name}{_power(p)} {'missing' if p < 0 else 'once too many'}"
+    for name, models in matrices(seen.names, seen.cases, seen.want):
+        if seen.same(models):
+            return name
+    return ""
+
+
+def constant_factor(seen: Seen) -> str:
+    """Any other constant factor."""
+    k = ratio_of(seen.got, seen.want)
+    if k != 0.0 and seen.same([k * w for w in seen.want]):
+        sign = ", and the sign is opposite" * (k < 0)
+        return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
+    ratios = [ratio_of([g], [w]) for g, w, _ in seen]
+    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want)
+    if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
+        return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
+    return ""
+
+
+def function_of(seen: Seen) -> str:
+    """The square, the root, the reciprocal or the inverse of the right answer."""
+    tries: list[tuple[Callable, str]] = [
+        (np.square, "the answer is the square of the right one: a root is missing"),
+        (lambda w: np.sqrt(np.abs(w)), "the answer is the root of the right one: a square is missing"),
+        (lambda w: 1 / w, "the answer is the reciprocal of the right one: numerator and denominator are exchanged"),
+    ]
+    if all(w.ndim == 2 for w in seen.want):
+        tries.append((np.linalg.pinv, "the answer is the inverse (or pseudoinverse) of the right matrix"))
+        tries.append((lambda w: np.linalg.pinv(w).T, "the answer is the transposed inverse of the right matrix"))
+    for change, words in tries:
+        try:
+            if seen.same([change(w) for w in seen.want]):
+                return words
+        except np.linalg.LinAlgError:
+            continue
+    return ""
+
+
+def combination(seen: Seen) -> str:
+    """A sum of the right answer and arguments of its shape, with whole or half coefficients."""
+    columns = {"the right answer": seen.want}
+    for k, name in enumerate(seen.names):
+        fit = [case[k] for case in seen.cases if k < len(case) and isinstance(case[k], np.ndarray)]
+        if len(fit) == len(seen.cases) and all(a.shape == w.shape for a, w in zip(fit, seen.want, strict=True)):
+            columns[name] = fit
+    M = np.array([np.concatenate([np.ravel(v) for v in side]) for side in columns.values()]).T
+    if M.shape[1] < 2 or M.shape[0] < 3 * M.shape[1]:
+        return ""
+    factors = np.linalg.lstsq(M, np.concatenate([g.ravel() for g in seen.got]), rcond=None)[0]
+    factors = np.round(2 * factors) / 2
+    parts = [sum(f * v[i] for f, v in zip(factors, columns.values(), strict=True)) for i in range(len(seen.want))]
+    if not seen.same([np.asarray(part) for part in parts]):
+        return ""
+    terms = [f"{'-' if f < 0 else '+'} {abs(f):g} times {name}" for f, name in zip(factors, columns, strict=True) if f]
+    return f"the answer is {' '.join(terms)}: something is added or subtracted in the wrong place, or left out"
+
+
+def mixture(seen: Seen) -> str:
+    """A constant matrix times the right answer: another basis, or some rows scaled."""
+    shapes = {w.shape for w in seen.want}
+    if len(shapes) > 1 or len(shape := shapes.pop()) not in (1, 2) or shape[0] < 2:
+        return ""
+    got, want = (np.concatenate([v.reshape(shape[0], -1) for v in side], axis=1) for side in (seen.got, seen.want))
+    if want.shape[1] < 2 * shape[0] or np.linalg.matrix_rank(want, 1e-6 * np.abs(want).max()) < shape[0]:
+        return ""
+    M = got @ np.linalg.pinv(want)
+    if not alike(M @ want, got, seen.slack):
+        return ""
+    if not np.any(np.abs(M - np.diag(np.diag(M))) > 1e-4):
+        rows = ", ".join(f"{i} ({f:.4g})" for i, f in enumerate(np.diag(M)) if abs(f - 1.0) > 1e-4)
+        return f"a constant factor is wrong in {'row' if len(shape) == 2 else 'entry'} {rows}, counted from 0"
+    if np.all((np.abs(np.abs(M) - 1) < 1e-4).sum(axis=1) == 1) and np.all((np.abs(M) < 1e-4).sum(axis=1) == len(M) - 1):
+        return "the entries stand in another order, some with the opposite sign"
+    return "the entries are a fixed mixture of the right ones: they are given in another basis or frame"
+
+
+def shifted(seen: Seen) -> str:
+    """The right answer plus a constant."""
+    gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
+    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    if len(gaps) > 1 and np.ptp(gaps) <= seen.slack * max(scale, abs(gaps[0])):
+        return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
+    return ""

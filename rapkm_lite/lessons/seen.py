@@ -1,0 +1,44 @@
+"""Given and right answers of all cases, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Given and right answers of all cases, their arguments and the names of these.
+
+    slack : relative deviation up to which two answers count as the same.
+    """
+
+    got: list[np.ndarray]
+    want: list[np.ndarray]
+    cases: list[tuple]
+    names: tuple[str, ...]
+    slack: float = 1e-6
+
+    def same(self, model: list[np.ndarray]) -> bool:
+        """True when the model gives the same as the answer in every case."""
+        return all(alike(m, g, self.slack) for m, g in zip(model, self.got, strict=True))
+
+    def __iter__(self) -> Iterator[tuple]:
+        return zip(self.got, self.want, self.cases, strict=True)
+
+
+def alike(model, got: np.ndarray, slack: float) -> bool:
+    """True when two arrays have the same shape and numbers, relative to the largest entry."""
+    model = np.asarray(model, dtype=float)
+    if model.shape != got.shape or not np.all(np.isfinite(model)):
+        return False
+    return float(np.max(np.abs(model - got), initial=0.0)) <= slack * float(np.max(np.abs(model), initial=1e-300))
+
+
+def ratio_of(got: list[np.ndarray], want: list[np.ndarray]) -> float:
+    """The factor k for which k want is nearest to the answer."""
+    above = sum(float(np.sum(g * w)) for g, w in zip(got, want, strict=True))
+    below = sum(float(np.sum(w * w)) for w in want)
+    return above / below if below > 0.0 else 0.0

@@ -1,0 +1,162 @@
+"""Answers to lesson 04: the filter, the filtered command, the energy it saves."""
+
+import numpy as np
+from scipy.optimize import minimize
+
+import rapkm_lite as rk
+
+
+def keep(A, c):
+    return A @ np.linalg.pinv(A) @ c
+
+
+def searched(A, c):
+    """The smallest torques with the same force, by an optimizer at its default tolerance."""
+    force = A.T @ c
+    return A @ minimize(lambda f: np.sum((A.T @ (A @ f) - force) ** 2), np.zeros(2), method="Nelder-Mead").x
+
+
+def in_place(A, c):
+    c -= c - keep(A, c)
+    A *= 0.0
+    return c
+
+
+def in_turn(A, c):
+    """The columns of A made orthogonal one after the other."""
+    first = A[:, 0] / np.linalg.norm(A[:, 0])
+    second = A[:, 1] - first * (first @ A[:, 1])
+    second /= np.linalg.norm(second)
+    return first * (first @ c) + second * (second @ c)
+
+
+def null(A):
+    n = np.cross(A[:, 0], A[:, 1])
+    return n / np.linalg.norm(n)
+
+
+TORQUES = [
+    ("right", "pseudoinverse", keep),
+    ("right", "least squares", lambda A, c: A @ np.linalg.lstsq(A, c, rcond=None)[0]),
+    ("right", "inverse", lambda A, c: A @ np.linalg.inv(A.T @ A) @ A.T @ c),
+    ("right", "null vector by a cross product", lambda A, c: c - null(A) * (null(A) @ c)),
+    ("right", "in place", in_place),
+    ("right", "a list", lambda A, c: list(keep(A, c))),
+    ("right", "QR", lambda A, c: np.linalg.qr(A)[0] @ (np.linalg.qr(A)[0].T @ c)),
+    ("right", "columns made orthogonal", in_turn),
+    ("close", "an optimizer at its default tolerance", searched),
+    ("close", "a damped inverse", lambda A, c: A @ np.linalg.solve(A.T @ A + 1e-4 * np.eye(2), A.T @ c)),
+    ("wrong", "unchanged", lambda A, c: c, "unchanged"),
+    ("wrong", "opposite sign", lambda A, c: -keep(A, c), "sign"),
+    ("wrong", "what is removed", lambda A, c: c - keep(A, c), "complement"),
+    ("wrong", "what is removed, by the null vector", lambda A, c: null(A) * (null(A) @ c), "complement"),
+    ("wrong", "without the inverse", lambda A, c: A @ A.T @ c, "inverse"),
+    ("wrong", "the force", lambda A, c: A.T @ c, "force"),
+    ("wrong", "the two numbers", lambda A, c: np.linalg.pinv(A) @ c, "factor A"),
+    ("wrong", "in mN m", lambda A, c: 1e3 * keep(A, c), "1000"),
+    ("wrong", "mean removed", lambda A, c: c - np.mean(c), "null vector"),
+    ("wrong", "columns one by one", lambda A, c: sum(a * (a @ c) / (a @ a) for a in A.T), "one by one"),
+    ("wrong", "not divided by the norm", lambda A, c: c - np.cross(*A.T) * (np.cross(*A.T) @ c), "unit"),
+    ("wrong", "added instead of removed", lambda A, c: c + null(A) * (null(A) @ c), "added"),
+    ("wrong", "reversed", lambda A, c: keep(A, c)[::-1], "order"),
+    ("wrong", "absolute value", lambda A, c: np.abs(keep(A, c)), "sign"),
+    ("wrong", "the matrix", lambda A, c: rk.antagonism_filter(A), "shape"),
+    ("wrong", "a column", lambda A, c: keep(A, c)[:, None], "shape"),
+    ("wrong", "third drive off", lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0), "switched off"),
+    ("wrong", "half of it", lambda A, c: 0.5 * keep(A, c), "half"),
+    ("wrong", "limited", lambda A, c: np.clip(c, -0.03, 0.03), ""),
+    ("wrong", "complex", lambda A, c: keep(A, c) + 0j, "complex"),
+    ("wrong", "one argument", lambda A: A, "TypeError"),
+]
+
+
+def command(A, K_P, measured, desired, gains=None):
+    gains = K_P if gains is None else gains
+    R = rk.antagonism_filter(gains[:, None] * A)
+    return measured - R @ (measured - desired)
+
+
+def with_matrices(A, K_P, measured, desired):
+    AK = A.T @ np.diag(K_P)
+    return measured - np.linalg.pinv(AK) @ AK @ (measured - desired)
+
+
+COMMANDS = [
+    ("right", "as in the lesson", command),
+    ("right", "two pseudoinverses", with_matrices),
+    ("right", "desired plus what is removed", lambda A, K, q, d: d + (np.eye(3) - rk.command_filter(A, K)) @ (q - d)),
+    ("right", "null vector", lambda A, K, q, d: d + null(A * K[:, None]) * (null(A * K[:, None]) @ (q - d))),
+    ("wrong", "gains forgotten", lambda A, K, q, d: command(A, np.ones(3), q, d), "gains are forgotten"),
+    ("wrong", "from the desired", lambda A, K, q, d: d - rk.command_filter(A, K) @ (q - d), "desired"),
+    ("wrong", "desired minus the error", lambda A, K, q, d: q + rk.command_filter(A, K) @ (q - d), "sign"),
+    ("wrong", "error only", lambda A, K, q, d: rk.command_filter(A, K) @ (q - d), "error only"),
+    ("wrong", "measured", lambda A, K, q, d: q, "itself"),
+    ("wrong", "desired", lambda A, K, q, d: d, "itself"),
+    ("wrong", "angles filtered", lambda A, K, q, d: rk.command_filter(A, K) @ d, "angles themselves"),
+    ("wrong", "measured angles filtered", lambda A, K, q, d: rk.command_filter(A, K) @ q, "angles themselves"),
+    ("wrong", "divided by gains", lambda A, K, q, d: command(A, 1 / K, q, d), "divided by the gains"),
+    ("wrong", "torques filtered", lambda A, K, q, d: q - rk.antagonism_filter(A) @ (K * (q - d)) / K, "torques"),
+    ("wrong", "a torque", lambda A, K, q, d: q - rk.antagonism_filter(A) @ (K * (q - d)), "units"),
+    ("wrong", "degrees", lambda A, K, q, d: np.degrees(command(A, K, q, d)), "180/pi"),
+    ("wrong", "complement", lambda A, K, q, d: d + rk.command_filter(A, K) @ (q - d), "complement"),
+    ("wrong", "columns scaled", lambda A, K, q, d: q - rk.antagonism_filter(A * K.mean()) @ (q - d), "gains"),
+    ("wrong", "exchanged", lambda A, K, q, d: command(A, K, d, q), "exchanged"),
+    ("wrong", "root of the gains", lambda A, K, q, d: command(A, np.sqrt(K), q, d), "root"),
+]
+
+
+def kept(A, c):
+    return np.array([keep(Ak, ck) for Ak, ck in zip(A, c, strict=True)])
+
+
+def loss(robot, c, dt):
+    return robot.resistance * np.sum((c / robot.torque_constant) ** 2, axis=0) * dt
+
+
+def saved(robot, A, c, dt):
+    return loss(robot, c, dt) - loss(robot, kept(A, c), dt)
+
+
+def whole_matrix(robot, A, c, dt):
+    c[:] = c - kept(A, c)
+    return loss(robot, c, dt)
+
+
+SAVINGS = [
+    ("right", "by hand", saved),
+    ("right", "in place", lambda robot, A, c, dt: saved(robot, A, c, dt).tolist()),
+    ("right", "as a list", lambda robot, A, c, dt: list(saved(robot, A, c, dt))),
+    (
+        "right",
+        "einsum",
+        lambda r, A, c, dt: loss(r, c, dt) - loss(r, (rk.antagonism_filter(A) @ c[..., None])[..., 0], dt),
+    ),
+    ("wrong", "loss of the antagonism", whole_matrix, "Pythagoras"),
+    ("wrong", "what remains", lambda r, A, c, dt: loss(r, kept(A, c), dt), "remains"),
+    ("wrong", "without filter", lambda r, A, c, dt: loss(r, c, dt), "without the filter"),
+    ("wrong", "opposite", lambda r, A, c, dt: -saved(r, A, c, dt), "sign"),
+    ("wrong", "total", lambda r, A, c, dt: saved(r, A, c, dt).sum(), "total"),
+    ("wrong", "share", lambda r, A, c, dt: saved(r, A, c, dt) / loss(r, c, dt), "share"),
+    ("wrong", "mJ", lambda r, A, c, dt: 1e3 * saved(r, A, c, dt), "1000"),
+    ("wrong", "dt forgotten", lambda r, A, c, dt: saved(r, A, c, 1.0), "dt"),
+    (
+        "wrong",
+        "first filter",
+        lambda r, A, c, dt: loss(r, c, dt) - loss(r, c @ rk.antagonism_filter(A[0]), dt),
+        "first sample",
+    ),
+    ("wrong", "first motor", lambda r, A, c, dt: saved(r.replace(resistance=r.resistance[0]), A, c, dt), "motor"),
+    ("wrong", "motors forgotten", lambda r, A, c, dt: np.sum(c**2 - kept(A, c) ** 2, axis=0) * dt, "motor"),
+    ("wrong", "k_t not squared", lambda r, A, c, dt: saved(r, A, c, dt) * r.torque_constant, "k_t"),
+    ("wrong", "resistance forgotten", lambda r, A, c, dt: saved(r, A, c, dt) / r.resistance, "R_el"),
+    ("wrong", "last sample", lambda r, A, c, dt: saved(r, A[:-1], c[:-1], dt), "last sample"),
+    ("wrong", "half", lambda r, A, c, dt: 0.5 * saved(r, A, c, dt), "half"),
+    ("wrong", "mean power", lambda r, A, c, dt: saved(r, A, c, 1 / len(c)), "dt"),
+    ("wrong", "shape", lambda r, A, c, dt: c - kept(A, c), "shape"),
+]
+
+ANSWERS = {
+    "04.filtered_torques": TORQUES,
+    "04.filtered_command": COMMANDS,
+    "04.saved_energy": SAVINGS,
+}
