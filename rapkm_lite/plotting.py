@@ -79,6 +79,7 @@ from .lessons.lesson03.figures import (
     plot_torque_steps,
 )
 from .lessons.lesson04.figures import (
+    film_filter,
     plot_antagonism,
     plot_energies,
     plot_filter_share,
@@ -89,6 +90,7 @@ from .lessons.lesson04.figures import (
     plot_torque_plane,
 )
 from .lessons.lesson05.figures import (
+    film_mirror,
     plot_ee_paths,
     plot_effective_gain,
     plot_feedback_along,
@@ -126,6 +128,8 @@ __all__ = [
     "axes_or_new",
     "curve_crossings",
     "film",
+    "film_filter",
+    "film_mirror",
     "grid_points",
     "lines_per_drive",
     "mode_name",

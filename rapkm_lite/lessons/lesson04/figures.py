@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures.film import film
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
 from ...figures.runs import lines_per_drive
@@ -132,9 +133,9 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
 _RUN_LINES: tuple[dict[str, Any], ...] = (
     {"color": BEFORE, "linestyle": "-"},
     {"color": ALARM, "linestyle": (0, (5, 1.2))},
-    {"color": "#66AACC", "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": "#3997BF", "linestyle": (0, (4, 1.2, 1, 1.2))},
     {"color": AFTER, "linestyle": "-"},
-    {"color": "#997700", "linestyle": (0, (1.5, 1.2))},
+    {"color": "#8A3FC0", "linestyle": (0, (1.5, 1.2))},
 )
 
 
@@ -210,6 +211,20 @@ def plot_filter_share(run, share: float, axes=None):
     axes[1].set(xlim=(low, max(10.0, 1.1 * along.max())), ylim=(0, max(high, 0.5 * wide)))
     axes[1].set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, in mN m")
     return axes
+
+
+def film_filter(run):
+    """A film of `plot_filter_share`: the torque points of a log land on the axis while the filter is turned on."""
+    return film(
+        lambda axes, share: plot_filter_share(run, share, axes),
+        [0.0, 0.0, 0.0, *np.linspace(0, 1, 18)],
+        "Left the torques of the three drives over time, lopsided at first, right every sample as a point, antagonism "
+        "to the side and torque that moves upwards. While the filter is turned on the curves draw together, and all "
+        "points travel sideways onto the vertical axis and keep their height.",
+        panels=2,
+        figsize=(8.0, 3.2),
+        seconds=4,
+    )
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):

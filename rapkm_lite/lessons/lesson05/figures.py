@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import effective_gain, feedback_norm
+from ...figures.film import film
 from ...figures.machine import plot_machine, plot_path, plot_workspace
 from ...figures.maps import curve_crossings, grid_points, on_grid, pair_line, pair_name, plot_map, plot_pair_curves
 from ...figures.runs import plot_errors, plot_torques
@@ -150,6 +151,23 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
     axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", title="enlarged")
     axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
     return axes
+
+
+def film_mirror(run, pair):
+    """A film of `plot_mirror` from just before the first crossing of the pair's curve to just after the second."""
+    first, second = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)][:2]
+    steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, 23).astype(int)
+    return film(
+        lambda axes, k: plot_mirror(run, k, pair, axes),
+        steps,
+        "Left the machine, right the lower right corner of the triangle, enlarged. At the curve on which the distal "
+        "links are parallel the end-effector is thrown back, while the wanted point goes on over the curve; until the "
+        "path comes back each is the mirror image of the other in the line through the two elbows.",
+        panels=2,
+        figsize=(8.0, 3.6),
+        seconds=6,
+        poster=10,
+    )
 
 
 def plot_pairs(run, ax=None):
