@@ -71,7 +71,7 @@ def test_runs_agree_with_the_package(name, friction):
     """Path, law, filter, friction steps and energy: one model in two languages."""
     setting = rk.experiment(name)
     robot = setting.robot if friction else setting.robot.replace(friction=0.0)
-    path, corners = rk.triangle(robot, SIDES[name], duration=2.0), triangle_of(SIDES[name])
+    path, corners = rk.triangle(robot, SIDES[name]), triangle_of(SIDES[name])
     how = settings(setting.law, robot.n_arms, [None])
     for h, torque, x, angle, energy in deviation(robot, path, setting.law, corners, how):
         assert torque.max() <= 1e-12, h
