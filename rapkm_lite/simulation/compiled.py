@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import engine
 from ..control.compiled_law import CompiledLaw
 from ..engine import COMPILED, tables
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
@@ -18,6 +19,13 @@ __all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant"
 
 LANES = 16 if COMPILED else 1
 _made = weakref.WeakKeyDictionary()
+
+
+def without_compiler() -> None:
+    """Plain Python from now on, for a process whose few runs end sooner so; to be called before the first run."""
+    global COMPILED, LANES
+    COMPILED = engine.COMPILED = tables.COMPILED = False
+    LANES = 1
 
 
 def encode(law: Any, model) -> Code | None:

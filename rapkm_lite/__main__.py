@@ -1,0 +1,47 @@
+"""python -m rapkm_lite: the default experiment beside Table 1, and commands for students and teachers."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+
+
+def _summary(options) -> None:
+    from .simulation.compiled import without_compiler
+    from .simulation.summary import as_text, summary
+
+    # Two runs are sooner done than compiled.
+    without_compiler()
+    values = summary()
+    print(json.dumps(values, indent=2) if options.json else as_text(values))
+
+
+def _lessons(options) -> None:
+    from .lessons.copies import copy_lessons
+
+    files = copy_lessons(options.folder)
+    print(f"{len(files)} files in {options.folder}; open the first lesson with")
+    print(f"    python -m jupyter lab {files[0]}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m rapkm_lite", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print the summary for scripts")
+    parser.set_defaults(run=_summary)
+    commands = parser.add_subparsers(title="commands", metavar="")
+    lessons = commands.add_parser("lessons", help="copy the lessons into a folder")
+    lessons.add_argument("folder")
+    lessons.set_defaults(run=_lessons)
+    options = parser.parse_args(arguments)
+    try:
+        return options.run(options) or 0
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
