@@ -83,6 +83,7 @@ from .mechanics.matrices import (
     redundant_terms,
 )
 from .mechanics.partition import explicit_pseudoinverse, select_independent
+from .mechanics.redundancy import allocate_torques, endeffector_stiffness, minimax_torques
 from .mechanics.trajectory import Desired, Trajectory, circle, follow, hold, polygon, triangle
 from .simulation.energy import (
     antagonism_form,
@@ -104,15 +105,16 @@ __all__ = [
     "APD", "CTC", "PD", "PID", "AntagonismFilter", "At", "Calibration", "CalibrationError", "CommandFilter",
     "CompiledLaw", "Controller", "ConvergenceError", "DeadDrive", "Desired", "EncoderDropout", "Experiment", "Law",
     "Log", "Manipulator", "OffsetJump", "RedundantAPD", "RedundantCTC", "Run", "Sample", "Sensors", "SimulationError",
-    "Sweep", "SwitchedCTC", "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "antagonism_filter",
-    "antagonism_form", "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at", "calibrate", "circle",
-    "close_loops", "closed_loop_projector", "command_filter", "common_sign", "compiled", "complement", "complement_dot",
-    "constraint_jacobian", "constraint_jacobian_dot", "constraint_rank", "control_matrix", "control_vector_fields",
-    "copper_loss", "coriolis_matrix", "data_path", "degree_of_actuation", "degree_of_freedom", "distal_cross_products",
-    "drive_pairs", "effective_gain", "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow",
-    "force_polygon", "forward_dynamics", "forward_kinematics", "generalized_forces", "hold", "inverse_dynamics",
-    "inverse_kinematics", "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix",
-    "measured_energies", "mechanical_work", "minimal_dynamics", "minimal_terms", "mystery_run", "null_basis",
+    "Sweep", "SwitchedCTC", "TorqueLimit", "Trajectory", "actuation_map", "actuation_type", "allocate_torques",
+    "antagonism_filter", "antagonism_form", "antagonistic_energy", "antagonistic_torque", "arm_vectors", "at",
+    "calibrate", "circle", "close_loops", "closed_loop_projector", "command_filter", "common_sign", "compiled",
+    "complement", "complement_dot", "constraint_jacobian", "constraint_jacobian_dot", "constraint_rank",
+    "control_matrix", "control_vector_fields", "copper_loss", "coriolis_matrix", "data_path", "degree_of_actuation",
+    "degree_of_freedom", "distal_cross_products", "drive_pairs", "effective_gain", "endeffector_stiffness",
+    "estimate_pose", "experiment", "explicit_pseudoinverse", "feedback_norm", "follow", "force_polygon",
+    "forward_dynamics", "forward_kinematics", "generalized_forces", "hold", "inverse_dynamics", "inverse_kinematics",
+    "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix", "measured_energies",
+    "mechanical_work", "minimal_dynamics", "minimal_terms", "minimax_torques", "mystery_run", "null_basis",
     "null_vector", "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement",
     "orthogonal_complement_dot", "polygon", "potential_energy", "prestress_projector", "projector", "projector_dot",
     "reachable", "read_log", "redundant_control_matrix", "redundant_dynamics", "redundant_terms", "required_wrench",

@@ -1,0 +1,124 @@
+"""Using the redundancy: torques within limits, of least size or least peak, and what a prestress does to stiffness.
+
+Of all torques c with A^T c = w, (11) takes those of least weighted size.  Drives have limits, and then the choice is a
+small convex problem: a quadratic programme, or a linear one for the least peak.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, tall_matrix
+from ..machine.manipulator import Manipulator
+from .actuation import prestress_projector, weighted_pseudoinverse
+from .antagonism import null_basis
+from .at import at
+
+
+def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
+    """Torques c (m,) in N m of least (c - c0)^T W (c - c0) with A^T c = wrench and |c_i| <= limit_i.
+
+    The least-distance programme of Lawson and Hanson in the coordinates of the null space, solved by SciPy's
+    non-negative least squares, which ends after finitely many steps; without limits in reach it is (11).
+    A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
+    W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
+    Raises ValueError at input singularities, and for a wrench beyond the limits, with the factor that is missing.
+
+    >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+    >>> rk.allocate_torques(A, [1.0, 1.0], limit=1.0).round(3), rk.allocate_torques(A, [1.0, 1.0], limit=0.6).round(3)
+    (array([0.333, 0.333, 0.667]), array([0.4, 0.4, 0.6]))
+    """
+    from scipy.optimize import nnls
+
+    A, wrench, limit = _demand(A, wrench, limit)
+    m = len(A)
+    c0 = np.zeros(m) if prestress is None else exact_array("prestress", prestress, m)
+    W = np.eye(m) if W is None else positive_definite("W", W, m)
+    best = matvec(weighted_pseudoinverse(A, W), wrench) + matvec(prestress_projector(A, W), c0)
+    if np.all(np.abs(best) <= limit):
+        return best
+    edge, peak = _least_peak(A, wrench, limit)
+    if peak > 1.0 + 1e-12:
+        raise ValueError(
+            f"wrench = {wrench.tolist()} needs {peak:.4g} times limit = {limit.tolist()} at least; allowed: a wrench "
+            "inside the force polygon of the limits"
+        )
+    # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.
+    n = null_basis(A)
+    n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ W @ n)).T
+    G, h = np.concatenate([-n, n]), np.concatenate([best - limit, -best - limit])
+    size = np.abs(h).max()
+    u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
+    r, slack = G.T @ u, 1.0 - h @ u / size
+    # On the edge of the force polygon there is one choice, and nothing to divide by.
+    c = best + n @ r / slack * size if slack > 1e-12 else edge
+    return np.clip(c, -limit, limit)
+
+
+def minimax_torques(A, wrench, limit=1.0) -> np.ndarray:
+    """Torques c (m,) in N m with A^T c = wrench whose largest share |c_i| / limit_i is least, by linear programming.
+
+    A : (m, delta).  wrench : (delta,).  limit : number or (m,), N m, positive: which drive counts for how much.
+    Raises ValueError at input singularities.
+
+    >>> import rapkm_lite as rk
+    >>> rk.minimax_torques([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [1.0, 1.0]).round(3)
+    array([0.5, 0.5, 0.5])
+    """
+    return _least_peak(*_demand(A, wrench, limit))[0]
+
+
+def _demand(A, wrench, limit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    A = tall_matrix("A", A)
+    if A.ndim != 2:
+        raise ValueError(f"A has shape {A.shape}; allowed: (m, delta), one pose")
+    weighted_pseudoinverse(A)  # raises at input singularities
+    limit = bounded("limit", real_array("limit", limit), 0.0, strict=True)
+    if limit.shape not in ((), (len(A),)):
+        raise ValueError(f"limit has shape {limit.shape}; allowed: one number or ({len(A)},)")
+    return A, exact_array("wrench", wrench, A.shape[1]), np.broadcast_to(limit, len(A))
+
+
+def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, float]:
+    from scipy.optimize import linprog
+
+    m, delta = A.shape
+    # Unknowns: the shares c_i / limit_i of one unit of wrench, and their largest size t.
+    force = max(float(np.abs(wrench).max(initial=0.0)), 1e-300)
+    scale = np.abs(limit[:, None] * A).max()
+    cost = np.append(np.zeros(m), 1.0)
+    below = np.block([[np.eye(m), -np.ones((m, 1))], [-np.eye(m), -np.ones((m, 1))]])
+    equal = np.hstack([(limit[:, None] * A).T / scale, np.zeros((delta, 1))])
+    found = linprog(cost, below, np.zeros(2 * m), equal, wrench / force, bounds=[(None, None)] * m + [(0, None)])
+    if found.status != 0:
+        raise ValueError(f"wrench = {wrench.tolist()} has no torques ({found.message}); allowed: a regular A")
+    return found.x[:m] * limit * force / scale, found.x[m] * force / scale
+
+
+def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
+    """Stiffness (..., 2, 2) in N/m of PD drives at rest: K_x = A^T K_P A - sum_i c_i d2 q_i / dx2.
+
+    The force that a displaced end-effector feels is -K_x dx.  The second term comes from the torques c (..., N) in N m
+    that are there at rest, such as a prestress along the null vector: it stiffens in one sign and softens in the other.
+    K_P : number, (N,) or (N, N), N m/rad.  c : default none.
+    Raises ValueError at the edge of the workspace.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.0, 0.0])
+    >>> rk.endeffector_stiffness(robot, q, 7.05).round(1) + 0.0
+    array([[297.4,   0. ],
+           [  0. , 297.4]])
+    """
+    pose = at(robot, q)
+    A, N = pose.A, robot.n_arms
+    K = A.mT @ positive_definite("K_P", K_P, N) @ A
+    if c is not None:
+        c = real_array("c", c, N)
+        K = K - np.einsum("...i,...ikl->...kl", c, base_angle_hessians(robot, pose.q))
+    return K
+
+
+def base_angle_hessians(robot: Manipulator, q) -> np.ndarray:
+    """d2 q_i / dx2 of the base angles, (..., N, 2, 2) in rad/m^2: how the rows of A change along x and along y."""
+    F = at(robot, q).F
+    columns = [at(robot, q, F[..., k]).F_dot[..., : robot.n_arms, :] for k in (0, 1)]
+    return np.stack(columns, axis=-1)

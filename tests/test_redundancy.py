@@ -1,0 +1,144 @@
+"""Torques within limits against a general solver and by symmetry; stiffness against the energy it comes from."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from samples import FRICTIONLESS, MACHINES, random_points
+from scipy.optimize import minimize
+
+import rapkm_lite as rk
+
+CENTRE = rk.control_matrix(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0]))
+# Two null directions more than the testbed has: six drives on two forces.
+SIX = np.random.default_rng(9).normal(size=(6, 2))
+
+
+def demands(A, rng):
+    """Limits, weights, prestress, and a wrench that some torques within the limits make."""
+    m = len(A)
+    limit = rng.uniform(0.5, 1.0, m)
+    return A.T @ (rng.uniform(-1, 1, m) * limit), limit, rng.uniform(0.5, 3.0, m), rng.normal(0, 0.5, m)
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms", "six"])
+def test_allocation_is_the_minimum_that_a_general_solver_finds(name):
+    rng = np.random.default_rng(1)
+    places = [None] * 20 if name == "six" else random_points(MACHINES[name], 20, bend=0.3)
+    for x in places:
+        A = SIX if x is None else rk.control_matrix(MACHINES[name], rk.inverse_kinematics(MACHINES[name], x))
+        wrench, limit, W, c0 = demands(A, rng)
+        c = rk.allocate_torques(A, wrench, limit, W, c0)
+
+        def cost(c, W=W, c0=c0):
+            return (c - c0) @ (W * (c - c0))
+
+        peer = minimize(
+            cost,
+            c,
+            constraints={"type": "eq", "fun": lambda c, A=A, wrench=wrench: A.T @ c - wrench},
+            bounds=list(zip(-limit, limit, strict=True)),
+            method="SLSQP",
+            options={"ftol": 1e-12},
+        )
+        assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-12 * np.abs(A).max())
+        assert np.all(np.abs(c) <= limit) and cost(c) <= peer.fun + 1e-9
+
+
+def test_without_limits_in_reach_it_is_the_weighted_pseudoinverse():
+    W, c0, wrench = [1.0, 2.0, 3.0], [0.1, 0.0, 0.0], np.array([0.3, -0.2])
+    robot, q = FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0])
+    want = rk.weighted_pseudoinverse(CENTRE, W) @ wrench + rk.prestress_projector(CENTRE, W) @ c0
+    assert_allclose(rk.allocate_torques(CENTRE, wrench, 1.0, W, c0), want, atol=1e-15)
+    assert_allclose(rk.inverse_dynamics(robot, q, 0 * q, 0 * q, W, c0), rk.prestress_projector(CENTRE, W) @ c0)
+
+
+def test_a_wrench_on_the_edge_has_one_answer_and_one_beyond_is_refused_with_the_factor():
+    corner = rk.force_polygon(CENTRE, 0.1)[0]
+    c = rk.allocate_torques(CENTRE, corner, 0.1)
+    assert_allclose(np.abs(c), 0.1, atol=1e-12)
+    assert_allclose(CENTRE.T @ c, corner, atol=1e-12)
+    with pytest.raises(ValueError, match=r"needs 1\.25 times limit"):
+        rk.allocate_torques(CENTRE, 1.25 * corner, 0.1)
+
+
+def test_minimax_reaches_the_edge_of_the_force_polygon():
+    """The largest share is the factor at which the wrench leaves the polygon of the limits."""
+    rng = np.random.default_rng(3)
+    limit = np.array([0.05, 0.1, 0.2])
+    corners = rk.force_polygon(limit[:, None] * CENTRE, 1.0)
+    for _ in range(20):
+        wrench = rng.normal(size=2)
+        c = rk.minimax_torques(CENTRE, wrench, limit)
+        edges = np.roll(corners, -1, axis=0) - corners
+        normal = np.stack([edges[:, 1], -edges[:, 0]], axis=-1)
+        factor = np.max(normal @ wrench / np.sum(normal * corners, axis=-1))
+        assert_allclose(np.max(np.abs(c) / limit), factor, rtol=1e-9)
+        assert_allclose(CENTRE.T @ c, wrench, atol=1e-12)
+
+
+@pytest.mark.parametrize(("x", "gain"), [((0.0, 0.0), 4 / 3), ((-0.05, 0.0), 1.3013), ((-0.1, 0.0), 1.1437)])
+def test_the_force_polygon_is_larger_than_what_the_pseudoinverse_reaches(x, gain):
+    """Areas: zonotope of the box against {w : |(A^T)^+ w| <= 1}; reference values, exactly 4/3 at the centroid."""
+    A = rk.control_matrix(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, x))
+    rows = rk.weighted_pseudoinverse(A)
+    # Corners of the strips |row . w| <= 1: crossings of two edges inside all others.
+    corners = []
+    for i in range(3):
+        for j in range(i):
+            for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+                w = np.linalg.solve(rows[[i, j]], signs)
+                if np.all(np.abs(rows @ w) <= 1 + 1e-12):
+                    corners.append(w)
+    corners = np.array(sorted(corners, key=lambda w: np.arctan2(w[1], w[0])))
+    assert_allclose(area(rk.force_polygon(A, 1.0)) / area(corners), gain, rtol=5e-5)
+
+
+def area(corners):
+    x, y = corners.T
+    return np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2
+
+
+def test_prestress_stiffens_in_one_sign():
+    """-17.2 N/m per N m along +n at the centroid, isotropic by symmetry (reference value)."""
+    q = rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0])
+    n = rk.null_basis(CENTRE)[:, 0]
+    change = rk.endeffector_stiffness(FRICTIONLESS, q, 7.05, n) - rk.endeffector_stiffness(FRICTIONLESS, q, 7.05)
+    assert_allclose(change, -17.223 * np.eye(2), atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms", "asymmetric"])
+def test_stiffness_is_the_second_derivative_of_the_servo_energy(name):
+    """V(x) = sum K_i (q_i(x) - q_i0)^2 / 2 with torques c = -K (q - q0) at x0."""
+    robot = MACHINES[name]
+    N, x0 = robot.n_arms, random_points(robot, 1, seed=2, bend=0.4)[0]
+    K, c = np.linspace(5, 9, N), np.linspace(-0.3, 0.4, N)
+    start = rk.inverse_kinematics(robot, x0)
+    spring = start[:N] + c / K
+
+    def energy(dx, dy):
+        q = rk.inverse_kinematics(robot, x0 + [dx, dy])[:N]
+        return np.sum(K * (q - spring) ** 2) / 2
+
+    h = 1e-4
+    V = np.array([[energy(i * h, j * h) for j in (-1, 0, 1)] for i in (-1, 0, 1)])
+    xx, yy = V[2, 1] - 2 * V[1, 1] + V[0, 1], V[1, 2] - 2 * V[1, 1] + V[1, 0]
+    xy = (V[2, 2] - V[2, 0] - V[0, 2] + V[0, 0]) / 4
+    stiffness = rk.endeffector_stiffness(robot, start, K, c)
+    assert_allclose(stiffness, np.array([[xx, xy], [xy, yy]]) / h**2, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], -1.0), "limit = -1"),
+        (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], [1.0, 1.0]), "limit has shape"),
+        (lambda: rk.allocate_torques(CENTRE, [1.0], 1.0), "wrench has shape"),
+        (lambda: rk.allocate_torques([CENTRE], [1.0, 0.0], 1.0), "A has shape"),
+        (lambda: rk.allocate_torques(np.ones((3, 2)), [1.0, 0.0], 1.0), "lost rank"),
+        (lambda: rk.minimax_torques(CENTRE, [np.nan, 0.0]), "wrench"),
+        (lambda: rk.endeffector_stiffness(FRICTIONLESS, np.zeros(6), 7.05), "boundary of the workspace"),
+    ],
+)
+def test_bad_arguments(call, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        call()
