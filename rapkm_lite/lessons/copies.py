@@ -1,6 +1,6 @@
 """The students' lessons that come with the package, copied without outputs; needs nothing but Python.
 
-The build of the wheel uses it too, see `docs/package_lessons.py`.
+The build of the wheel uses it too, see `docs/package_data.py`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 # What a student gets beside the lessons: the pages that they link to.
-PAGES = "equations.md", "errata.md", "LICENSE"
+PAGES = "equations.md", "errata.md"
 
 
 def lesson_folder() -> Path:

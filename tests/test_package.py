@@ -1,0 +1,84 @@
+"""What an installed copy offers without a notebook: the summary, and the students' lessons."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite.lessons.copies import bare, copy_lessons, lesson_folder
+from rapkm_lite.simulation.summary import OFFSET, ROWS
+
+ROOT = Path(__file__).parents[1]
+
+
+def command(*arguments, code="import runpy; runpy.run_module('rapkm_lite', run_name='__main__', alter_sys=True)"):
+    """`python -m rapkm_lite` in a process that cannot import what belongs to notebooks."""
+    absent = "import sys; sys.modules.update(dict.fromkeys(['matplotlib', 'ipywidgets', 'IPython', 'numba']))\n"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", absent + code, *arguments],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=environment | {"PYTHONIOENCODING": "utf-8"},
+        cwd=ROOT / "tests",
+    )
+
+
+def test_summary_prints_the_energies_of_simulate_beside_table_1():
+    done = command("--json")
+    assert done.returncode == 0, done.stderr
+    tables = json.loads(done.stdout)["energy_J"]
+    setting = rk.experiment("testbed")
+    laws = setting.law, rk.AntagonismFilter(setting.law, pose="true")
+    for row, law in zip(ROWS, laws, strict=True):
+        run = rk.simulate(setting.robot, law, setting.trajectory, OFFSET)
+        assert np.allclose(tables["default experiment"][row], run.energy, atol=1e-9)
+    assert np.allclose(list(tables["Table 1, measured"].values()), rk.measured_energies(), atol=0.0)
+
+
+def test_summary_for_people_names_the_machine_and_both_tables():
+    done = command()
+    assert done.returncode == 0, done.stderr
+    for word in ("testbed", "default experiment, without filter", "Table 1, measured, with filter", "4.56", "2.24"):
+        assert word in done.stdout
+
+
+def test_lessons_are_copied_without_outputs_and_solutions(tmp_path):
+    target = tmp_path / "my lessons"
+    assert command("lessons", str(target)).returncode == 0
+    names = {path.name for path in target.iterdir()}
+    sources = {path.name for path in lesson_folder().glob("0*.ipynb")}
+    assert sources <= names and {"dashboard.ipynb", "equations.md", "errata.md"} <= names
+    for path in target.glob("*.ipynb"):
+        text = path.read_text(encoding="utf-8")
+        assert text == bare(text)
+        for cell in json.loads(text)["cells"]:
+            assert "BEGIN SOLUTION" not in "".join(cell["source"])
+            assert cell["cell_type"] != "code" or (cell["outputs"], cell["execution_count"]) == ([], None)
+
+
+def test_a_lesson_is_never_overwritten(tmp_path):
+    copy_lessons(tmp_path)
+    (tmp_path / "00_start_here.ipynb").write_text("mine", encoding="utf-8")
+    done = command("lessons", str(tmp_path))
+    assert done.returncode == 2 and "00_start_here.ipynb" in done.stderr and "Traceback" not in done.stderr
+    assert (tmp_path / "00_start_here.ipynb").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(ValueError, match="cannot be written"):
+        copy_lessons(tmp_path / "file" / "lessons")
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    heavy = "matplotlib", "ipywidgets", "IPython", "numba", "sympy", "anywidget", "PIL"
+    code = f"import sys, rapkm_lite; print([m for m in {heavy!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert done.stdout.strip() == "[]", done.stderr
