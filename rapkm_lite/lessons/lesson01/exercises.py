@@ -62,7 +62,7 @@ def _cosine_law(h, robot, q) -> tuple[float, str]:
     return np.abs(np.linalg.norm(p - robot.base, axis=-1) - reach).max(), "the arms obey the law of cosines to (m)"
 
 
-def _regular_pairs(rng) -> list[tuple]:
+def _regular_pairs(rng) -> list[Case]:
     """Poses with a pair of joints that is well away from its singularities, and two pairs that are not."""
     cases = []
     machines = _machines()

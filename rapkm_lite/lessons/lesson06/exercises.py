@@ -6,20 +6,28 @@ from functools import cache
 
 import numpy as np
 
-from ...machine.manipulator import load
+from ...machine.manipulator import Manipulator, load
 from ...mechanics.trajectory import circle, polygon, triangle
 from ...simulation.energy import antagonism_form
-from ..checker import Exercise
+from ..checker import Case, Exercise
+from . import mistakes, places
+
+
+def _four_arms() -> Manipulator:
+    square = 0.25 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return Manipulator(base=square, lengths=[0.25, 0.3], masses=[0.1, 0.2], resistance=1.2, torque_constant=0.04)
 
 
 def _paths(rng) -> list[tuple]:
-    """A few machines, paths and gains."""
+    """A few machines, paths and gains: other motors, unequal arms, four arms, samples of another length."""
     robot = load().replace(friction=0.0)
     corners = rng.uniform(-0.06, 0.06, (3, 2))
+    unequal = robot.replace(lengths=[[0.2, 0.22], [0.23, 0.2], [0.21, 0.24]], resistance=0.9)
     return [
-        (robot, circle(robot, 0.05, dt=5e-3), 7.05),
-        (robot, polygon(robot, corners, dt=5e-3), rng.uniform(2, 9)),
-        (robot, triangle(robot, dt=5e-3), rng.uniform(2, 9)),
+        Case("the testbed", robot, circle(robot, 0.05, dt=5e-3), 7.05),
+        Case("the testbed", robot, polygon(robot, corners, dt=1e-2), rng.uniform(2, 9)),
+        Case("unequal arms", unequal, triangle(unequal, side=0.1, duration=4.0, dt=5e-3), rng.uniform(2, 9)),
+        Case("four arms", _four_arms(), circle(_four_arms(), 0.08, dt=5e-3), rng.uniform(2, 9)),
     ]
 
 
@@ -35,29 +43,31 @@ def _trace(S, robot, trajectory, K_P):
     return abs(np.trace(S) / expected - 1), "the trace of S differs from (R_el/k_t²) k_P² (m - δ) T, relatively by"
 
 
-def expected_cost(S, sigma) -> float:
-    """Mean antagonistic energy in J for independent normal offsets of standard deviation sigma in rad."""
-    return sigma**2 * np.trace(S)
+def expected_cost(S, sigma_dq) -> float:
+    """Mean antagonistic energy in J for independent normal offsets of standard deviation sigma_dq in rad."""
+    return sigma_dq**2 * np.trace(S)
 
 
 def _forms(rng) -> list[tuple]:
+    """Forms of paths of three and of four drives, and a number in rad."""
     out = []
-    for _ in range(5):
-        M = rng.normal(size=(3, 3))
-        out.append((1e4 * (M @ M.T + np.eye(3)), rng.uniform(1e-3, 6e-3)))
+    for k in range(6):
+        size = 3 + k // 4
+        M = rng.normal(size=(size, size))
+        out.append(Case(f"{size} drives", 1e4 * (M @ M.T + np.eye(size)), rng.uniform(1e-3, 6e-3)))
     return out
 
 
 @cache
-def _draws() -> np.ndarray:
-    """Normal draws (200 000, 3), whitened: their covariance is exactly the identity."""
-    draws = np.random.default_rng(7).normal(size=(200_000, 3))
+def _draws(size: int) -> np.ndarray:
+    """Normal draws (200 000, size), whitened: their covariance is exactly the identity."""
+    draws = np.random.default_rng(7).normal(size=(200_000, size))
     draws -= draws.mean(axis=0)
     return draws @ np.linalg.inv(np.linalg.cholesky(np.cov(draws.T, bias=True))).T
 
 
-def _sampled(mean, S, sigma):
-    offsets = sigma * _draws()
+def _sampled(mean, S, sigma_dq):
+    offsets = sigma_dq * _draws(len(S))
     sample = np.sum((offsets @ S) * offsets, axis=-1).mean()
     return abs(mean / sample - 1), "relative difference from the mean over 200 000 draws"
 
@@ -68,7 +78,7 @@ def cheapest_offsets(S, size: float) -> float:
 
 
 def _no_cheaper(cost, S, size):
-    draws = np.random.default_rng(8).normal(size=(4000, 3))
+    draws = np.random.default_rng(8).normal(size=(4000, len(S)))
     draws *= size / np.linalg.norm(draws, axis=1, keepdims=True)
     best = np.einsum("ki,ij,kj->k", draws, S, draws).min()
     return max(0.0, (cost - best) / best), "random offsets of that norm are cheaper, relatively by"
@@ -81,7 +91,17 @@ EXERCISES = {
         invariant=_trace,
         tolerance=1e-6,
         unit="J/rad²",
-        hint="N = I - A (A^T A)^-1 A^T at every sample; sum k_P² (R_el/k_t²) N over the holds, times dt",
+        hints=(
+            "An offset acts like a set-point that moves, -k_P dq in torques. The machine gives way until nothing is "
+            "left that could move it. Which part of a torque vector does the filter of lesson 04 take away?",
+            "K_0 = k_P N with the projector N = I - A (A^T A)^-1 A^T at every sample, and N^T N = N. The weight is "
+            "R_el/k_t².",
+            "sum over the samples but the last of (R_el/k_t²) k_P² N, times trajectory.dt; "
+            "np.linalg.inv works on a stack of matrices.",
+        ),
+        close=2e-2,
+        improve="sum the exact projector over the holds, all samples but the last, each times dt",
+        mistakes=mistakes.FORMS,
     ),
     "06.expected_cost": Exercise(
         expected_cost,
@@ -89,7 +109,14 @@ EXERCISES = {
         invariant=_sampled,
         tolerance=1e-9,
         unit="J",
-        hint="the mean of dq^T S dq is the sum of S_ij times the covariance of dq_i and dq_j",
+        hints=(
+            "The mean of a sum is the sum of the means. Which products of two offsets does dq^T S dq hold?",
+            "The mean of dq_i dq_j is sigma² for i = j and zero for independent offsets.",
+            "sigma_dq**2 * np.trace(S)",
+        ),
+        close=0.05,
+        improve="a mean over random draws is as good as their number; the mean of dq_i dq_j is known exactly",
+        mistakes=mistakes.MEANS,
     ),
     "06.cheapest_offsets": Exercise(
         cheapest_offsets,
@@ -97,6 +124,28 @@ EXERCISES = {
         invariant=_no_cheaper,
         tolerance=1e-9,
         unit="J",
-        hint="dq^T S dq at a fixed norm is smallest along an eigenvector of S; which one?",
+        hints=(
+            "On a sphere of offsets, where is a quadratic form stationary? Remember the ellipses of the first picture.",
+            "Along the eigenvectors of S, where the energy is the eigenvalue times the norm squared.",
+            "size**2 * np.linalg.eigvalsh(S)[0]; eigvalsh sorts, np.linalg.eig does not.",
+        ),
+        close=0.1,
+        improve="a search ends where it was told to; the smallest eigenvalue of S is exact",
+        mistakes=mistakes.MINIMA,
+    ),
+    "06.placement": Exercise(
+        places.placement,
+        hints=(
+            "The energy at one place follows from a form S, without a run. How many places do you have to try?",
+            "Take the points of a grid where all three corners are reachable; for each of them the form of its "
+            "triangle, and the energy offset @ S @ offset.",
+            "spots[np.argmin([offset @ rk.antagonism_form(robot, rk.triangle(robot, side=0.08, centre=p, dt=0.05), "
+            "7.05) @ offset for p in spots])]",
+        ),
+        judge=places.judge,
+        close=0.1,
+        improve="a finer search around the place that you found",
+        mistakes=places.MISTAKES,
+        points=10.0,
     ),
 }
