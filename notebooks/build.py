@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 from workshop.layout import PACKAGE, SOLUTIONS, figure_list, new  # noqa: E402
-from workshop.storing import student, tidy  # noqa: E402
+from workshop.storing import COVER, blank, student, tidy  # noqa: E402, F401
 
 
 def execute(path: Path, strict: bool) -> None:

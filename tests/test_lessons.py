@@ -8,18 +8,32 @@ from pathlib import Path
 import nbformat
 import numpy as np
 import pytest
+import shape
+import stored
 
 from rapkm_lite.checks import Exercise, check, examine, exercises
 from rapkm_lite.lessons import checker
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
+NUMBERED = [path for path in LESSONS if path.stem[:2].isdigit()]
 SOLVED = sorted((NOTEBOOKS / "solutions").glob("*.ipynb"))
 NAMES = {"ids": lambda path: path.stem}
 
 _spec = importlib.util.spec_from_file_location("build", NOTEBOOKS / "build.py")
 build = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(build)
+
+
+def lesson(path):
+    """A lesson with those that a reader has read before it."""
+    number = path.stem[:2] if path.stem[:2].isdigit() else path.stem
+    earlier = tuple(shape.Lesson(p.stem[:2], nbformat.read(p, as_version=4)) for p in NUMBERED if p.stem < path.stem)
+    return shape.Lesson(number, nbformat.read(path, as_version=4), earlier)
+
+
+def no_complaint(complaints):
+    assert not complaints, "\n".join(["", *complaints])
 
 
 def code_cells(path):
@@ -62,19 +76,44 @@ def test_stored_outputs_are_clean(path):
     assert not re.search(r"/(home|root|tmp|Users)/|[A-Z]:\\\\Users", text), "a path of a machine is stored"
 
 
-@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_compared_cells_have_outputs(path):
     compared = [c for c in code_cells(path) if "nbval-check-output" in c.metadata.get("tags", [])]
     assert all(c.outputs for c in compared), "nbval passes a cell without stored outputs"
     assert len(compared) >= (5 if path.stem[:2] != "00" else 1)
 
 
-@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_prose_and_code_are_balanced(path):
     cells = nbformat.read(path, as_version=4).cells
     words = sum(len(c.source.split()) for c in cells if c.cell_type == "markdown")
     lines = sum(1 for c in cells if c.cell_type == "code" for line in c.source.splitlines() if line.strip())
     assert 7 <= words / lines <= 20, f"{words} words for {lines} lines of code: {words / lines:.1f} per line"
+
+
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
+@pytest.mark.parametrize("rule", shape.RULES, ids=lambda rule: rule.__name__)
+def test_lesson_has_its_shape(rule, path):
+    no_complaint(rule(lesson(path)))
+
+
+@pytest.mark.parametrize("path", LESSONS + SOLVED, ids=lambda p: f"{p.parent.name}/{p.stem}")
+def test_lesson_stores_what_it_must(path):
+    one = lesson(path)
+    hints = {name: exercise.hints for name, exercise in exercises().items()}
+    said = stored.alternative_text(one) + stored.in_order(one)
+    no_complaint(said + stored.hidden_outputs(one, build.COVER) + stored.no_hints(one, hints))
+
+
+def test_in_the_picture_opens_a_handful_of_paragraphs():
+    counts = {path.stem: shape.picture_phrases(lesson(path)) for path in NUMBERED}
+    assert sum(counts.values()) <= 5, f"vary the openings: {counts}"
+
+
+@pytest.mark.parametrize("path", [p for p in NUMBERED if p.stem >= "03"], **NAMES)
+def test_lesson_has_an_exercise_of_design(path):
+    designs = [name for name, exercise in exercises().items() if name.startswith(path.stem[:2]) and exercise.judge]
+    assert designs, f"lesson {path.stem[:2]}: no exercise is judged by what it does (Exercise.judge)"
 
 
 def wrong_answers(exercise: Exercise):
@@ -138,7 +177,7 @@ def test_blanking_keeps_the_signature_and_names():
     assert build.blank("### BEGIN SOLUTION\na = 1\nb = a\n### END SOLUTION\nprint(a)") == "a = ...\nb = ...\nprint(a)"
 
 
-@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_readme_asks_the_question_of_the_lesson(path):
     title = nbformat.read(path, as_version=4).cells[0].source.splitlines()[0]
     number, question = title.removeprefix("# ").split(" · ", 1)
@@ -147,7 +186,7 @@ def test_readme_asks_the_question_of_the_lesson(path):
     assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
 
 
-@pytest.mark.parametrize("path", [p for p in LESSONS if p.stem[:2].isdigit()], **NAMES)
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_tables_agree_with_the_lesson(path):
     text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
     minutes = re.search(r"\*\*(?:Minutes|Time):?\W*(\d+)", text)

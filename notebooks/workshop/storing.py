@@ -60,7 +60,7 @@ def cover(cell: nbformat.NotebookNode) -> None:
     """Begin the outputs of a hidden cell with a line that is not the answer."""
     first = cell.outputs[0] if cell.outputs else None
     if first is not None and first.get("name") == "stdout":
-        first.text = COVER + first.text
+        first.text = COVER + first.text.removeprefix(COVER)
     elif first is not None:
         cell.outputs.insert(0, nbformat.v4.new_output("stream", name="stdout", text=COVER))
 
