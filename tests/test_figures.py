@@ -24,7 +24,7 @@ PURE_NUMBERS = {
     "largest singular value of F",
     "effective / nominal gain",
     "gain of drive 3 / gain of drives 1 and 2",
-    "σ_min(Ã), all drives",
+    "visible share β, all drives",
     "σ_min(Ã₁)",
     "share |η_i| of the prestress",
 }

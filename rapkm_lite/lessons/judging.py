@@ -18,6 +18,8 @@ def judged(exercise: Exercise, answer: Any) -> Result:
     """The verdict on one answer, whatever it is and does."""
     try:
         answer = _unwrapped(answer)
+        if exercise.judge and exercise.raw:
+            return guarded(exercise.judge, answer)
         if exercise.judge:
             return _behaviour(exercise, answer)
         return _numbers(exercise, answer)

@@ -2,134 +2,204 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from ...machine.manipulator import load
-from ...mechanics.actuation import control_matrix, distal_cross_products, prestress_projector, weighted_pseudoinverse
-from ...mechanics.kinematics import arm_vectors, cross, inverse_kinematics, reachable, turn, working_modes
+from ...mechanics.actuation import prestress_projector, weighted_pseudoinverse
+from ...mechanics.kinematics import cross, turn
 from ..checker import Exercise
-
-
-def _arms(rng) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Arm vectors of seeded poses of the testbed in all working modes."""
-    robot = load()
-    x = rng.uniform(-0.1, 0.1, (8, 2))
-    return [arm_vectors(robot, inverse_kinematics(robot, p, s)) for p, s in zip(x, working_modes(robot), strict=True)]
-
-
-def _control_matrix(a, d) -> np.ndarray:
-    return d / cross(a, d)[:, None]
-
-
-def _stretching(A, a, d) -> tuple[float, str]:
-    """A rigid distal link: elbow (qd_i times a, a quarter turn on) and tip (xd) have the same velocity along d."""
-    x_rate = np.array([0.6, -0.8])
-    stretch = np.abs((d * (x_rate - turn(a) * (A @ x_rate)[:, None])).sum(axis=1)) / np.linalg.norm(d, axis=1)
-    return stretch.max(), "moving the end-effector at 1 m/s stretches a distal link, in m/s, by"
-
-
-def _control_matrices(rng) -> list[tuple[np.ndarray, float]]:
-    robot = load()
-    q = inverse_kinematics(robot, rng.uniform(-0.1, 0.1, (6, 2)))
-    return [(A, c) for A, c in zip(control_matrix(robot, q), rng.uniform(0.05, 0.2, 6), strict=True)]
-
-
-def guaranteed_force(A, torque: float) -> float:
-    """Largest force (N) that torques |c_i| <= torque (N m) produce in every direction: the zonotope's inner radius.
-
-    A : (m, 2) in rad/m.  The edge of the zonotope along row A_i has the distance sum_j |A_j x A_i| / |A_i| from zero.
-    """
-    A = np.asarray(A, dtype=float)
-    return torque * min(np.abs(cross(A, row)).sum() / np.linalg.norm(row) for row in A)
-
-
-def _overpromise(force, A, torque: float) -> tuple[float, str]:
-    angle = np.linspace(0.0, np.pi, 4001)
-    reach = torque * np.abs(A @ np.stack([np.cos(angle), np.sin(angle)])).sum(axis=0)
-    return max(0.0, float(force) - reach.min()), "in one direction the drives fall short of this force, in N, by"
-
-
-def best_torques(A, f, W, c0) -> np.ndarray:
-    """Torques (m,) in N m of (11): A^T c = f, and of all those the nearest to c0 in the weights W (m, m)."""
-    return weighted_pseudoinverse(A, W) @ f + prestress_projector(A, W) @ c0
-
-
-def _choices(rng) -> list[tuple]:
-    """Control matrices of three and four arms with a force, weights (diagonal, then full) and a wish for prestress."""
-    cases = []
-    for k in range(8):
-        robot = load(("testbed", "four_arms")[k % 2])
-        A = control_matrix(robot, inverse_kinematics(robot, rng.uniform(-0.06, 0.06, 2)))
-        m = len(A)
-        L = np.diag(rng.uniform(0.5, 3.0, m)) + (k > 3) * 0.3 * rng.standard_normal((m, m))
-        cases.append((A, rng.uniform(-1.0, 1.0, 2), L @ L.T, rng.uniform(-0.1, 0.1, m)))
-    return cases
-
-
-def _not_the_best(c, A, f, W, c0) -> tuple[float, str]:
-    """The force missed, and the slope of the price along the torques that move nothing."""
-    free = np.linalg.svd(A.T)[2][2:]
-    slope = np.linalg.norm(free @ W @ (c - c0)) / np.linalg.norm(W)
-    return max(float(slope), float(np.linalg.norm(A.T @ c - f) / np.linalg.norm(A))), (
-        "force missed, or slope of the price along a torque that moves nothing, as a torque in N m"
-    )
-
-
-def input_singularity(mode) -> np.ndarray:
-    """Input singularity (2,) in m of the testbed in a mixed mode (3,): midway between the bases of the equal arms."""
-    equal = next(pair for pair in itertools.combinations(range(3), 2) if mode[pair[0]] == mode[pair[1]])
-    return load().base[list(equal)].mean(axis=0)
-
-
-def _mixed_modes(rng) -> list[tuple[np.ndarray]]:
-    return [(mode,) for mode in working_modes(load()) if abs(mode.sum()) == 1]
-
-
-def _spread(x, mode) -> tuple[float, str]:
-    robot = load()
-    if not reachable(robot, x):
-        return np.inf, "the point lies outside the workspace"
-    crossed = distal_cross_products(robot, inverse_kinematics(robot, x, mode))
-    return 0.2 * np.abs(crossed).max(), "over their length of 0.2 m the distal links miss being parallel, in m, by"
-
+from . import tasks
 
 EXERCISES = {
     "02.control_matrix": Exercise(
-        reference=_control_matrix,
-        cases=_arms,
-        invariant=_stretching,
+        tasks.control_rows,
+        hints=(
+            "Both ends of a rigid rod have the same speed along the rod. Which two velocities does that compare for "
+            "one distal link?",
+            "Along d_i the elbow moves with (d_i . a_i^perp) qd_i = (a_i x d_i) qd_i, and the end-effector with "
+            "d_i . xd. Solve for qd_i: what multiplies xd is row i.",
+            "Row i is d_i divided by the number a_i x d_i: return d / cross(a, d)[:, None].",
+        ),
         unit="rad/m",
+        cases=tasks.arms,
+        invariant=tasks.stretching,
         tolerance=1e-10,
-        hint="the tip velocity xd and the elbow velocity, qd_i times a_i turned by a quarter turn, have the same "
-        "component along d_i; for the elbow it is qd_i times the cross product a_i x d_i; solve for qd_i",
+        close=1e-4,
+        improve="divide by the cross product itself, without a difference quotient or a small number added",
+        mistakes={
+            "the lever is missing: the rows are the distal vectors, not yet divided by a x d": lambda a, d: d,
+            "the rows are unit vectors: they have the direction of the distal links, but the lever in m is missing": (
+                lambda a, d: tasks.unit(d)
+            ),
+            "the rows point along the proximal links; a drive pushes along its distal link (another direction)": (
+                lambda a, d: a / cross(a, d)[:, None]
+            ),
+            "the rows are turned by a quarter: they stand across the distal links, another frame": (
+                lambda a, d: turn(d) / cross(a, d)[:, None]
+            ),
+            "it is divided by the scalar product a . d; the lever is the cross product a x d": (
+                lambda a, d: d / np.sum(a * d, axis=1)[:, None]
+            ),
+            "it is multiplied by the lever a x d; the rates follow when you divide by it": (
+                lambda a, d: d * cross(a, d)[:, None]
+            ),
+            "the lever of unit vectors is only the sine of the elbow angle: the lengths of the links are missing": (
+                lambda a, d: tasks.unit(d) / cross(tasks.unit(a), tasks.unit(d))[:, None]
+            ),
+            "the lever is taken with a unit distal vector, but the row is not of unit length: a factor, the length of "
+            "the distal link, is one too many": lambda a, d: d / cross(a, tasks.unit(d))[:, None],
+            "a factor is missing, the length of the distal link: row and lever need the same d": (
+                lambda a, d: tasks.unit(d) / cross(a, d)[:, None]
+            ),
+            "the sign of the lever is lost: no absolute value, an elbow that bends the other way turns the other way": (
+                lambda a, d: d / np.abs(cross(a, d))[:, None]
+            ),
+            "each row is divided by the lever of another arm (order of the levers)": (
+                lambda a, d: d / np.roll(cross(a, d), 1)[:, None]
+            ),
+            "the whole arm a + d stands in the row; only the distal vector belongs there": (
+                lambda a, d: (a + d) / cross(a, d)[:, None]
+            ),
+            "this is the inverse direction, xd from the rates (a pseudoinverse); A gives the rates from xd": (
+                lambda a, d: np.linalg.pinv(tasks.control_rows(a, d)).T
+            ),
+        },
     ),
     "02.guaranteed_force": Exercise(
-        reference=guaranteed_force,
-        cases=_control_matrices,
-        invariant=_overpromise,
+        tasks.guaranteed_force,
+        hints=(
+            "The largest disc inside a polygon about zero touches the nearest edge. In which directions do the edges "
+            "of the hexagon run?",
+            "Each edge is parallel to one row of A, so its distance from zero is h(u) for the unit vector u across "
+            "that row. There are as many directions to try as there are drives.",
+            "For each row: u = (-row_y, row_x) / |row|, h = torque * np.abs(A @ u).sum(); return the smallest h.",
+        ),
         unit="N",
+        cases=tasks.control_matrices,
+        invariant=tasks.overpromise,
         tolerance=1e-9,
-        hint="the closest point of a polygon lies on an edge, the edges are parallel to the rows of A, and across row "
-        "A_i every drive j adds at most torque times |A_j x A_i| / |A_i|",
+        close=0.02,
+        improve="the nearest point lies on an edge: try the direction across each row exactly",
+        mistakes={
+            "this is the largest distance of an edge (max for min); guaranteed is only the smallest": (
+                lambda A, torque: torque * max(tasks.edges(A))
+            ),
+            "this is the nearest corner of the polygon; the nearest point lies on an edge": tasks.force_without(
+                "corner"
+            ),
+            "this is the farthest corner, the largest force in any direction (max for min)": (
+                tasks.force_without("far corner")
+            ),
+            "this is the smallest singular value: it belongs to torques in a ball, |c| <= torque, and here each drive "
+            "has its own limit": lambda A, torque: torque * np.linalg.svd(A, compute_uv=False)[-1],
+            "a singular value with a factor, the root of the number of drives: the box of torques is no ball": (
+                tasks.force_without("root")
+            ),
+            "this is the largest singular value; it belongs to a ball of torques, and to the best direction": (
+                lambda A, torque: torque * np.linalg.svd(A, compute_uv=False)[0]
+            ),
+            "this is the force of the weakest drive alone, in its own direction": (
+                lambda A, torque: torque * np.linalg.norm(A, axis=1).min()
+            ),
+            "this is the force of all drives along their own directions added: they do not all push the same way": (
+                lambda A, torque: torque * np.linalg.norm(A, axis=1).sum()
+            ),
+            "the absolute value is missing: each drive chooses the sign that helps": tasks.force_without("abs"),
+            "the direction across a row has not unit length: the factor 1 / |A_i| is missing": tasks.force_without(
+                "size"
+            ),
+            "the length of the row is divided out twice (a factor too many)": tasks.force_without("unit"),
+            "only the best drive is counted in each direction; all drives add up": tasks.force_without("one"),
+            "this looks along the rows; the edges run along them, so look across (another direction)": (
+                tasks.force_without("along")
+            ),
+            "this is the mean over the edges, not the smallest": tasks.force_without("mean"),
+            "only the directions x and y are tried": tasks.force_without("axes"),
+        },
     ),
     "02.best_torques": Exercise(
-        reference=best_torques,
-        cases=_choices,
-        invariant=_not_the_best,
+        tasks.best_torques,
+        hints=(
+            "Write c = c0 + s. What must the step s bring at the end-effector, and in which sense should it be small?",
+            "The step makes up for the force f - A^T c0 and has the smallest s^T W s. With two multipliers p the "
+            "condition is W s = A p.",
+            "s = W^-1 A p with (A^T W^-1 A) p = f - A^T c0: two calls of np.linalg.solve, then c0 + s.",
+        ),
         unit="N m",
+        cases=tasks.choices,
+        invariant=tasks.not_the_best,
         tolerance=1e-9,
-        hint="write c = c0 + s: the step s must make up for the force f - A^T c0 and be as small as possible in the "
-        "weights W, and (A^T)_W^+ of (11) gives the smallest step for a force",
+        close=0.01,
+        improve="the conditions are linear: solve them for c and the two multipliers instead of minimizing",
+        mistakes={
+            "the weights are forgotten: this is the answer for W = I (a factor W is missing)": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, np.eye(len(A)), c0)
+            ),
+            "the weights are inverted: W^-1 stands where W belongs": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, np.linalg.inv(W), c0)
+            ),
+            "the weights are squared": lambda A, f, W, c0: tasks.best_torques(A, f, W @ W, c0),
+            "only the diagonal of W is used; the rest of it counts too": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, np.diag(np.diag(W)), c0)
+            ),
+            "the wish c0 is forgotten: this is the answer for c0 = 0 (a term is missing)": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, W, 0 * c0)
+            ),
+            "weights and wish are both forgotten: this is pinv(A.T) @ f": lambda A, f, W, c0: np.linalg.pinv(A.T) @ f,
+            "the whole wish is added, and a part of it changes the force: the projector is missing": (
+                lambda A, f, W, c0: weighted_pseudoinverse(A, W) @ f + c0
+            ),
+            "the sign of the wish c0 is opposite": lambda A, f, W, c0: tasks.best_torques(A, f, W, -c0),
+            "the sign of the force f is opposite": lambda A, f, W, c0: tasks.best_torques(A, -f, W, c0),
+            "the wish is projected without the weights (the projector of W = I)": (
+                lambda A, f, W, c0: weighted_pseudoinverse(A, W) @ f + prestress_projector(A) @ c0
+            ),
+            "the force is distributed without the weights, only the wish has them": (
+                lambda A, f, W, c0: weighted_pseudoinverse(A) @ f + prestress_projector(A, W) @ c0
+            ),
+            "this is the step from c0 only; add the wish": lambda A, f, W, c0: tasks.best_torques(A, f, W, c0) - c0,
+            "this is the prestress only; the part that makes the force is missing": (
+                lambda A, f, W, c0: prestress_projector(A, W) @ c0
+            ),
+            "the projector is transposed": (
+                lambda A, f, W, c0: weighted_pseudoinverse(A, W) @ f + prestress_projector(A, W).T @ c0
+            ),
+            "the price of c instead of c - c0 is smallest: the wish is weighted, not projected": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, W, 0 * c0) + np.linalg.solve(W, c0)
+            ),
+        },
     ),
     "02.input_singularity": Exercise(
-        reference=input_singularity,
-        cases=_mixed_modes,
-        invariant=_spread,
+        tasks.input_singularity,
+        hints=(
+            "All three distal links are parallel there. How many equations is that, and for how many unknowns?",
+            "Two of the cross products that rk.distal_cross_products gives must vanish together, as functions of the "
+            "two coordinates. A root finder wants a start: the darkest node of the map is close.",
+            "root(lambda p: rk.distal_cross_products(robot, rk.inverse_kinematics(robot, p, mode))[:2], start).x with "
+            "root from scipy.optimize.",
+        ),
         unit="m",
+        cases=tasks.mixed_modes,
+        invariant=tasks.spread,
         tolerance=1e-6,
-        hint="two cross products d_1 x d_2 and d_1 x d_3 must vanish together: start a root finder at the darkest "
-        "point of the map, or ask where two of the three curves cross",
+        close=0.05,
+        improve="a grid or a minimizer comes only near: let a root finder make both cross products zero from there",
+        mistakes={
+            "this is the other common point of the curves, a base joint: there the arm is folded, a corner of the "
+            "workspace and not inside": lambda mode: load().base[tasks.odd(mode)],
+            "this is the midpoint of another side of the base triangle (order of the arms)": (
+                lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[0]]].mean(axis=0)
+            ),
+            "this is the midpoint of another side of the base triangle, (order of the arms)": (
+                lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[1]]].mean(axis=0)
+            ),
+            "this is a base joint of the two arms that bend alike, not the middle between them": (
+                lambda mode: load().base[tasks.equal(mode)[0]]
+            ),
+            "this point lies on the opposite side of the centroid (sign)": lambda mode: -tasks.input_singularity(mode),
+            "this is the sum of the two base points: a factor 1/2 is missing": (
+                lambda mode: load().base[list(tasks.equal(mode))].sum(axis=0)
+            ),
+        },
     ),
 }

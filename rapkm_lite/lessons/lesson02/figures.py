@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle
 
-from ...figures.machine import plot_machine, plot_path, plot_workspace
+from ...figures.film import film
+from ...figures.machine import arm_points, plot_machine, plot_path, plot_workspace
 from ...figures.maps import (
     curve_crossings,
     grid_points,
@@ -18,9 +19,10 @@ from ...figures.maps import (
     plot_map,
     plot_pair_curves,
 )
-from ...figures.style import ALARM, NEUTRAL, arm_line, axes_or_new
+from ...figures.style import ALARM, NEUTRAL, arm_line, arm_text_colour, axes_or_new
 from ...mechanics.actuation import (
     control_matrix,
+    distal_cross_products,
     drive_pairs,
     force_polygon,
     singular_values,
@@ -29,7 +31,7 @@ from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_mod
 
 
 def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
-    """Maps sigma (2^N, n, n) of an actuation measure for all working modes, with the curves of all pairs on top.
+    """Maps sigma (2^N, n, n) of the visible share σ_min(Ã) for all working modes, with the curves of all pairs on top.
 
     x, y : samples (n,) in m.  marks : a point (2,) in m to mark, or None, for each mode.
     """
@@ -44,7 +46,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
         ax.set_title(mode_name(mode))
         ax.label_outer()
     mesh = np.ravel(axes)[0].collections[0]
-    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="σ_min(Ã), all drives", shrink=0.8)
+    np.ravel(axes)[0].figure.colorbar(mesh, ax=axes, label="visible share β, all drives", shrink=0.8)
     return axes
 
 
@@ -64,7 +66,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
             xytext=(10, 10 * np.sign(robot.base[i, 1])),
             va="center",
             textcoords="offset points",
-            color=arm_line(i)["color"],
+            color=arm_text_colour(i),
             fontweight="bold",
             fontsize=9,
         )
@@ -120,6 +122,88 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     return ax
 
 
+def plot_modes_and_forces(robot, x, modes, axes=None):
+    """The machine at one place x (2,) in m in several working modes, each beside its available forces.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_modes_and_forces(rk.load(), [0.0, 0.0], [(1, 1, 1), (1, 1, -1)])
+    """
+    if axes is None:
+        widths = [1.1, 1.0] * len(modes)
+        axes = plt.subplots(1, 2 * len(modes), figsize=(6.3 * len(modes), 3.1), width_ratios=widths)[1]
+    poses = [inverse_kinematics(robot, x, mode) for mode in modes]
+    size = 1.12 * max(np.abs(force_polygon(control_matrix(robot, q), 0.1)).max() for q in poses)
+    corners = np.concatenate([arm_points(robot, q).reshape(-1, 2) for q in poses])
+    low_high = np.array([corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05])
+    for q, mode, (left, right) in zip(poses, modes, np.reshape(axes, (-1, 2)), strict=True):
+        plot_machine(robot, q, left, labels=False)
+        plot_available_forces(robot, q, right)
+        left.set(title=f"mode {mode_name(np.asarray(mode))}", xlim=low_high[:, 0], ylim=low_high[:, 1])
+        right.set(title="available force", xlim=(-size, size), ylim=(-size, size))
+    axes[0].figure.legend(*axes[1].get_legend_handles_labels(), loc="outside right center")
+    return axes
+
+
+def plot_guaranteed_force(robot, poses: dict, guaranteed, axes=None, torque: float = 0.1, n: int = 90):
+    """Available forces with the disc of the guaranteed force at some poses (title -> q), and a map of its radius.
+
+    guaranteed : function of A (m, 2) and the torque limit in N m that gives the radius in N.
+
+    >>> import rapkm_lite as rk
+    >>> robot = rk.load()
+    >>> ax = plot_guaranteed_force(robot, {"": rk.inverse_kinematics(robot, [0, 0])}, lambda A, c: 0.5, n=9)
+    """
+    if axes is None:
+        count = len(poses) + 1
+        axes = plt.subplots(1, count, figsize=(3.8 * count, 3.3), width_ratios=[1.0] * len(poses) + [1.3])[1]
+    for ax, (title, q) in zip(axes, poses.items(), strict=False):
+        radius = float(guaranteed(control_matrix(robot, q), torque))
+        plot_available_forces(robot, q, ax, torque=torque, guaranteed=radius).set_title(title)
+    x, y, inside, points = grid_points(robot, n)
+    A = control_matrix(robot, inverse_kinematics(robot, points))
+    force = on_grid(inside, np.array([float(guaranteed(A_k, torque)) for A_k in A]))
+    plot_map(x, y, force, axes[-1], label="guaranteed force in N", vmin=0, vmax=1.2).set_title("whole workspace")
+    return axes
+
+
+def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
+    """Two parallel distal links as one rod between two cranks, for several tilts, and the curve of the rod's middle.
+
+    For two arms whose four links are equal and half as long as the base between them, as on the testbed.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_crossed_linkage(rk.load(), (0, 1))
+    """
+    ax = axes_or_new(ax, figsize=(5.6, 4.6))
+    base, length = robot.base[list(pair)], robot.lengths[pair[0], 0]
+    middle, along = base.mean(axis=0), (base[1] - base[0]) / np.linalg.norm(base[1] - base[0])
+    frame = np.stack([along, [-along[1], along[0]]])
+
+    def centre(theta):
+        w = np.sqrt(np.maximum(length**2 - 4 * length**2 * np.sin(theta) ** 2, 0.0))
+        return w[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1) @ frame
+
+    around, tilts = np.deg2rad(np.linspace(-30.0, 30.0, 241)), np.deg2rad([6.0, 15.0, 25.0])
+    for half, look in ((around >= 0, {"lw": 3.0}), (around <= 0, {"lw": 1.2})):
+        for sign in (1.0, -1.0):
+            ax.plot(*(middle + sign * centre(around[half])).T, color=pair_line(robot, pair)["color"], **look)
+    for i, end in zip(pair, base, strict=True):
+        ax.add_patch(Circle(tuple(end), length, fill=False, color=arm_line(i)["color"], lw=0.9, ls=":"))
+        ax.plot(*end, "o", color=arm_line(i)["color"], ms=10, zorder=4)
+        place = end + 0.5 * length * (frame[0] * np.sign((end - middle) @ frame[0]) - 0.6 * frame[1])
+        ax.annotate(f"drive {i + 1}", place, color=arm_text_colour(i), ha="center", va="center", weight="bold")
+    for theta in tilts:
+        rod = length * np.array([np.cos(2 * theta), np.sin(2 * theta)]) @ frame
+        ends = middle + centre(theta) + np.array([[-1.0], [1.0]]) * rod
+        ax.plot(*ends.T, color=NEUTRAL, lw=2.0, zorder=3)
+        ax.plot(*ends.mean(axis=0), "o", color=ALARM, ms=6, zorder=5)
+        for i, (start, end) in zip(pair, zip(base, ends, strict=True), strict=True):
+            ax.plot(*np.stack([start, end]).T, color=arm_line(i)["color"], lw=1.6, alpha=0.6, zorder=2)
+    ax.plot(*base.T, color=NEUTRAL, lw=1.0, ls="--", zorder=1)
+    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", title="straight rod between two cranks")
+    return ax
+
+
 def plot_pair_measures(trajectory, ax=None):
     """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path."""
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
@@ -148,3 +232,40 @@ def plot_torque_choices(trajectory, choices: dict, axes=None):
         ax.label_outer()
     axes[0].legend(loc="upper right")
     return axes
+
+
+def film_force_polygon(robot, x, pair=(1, 2), frames: int = 36):
+    """The machine crossing the curve of a pair at x (2,) in m, beside the forces of the pair and of all drives.
+
+    >>> import rapkm_lite as rk
+    >>> film_force_polygon(rk.load(), [0.094, 0.064], frames=3).size
+    (691, 336)
+    """
+    x, k, step = np.asarray(x, dtype=float), drive_pairs(robot).index(pair), 1e-5
+    beside = distal_cross_products(robot, inverse_kinematics(robot, x + step * np.eye(2)))[:, k]
+    across = beside / np.linalg.norm(beside)
+    # There and back, to end where nothing is left of the pair's polygon.
+    places = [
+        x + 0.04 * s * across
+        for s in np.concatenate([np.linspace(-1, 1, 2 * frames // 3), np.linspace(1, 0, frames // 3)])
+    ]
+    place = control_matrix(robot, inverse_kinematics(robot, np.array([places[0], x])))
+    size = 1.15 * max(np.abs(force_polygon(A, 0.1)).max() for A in place)
+
+    def draw(axes, place):
+        q = inverse_kinematics(robot, place)
+        plot_pair_curves(robot, axes[0], pairs=[pair], n=80)
+        plot_machine(robot, q, axes[0], labels=False)
+        A = control_matrix(robot, q)
+        axes[1].fill(*force_polygon(A, 0.1).T, color="#DCE3EA", zorder=1)
+        outline = force_polygon(A[list(pair)], 0.1)
+        axes[1].plot(*np.vstack([outline, outline[:1]]).T, color=pair_line(robot, pair)["color"], lw=2.2, zorder=3)
+        axes[0].set(title="machine and curve", xlabel="x in m", ylabel="y in m")
+        axes[1].set(xlim=(-size, size), ylim=(-size, size), aspect="equal", xlabel="force in x in N")
+        axes[1].set(ylabel="force in y in N", title=f"forces of {pair_name(pair)}; shaded: all")
+
+    alt = (
+        "Film: the end-effector crosses the curve on which the distal links of two drives are parallel. The "
+        "parallelogram of their forces thins to a line and opens again beyond it; the polygon of all drives stays wide."
+    )
+    return film(draw, places, alt, panels=2, figsize=(7.2, 3.5), seconds=6.0)

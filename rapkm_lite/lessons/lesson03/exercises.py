@@ -1,120 +1,194 @@
-"""Exercises of lesson 03: steady state under PD control, series springs, encoder counts, hidden offsets and gains."""
+"""Exercises of lesson 03: rest pose, springs in series, offsets that nobody sees, encoder counts, and the logs."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...machine.logs import mystery_run
-from ...machine.manipulator import load
-from ...mechanics.actuation import control_matrix
-from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
-from ...mechanics.closure import estimate_pose
-from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.antagonism import steady_state_error
 from ..checker import Exercise
-from ..mystery import hidden
+from . import tasks
+from .readings import READINGS
 
 
-def _poses(rng, count: int = 5):
-    """Control matrices in end-effector coordinates, null vectors, unequal gains and offsets at random poses."""
-    robot = load()
-    for _ in range(count):
-        q = inverse_kinematics(robot, rng.uniform(-0.08, 0.08, 2))
-        yield control_matrix(robot, q), null_vector(robot, q), rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)
+def _error(change):
+    """A wrong rest error from A, gains and offset."""
+    return lambda A, K_P, offset: change(A, K_P, offset)
 
 
-def _rest_cases(rng):
-    return [(A, np.diag(gains), offset) for A, _, gains, offset in _poses(rng)]
+def counts_needed(K_P, friction):
+    """Smallest counts per turn, not rounded, with K_P 2 pi / counts <= 2 f_c."""
+    return np.pi * K_P / friction
 
 
-def _unbalanced(e, A, K_P, offset):
-    """Force A^T c of the PD torques and the part of the error that breaks the loops, both as angles."""
-    force = A.T @ K_P @ (e + offset) / np.max(K_P) / np.max(np.abs(A))
-    torn = e - A @ np.linalg.lstsq(A, e, rcond=None)[0]
-    return max(np.max(np.abs(force)), np.max(np.abs(torn))), "force A^T K_P (e + offset) or loop gap, rad"
-
-
-def _fight_cases(rng):
-    return [(n, gains, offset) for _, n, gains, offset in _poses(rng)]
-
-
-def _fight(n, gains, offset):
-    """The rest torques by way of (14): any A whose columns span the plane normal to n gives the same."""
-    A = np.linalg.svd(n[:, None])[0][:, 1:]
-    return steady_state_torque(A, gains, offset)
-
-
-def _open_chain(c, n, gains, offset):
-    """Stretches c / k and offsets of the springs in series must close: n.(c / k + offset) = 0."""
-    return abs(n @ (c / gains + offset)), "gap eta.(c / K + offset) of the springs in series, rad"
-
-
-def _rests(name: str):
-    """Null vector, mean error and mean torque in the second half of each rest of a log."""
-    robot, log = load(), mystery_run(name)
-    for start in (0.7, 3.7, 6.7):
-        now = (log.t > start) & (log.t < start + 0.8)
-        n = null_vector(robot, estimate_pose(robot, log.q_a_desired[now][0], [0.0, 0.0]))
-        yield n, log.error[now].mean(axis=0), log.c[now].mean(axis=0)
-
-
-def _unexplained_torque(offset):
-    """Largest difference between the rest torques of the log and those the offsets cause, as an angle."""
-    worst = max(np.max(np.abs(c / 7.05 + n * (n @ offset))) for n, _, c in _rests("offset_a"))
-    return worst, "rest torques of the log that the offsets leave unexplained, over K_P, in rad"
-
-
-def _unexplained_gain(gains):
-    """Largest torque of a rest that the gains leave unexplained, as a gain at the mean error of that drive."""
-    errors, torques = (np.array(v) for v in zip(*[(e, c) for _, e, c in _rests("gain")], strict=True))
-    left = torques + errors * gains
-    worst = np.max(np.abs(left).max(axis=0) / np.abs(errors).max(axis=0))
-    return worst, "rest torques of the log that the gains leave unexplained, over the error, in N m/rad"
+def _mu(weight):
+    """Torques along eta with one part of mu done otherwise; weight(eta, gains) stands for the sum of compliances."""
+    return lambda eta, gains, offset: -eta * (eta @ offset) / weight(eta, gains)
 
 
 EXERCISES = {
     "03.rest_error": Exercise(
         steady_state_error,
-        "solve the two equations A^T K_P (A xi + offset) = 0 for the shift xi, then e = A xi",
-        "rad",
-        _rest_cases,
-        _unbalanced,
-        1e-9,
+        hints=(
+            "Which errors can the joints take at all while the loops stay closed? And what must the torques not do?",
+            "Write e = A xi and put it into (13): A^T K_P (A xi + offset) = 0 are two equations for two numbers.",
+            "xi = -np.linalg.solve(A.T @ K_P @ A, A.T @ K_P @ offset), then A @ xi.",
+        ),
+        unit="rad",
+        cases=tasks.rest_cases,
+        invariant=tasks.unbalanced,
+        tolerance=1e-9,
+        close=0.02,
+        improve="the two equations are linear: solve them instead of minimizing or simulating",
+        mistakes={
+            "this is the printed (14) with A^T put in: right for equal gains only, it tears the loops": (
+                _error(lambda A, K, o: -np.linalg.solve(K, A @ np.linalg.pinv(A) @ K @ o))
+            ),
+            "this is minus the offset: two drives could follow their encoders, three have to agree": (
+                _error(lambda A, K, o: -o)
+            ),
+            "the gains are forgotten (a factor K_P is missing): all drives count the same": (
+                _error(lambda A, K, o: -A @ np.linalg.pinv(A) @ o)
+            ),
+            "these are the two numbers xi in m; the factor A is missing, e = A xi": (
+                _error(lambda A, K, o: -np.linalg.solve(A.T @ K @ A, A.T @ K @ o))
+            ),
+            "this is the measured error e + offset; the true one is wanted": (
+                _error(lambda A, K, o: steady_state_error(A, K, o) + o)
+            ),
+            "these are the torques at rest, not the errors": (
+                _error(lambda A, K, o: -K @ (steady_state_error(A, K, o) + o))
+            ),
+            "the gains are inverted: the softest drive counts most": (
+                _error(lambda A, K, o: steady_state_error(A, np.linalg.inv(K), o))
+            ),
+            "the stiffness A^T K_P A is missing: the force is not yet divided by it": (
+                _error(lambda A, K, o: -A @ (A.T @ K @ o))
+            ),
+            "K_P is missing in the stiffness: A^T A instead of A^T K_P A": (
+                _error(lambda A, K, o: -A @ np.linalg.solve(A.T @ A, A.T @ K @ o))
+            ),
+            "K_P is missing on the right-hand side: A^T offset instead of A^T K_P offset": (
+                _error(lambda A, K, o: -A @ np.linalg.solve(A.T @ K @ A, A.T @ o))
+            ),
+            "the gains are squared": _error(lambda A, K, o: steady_state_error(A, K @ K, o)),
+            "only the diagonal of K_P is used": _error(lambda A, K, o: steady_state_error(A, np.diag(np.diag(K)), o)),
+            "this is the force -A^T K_P offset at the end-effector, not the error": _error(
+                lambda A, K, o: -A.T @ K @ o
+            ),
+        },
     ),
     "03.fight": Exercise(
-        _fight,
-        "c = mu eta; the errors -c / K - offset must lie in the tangent plane, so eta times them is zero",
-        "N m",
-        _fight_cases,
-        _open_chain,
-        1e-9,
+        tasks.fight,
+        hints=(
+            "All three torques hang on one number mu. Which condition is still unused?",
+            "The error that the law needs, -c / K - offset, must leave the loops closed: eta times it is zero. Put in "
+            "c = mu eta.",
+            "mu = -(eta @ offset) / np.sum(eta**2 / gains), then mu * eta.",
+        ),
+        unit="N m",
+        cases=tasks.fight_cases,
+        invariant=tasks.open_chain,
+        tolerance=1e-9,
+        close=0.02,
+        improve="the condition is linear in mu: solve it by hand",
+        mistakes={
+            "each drive multiplies its own part of the offset by its own gain: these torques are not along eta": (
+                lambda eta, gains, offset: -gains * eta * (eta @ offset)
+            ),
+            "this is right for equal gains only: the mean of the gains stands for the springs in series": (
+                lambda eta, gains, offset: -gains.mean() * eta * (eta @ offset)
+            ),
+            "the stiffnesses are added, as for springs in parallel; in series the compliances add": (
+                lambda eta, gains, offset: -eta * (eta @ offset) * np.sum(eta**2 * gains)
+            ),
+            "eta is missing in the sum of compliances: each one counts with eta_i^2": _mu(lambda n, k: np.sum(1 / k)),
+            "the mean compliance is used; each one counts with eta_i^2": _mu(lambda n, k: np.mean(1 / k)),
+            "eta is not squared in the sum of compliances": _mu(lambda n, k: np.sum(n / k)),
+            "eta is not squared in the sum of compliances, only its size": _mu(lambda n, k: np.sum(np.abs(n) / k)),
+            "only the softest drive is counted; it limits the tension, but the others give way too": (
+                _mu(lambda n, k: 1 / k.min())
+            ),
+            "only the first gain is used: right for equal gains only": _mu(lambda n, k: 1 / k[0]),
+            "this is the number mu alone; the factor eta is missing, c = mu eta": (
+                lambda eta, gains, offset: -(eta @ offset) / np.sum(eta**2 / gains)
+            ),
+            "the whole torque K (offset) is given: only its part along eta is held at rest": (
+                lambda eta, gains, offset: -gains * offset
+            ),
+            "the torques K (offset) are projected onto eta: the filter's complement, not the equilibrium": (
+                lambda eta, gains, offset: -eta * (eta @ (gains * offset))
+            ),
+            "this is the error at rest in rad, not the torques": (
+                lambda eta, gains, offset: -tasks.fight(eta, gains, offset) / gains - offset
+            ),
+            "the gains are inverted: compliances where gains belong": (
+                lambda eta, gains, offset: -eta * (eta @ offset) / np.sum(eta**2 * gains)
+            ),
+            "the gains are forgotten (a factor is missing): this is the part of the offset along eta": (
+                lambda eta, gains, offset: -eta * (eta @ offset)
+            ),
+            "the tangent part of the offset is used (the complement): it is the normal part that fights": (
+                lambda eta, gains, offset: -gains * (offset - eta * (eta @ offset))
+            ),
+        },
+    ),
+    "03.unseen_offsets": Exercise(
+        tasks.unseen_offsets,
+        hints=(
+            "What would all three encoders show if the machine simply stood 2 mm beside the place?",
+            "Offsets that agree with each other have the form A xi, with A from rk.control_matrix at the pose, and xi "
+            "is the shift in m. Mind that the real shift is not exactly the one of the first-order theory.",
+            "A = rk.control_matrix(robot, rk.inverse_kinematics(robot, x)); return A @ np.array([0.0, 2.2e-3]).",
+        ),
+        unit="rad",
+        judge=tasks.betrayal,
+        close=0.05,
+        improve="leave some room: the first-order theory is a few per cent off at this size",
+        points=10.0,
+        mistakes={
+            "no offsets at all: nothing is seen, and nothing is shifted": lambda f: not np.any(tasks.asked(f)[0]),
+            "these offsets point along eta: this is the part that fights and shifts nothing (the complement)": (
+                lambda f: (lambda o, A, n: np.linalg.norm(o - n * (n @ o)) < 0.05 * np.linalg.norm(o))(*tasks.asked(f))
+            ),
+            "the offsets are 1000 times too large: units, mrad given for rad or mm for m": (
+                lambda f: np.abs(tasks.asked(f)[0]).max() > 1.0
+            ),
+            "the offsets are 1000 times too small (units)": lambda f: np.abs(tasks.asked(f)[0]).max() < 2e-5,
+        },
     ),
     "03.counts": Exercise(
-        lambda K_P, friction: np.pi * K_P / friction,
-        "one step of the torque is K_P 2 pi / counts, and it must fit into the friction band from -f_c to f_c",
-        "counts",
-        lambda rng: [
-            (float(k), float(f)) for k, f in zip(rng.uniform(1, 20, 4), rng.uniform(1e-3, 1e-2, 4), strict=True)
-        ],
-        lambda counts, K_P, friction: (
+        counts_needed,
+        hints=(
+            "By how much does the torque of one drive jump from count to count, and what can friction take up?",
+            "One step of the torque is K_P 2 pi / counts; the friction band reaches from -f_c to f_c.",
+            "K_P 2 pi / counts <= 2 f_c, so counts >= np.pi * K_P / friction.",
+        ),
+        unit="counts",
+        cases=lambda rng: list(zip(rng.uniform(1, 20, 5), rng.uniform(1e-3, 1e-2, 5), strict=True)),
+        invariant=lambda counts, K_P, friction: (
             abs(K_P * 2 * np.pi / counts - 2 * friction),
             "difference of the torque step from 2 f_c, in N m",
         ),
-        1e-8,
+        tolerance=1e-8,
+        close=5e-3,
+        improve="leave the number of counts as it comes, without rounding",
+        mistakes={
+            "the friction band is 2 f_c wide, from -f_c to f_c: a factor of 2 is missing": (
+                lambda K_P, friction: 2 * np.pi * K_P / friction
+            ),
+            "a turn has 2 pi radians, not 360 (units, degrees)": lambda K_P, friction: 180 * K_P / friction,
+            "the reciprocal: this is the size of something per count, not the counts per turn": (
+                lambda K_P, friction: friction / (np.pi * K_P)
+            ),
+            "this is the largest step of the angle in rad, not the counts per turn": (
+                lambda K_P, friction: 2 * friction / K_P
+            ),
+            "counts per radian; a turn has 2 pi of them (a factor of 2 pi is missing)": (
+                lambda K_P, friction: K_P / (2 * friction)
+            ),
+            "these are the lines; each one is counted four times, the answer is in counts (a factor of 4)": (
+                lambda K_P, friction: np.pi * K_P / friction / 4
+            ),
+        },
     ),
-    "03.offsets": Exercise(
-        lambda: hidden("offset_a")[0],
-        "each rest gives one equation eta.offset = -eta.c / k_P; three rests, three unknowns",
-        "rad",
-        invariant=_unexplained_torque,
-        tolerance=3e-4,
-        secret=True,
-    ),
-    "03.gains": Exercise(
-        lambda: hidden("gain")[1],
-        "at rest c_i = -K_i times (measured minus desired): a straight line through the origin for each drive",
-        "N m/rad",
-        invariant=_unexplained_gain,
-        tolerance=0.2,
-        secret=True,
-    ),
-}
+} | READINGS

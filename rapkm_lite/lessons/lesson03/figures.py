@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures.film import film
 from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
@@ -157,3 +158,28 @@ def plot_log(log, axes=None):
     axes[1].set(xlabel="time in s", ylabel="torque in mN m")
     axes[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     return axes
+
+
+def film_three_lines(robot, q, offset, K_P, frames: int = 32):
+    """The opinions of the drives while the normal part of the offsets fades: the lines close on the rest point.
+
+    >>> import rapkm_lite as rk
+    >>> robot = rk.load()
+    >>> film_three_lines(robot, rk.inverse_kinematics(robot, [0.04, -0.05]), [4e-3, -2e-3, 5e-3], 7.05, frames=3).size
+    (403, 480)
+    """
+    n = null_vector(robot, q)
+    normal = n * (n @ np.asarray(offset, dtype=float))
+    frame: list = []
+
+    def draw(ax, share):
+        plot_disagreement(robot, q, offset - (1.0 - share) * normal, K_P, ax)
+        if not frame:
+            frame.extend([ax.get_xlim(), ax.get_ylim()])
+        ax.set(xlim=frame[0], ylim=frame[1], title=f"{100 * share:3.0f} % of the normal part")
+
+    alt = (
+        "Film: the lines of the three drives about the desired point. While the normal part of the offsets fades, the "
+        "triangle between the lines closes on the rest point, which stays, and the three torques go to zero."
+    )
+    return film(draw, np.linspace(1.0, 0.0, frames), alt, figsize=(4.2, 5.0), seconds=5.0)
