@@ -1,4 +1,4 @@
-"""Sliders that redraw a picture fast enough to feel alive: ready-made explorers, and `explorer` to build others.
+"""Pictures to take in hand: ready-made explorers, and `explorer` to build others.
 
 >>> from rapkm_lite import explore
 >>> explore.prestress().set(level=0).numbers["largest prestress"]
@@ -6,11 +6,20 @@
 """
 
 from ..figures.machine import plane_limits
-from .builder import Explorer, choice, explorer, log_slider, slider, switch
+from ..figures.marks import (
+    Palette,
+    Picture,
+    bars,
+    draw_machine,
+    draw_workspace,
+    drive_legend,
+    pair_legend,
+)
+from .controls import choice, log_slider, offset_sliders, slider, switch
+from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress
 from .landscape import landscape
-from .live import LivePicture
 from .motion import animation
-from .parts import draw_machine, drive_legend, legend, offset_sliders
-from .runs import bars, decentralized_run, steady_state
+from .rest import steady_state, three_opinions
+from .runs import decentralized_run
 from .torque import computed_torque

@@ -5,96 +5,134 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from contourpy import contour_generator
+from scipy.ndimage import distance_transform_edt
 
-from ..figures.machine import plane_limits, plot_workspace
+from ..figures.machine import arm_points, plane_limits
 from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
+from ..figures.marks import Palette, draw_machine, draw_workspace, drive_legend, pair_legend, per_drive
+from ..figures.marks.parts import workspace_outline
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.arguments import matvec
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
-from ..mechanics.kinematics import inverse_kinematics, working_modes
+from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import circle, triangle
-from .builder import Explorer, choice, explorer, slider
-from .parts import TIME, draw_machine, drive_legend, frictionless, legend, per_drive
+from .controls import choice, slider
+from .explorer import Explorer, explorer
 
+TIME = "time in s"
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
-# Pale steps of the map, so that the arms stand out on them; dark is weak.
-MAP = ListedColormap(["#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F4F3E4", "#FCFBEE"])
-LEVELS = BoundaryNorm([0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5], MAP.N)
+# Steps of the map on which the arms stand out; weak is far from the colour of the paper.
+MAP = Palette(
+    (0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5),
+    ("#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F4F3E4", "#FCFBEE"),
+    ("#8A8A94", "#70707C", "#5A5A66", "#474752", "#383842", "#2B2B33", "#202026"),
+)
 
 
-def pair_legend(ax, robot: Manipulator) -> None:
-    """A legend of the first pairs' lines."""
-    pairs = act.drive_pairs(robot)[:4]
-    legend(ax, [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)])
+def frictionless(robot: Manipulator | None) -> Manipulator:
+    """The given machine, or the testbed without friction."""
+    return load().replace(friction=0.0) if robot is None else robot
+
+
+def clamped(robot: Manipulator, point) -> np.ndarray:
+    """The point (2,) in m, or the last one that all arms reach on the way to it from the middle of the drives."""
+    if reachable(robot, point):
+        return np.asarray(point)
+    start = robot.base.mean(axis=0)
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        inside = reachable(robot, start + middle * (point - start))
+        low, high = (middle, high) if inside else (low, middle)
+    # A millimetre inside, where no arm is quite stretched.
+    return start + max(low - 1e-3 / np.linalg.norm(point - start), 0.0) * (point - start)
+
+
+def singular_curves(robot: Manipulator, mode=None) -> dict:
+    """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
+    x, y, inside, points = grid_points(robot, 161)
+    values = on_grid(inside, act.distal_cross_products(robot, inverse_kinematics(robot, points, mode)))
+    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(act.drive_pairs(robot))}
 
 
 def machine(robot: Manipulator | None = None) -> Explorer:
-    """The end-effector by two sliders in every working mode, a map of sigma_min, and the five-bar of each pair."""
+    """The end-effector by hand in every working mode, a map of sigma_min, and the five-bar of each pair."""
     robot = frictionless(robot)
     pairs = act.drive_pairs(robot)[:3]
     modes = {mode_name(m): m for m in working_modes(robot)}
-    which = ["all drives", *(f"pair {pair_name(p)}" for p in pairs)]
+    which = {"all drives": None} | {f"pair {pair_name(p)}": p for p in pairs}
     gx, gy, inside, points = grid_points(robot, 121)
     # An image ends where its last pixels end, half a step beyond their centres.
     wide, tall = (gx[1] - gx[0]) / 2, (gy[1] - gy[0]) / 2
     extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
+    outline, curves = workspace_outline(robot), lru_cache(maxsize=8)(lambda mode: singular_curves(robot, modes[mode]))
+    # Outside, where the map is cut off, the value of the nearest point inside.
+    nearest = tuple(distance_transform_edt(~inside, return_distances=False, return_indices=True))
 
     @lru_cache(maxsize=64)
-    def sigma_map(mode: str, drives: str) -> np.ma.MaskedArray:
+    def sigma_map(mode: str, drives: str) -> np.ndarray:
         A = act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
-        rows = slice(None) if drives == which[0] else list(pairs[which.index(drives) - 1])
-        return on_grid(inside, act.singular_values(A[:, rows])[:, 1])
+        rows = slice(None) if which[drives] is None else list(which[drives])
+        return on_grid(inside, act.singular_values(A[:, rows])[:, 1])[nearest].filled(0.0)
 
     def draw(picture, x, y, mode, drives):
-        sigma = sigma_map(mode, drives)
-        picture.image("machine", sigma, extent, cmap=MAP, norm=LEVELS)
-        point = 1e-3 * np.array([x, y])
-        picture.line("machine", *point, color=ALARM, marker="x", markersize=9, zorder=6)
+        picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
+        point = clamped(robot, 1e-3 * np.array([x, y]))
         q = inverse_kinematics(robot, point, modes[mode])
-        all_drives = act.singular_values(act.control_matrix(robot, q))[1]
+        for pair in [which[drives]] if which[drives] else []:
+            for curve in curves(mode)[pair]:
+                picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
         draw_machine(picture, "machine", robot, q)
+        picture.handle("machine", *point, x=(1e3, 0), y=(0, 1e3))
+        A = act.control_matrix(robot, q)
         numbers = {
+            "end-effector": f"({1e3 * point[0]:.0f}, {1e3 * point[1]:.0f}) mm",
             "degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
-            "σ_min of all drives": f"{all_drives:.2f} rad/m",
+            "σ_min of all drives": f"{act.singular_values(A)[1]:.2f} rad/m",
         }
+        chains = arm_points(robot, q)
         for pair, name, value in zip(pairs, "abc", pair_measures(robot, q), strict=False):
             weak = value < WEAK
-            draw_machine(picture, name, robot, q, arms=pair)
-            picture.text(
-                name,
-                0.5,
-                1.02,
-                f"{pair_name(pair)}: {value:.2f} rad/m",
-                inside=True,
-                ha="center",
-                fontsize=10,
-                fontweight="bold" if weak else "normal",
-                color=ALARM if weak else AFTER,
-            )
+            # The distal links that lie almost along each other are what makes a pair weak.
+            for i in pair if weak else ():
+                picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
+            draw_machine(picture, name, robot, q, arms=pair, names=False)
+            words = f"{pair_name(pair)}: {value:.2f} rad/m" + ", parallel" * bool(weak)
+            look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
+            picture.title(name, words, fontsize=10, **look)
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"
         return numbers
 
     plane = plane_limits(robot, 0.05)
-    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {"xticks": [], "yticks": [], "title": " "}
+    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {
+        "xticks": [],
+        "yticks": [],
+        "title": " ",
+        "small": True,
+    }
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
-
-    def setup(axes):
-        bar = axes["machine"].figure.colorbar(ScalarMappable(LEVELS, MAP), ax=axes["machine"], shrink=0.85, pad=0.02)
-        bar.set_label("σ_min in rad/m")
-
     controls = {
         "x": slider("x in mm", -200, 200, 2, 20),
         "y": slider("y in mm", -200, 230, 2, 30),
         "mode": choice("working mode", modes),
-        "drives": choice("map for", which),
+        "drives": choice("map for", which.keys(), list(which)[-1]),
     }
-    rows = [["machine", name] for name in "abc"[: len(pairs)]]
-    return explorer(draw, controls, panels, layout=rows, widths=[2.7, 1], size=(8.2, 5.4), setup=setup, live=True)
+    return explorer(
+        draw,
+        controls,
+        panels,
+        layout=[["machine", name] for name in "abc"[: len(pairs)]],
+        widths=[2.7, 1],
+        size=(8.2, 5.4),
+        setup=lambda picture: picture.scale("machine", MAP, "σ_min in rad/m"),
+        live=True,
+        about="The arms on a map of the smallest singular value σ_min of the chosen drives, and the five-bar of each "
+        "pair; where the two distal links of a pair are parallel, the pair grips in one direction only.",
+    )
 
 
 def actuation(robot: Manipulator | None = None) -> Explorer:
@@ -122,29 +160,24 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         share = np.linspace(0, 100, len(t))
         picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
         draw_machine(picture, "plane", robot, t.q[k])
+        picture.handle("plane", *t.x[k], along=t.x, place=share)
         for i, pair in enumerate(pairs):
             style = pair_line(robot, pair)
             picture.line("sigma", share, sigma[:, i], **style)
             picture.line("sigma", place, sigma[k, i], marker="o", markersize=6, color=style["color"], zorder=4)
+            corners = act.force_polygon(A[k][list(pair)], 1e-3 * torque)
+            edge = {"edgecolor": style["color"], "linestyle": style["linestyle"]}
+            picture.polygon("force", corners, fill=False, linewidth=1.5, **edge)
         for i in range(robot.n_arms):
             picture.line("null", share, null[:, i], **arm_line(i))
             picture.line("null", place, null[k, i], marker="o", markersize=6, color=arm_colour(i), zorder=4)
         for panel in ("sigma", "null"):
-            picture.line(panel, [place, place], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.8, zorder=1)
+            picture.line(panel, [place, place], picture.ylim(panel), color=NEUTRAL, linewidth=0.8, zorder=1)
+            picture.handle(panel, place, None, place=(1, 0))
         corners = act.force_polygon(A[k], 1e-3 * torque)
-        for pair in pairs:
-            picture.polygon(
-                "force",
-                act.force_polygon(A[k][list(pair)], 1e-3 * torque),
-                fill=False,
-                linewidth=1.5,
-                edgecolor=pair_line(robot, pair)["color"],
-                linestyle=pair_line(robot, pair)["linestyle"],
-            )
         picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
-        bound = np.abs(corners).max()
-        picture.fit("force", bound)
-        picture.limits("force", x=picture.axes["force"].get_ylim())
+        picture.fit("force", np.abs(corners).max())
+        picture.limits("force", x=picture.ylim("force"))
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
             "point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
@@ -154,25 +187,19 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             "null vector": per_drive(null[k], 2),
         }
 
-    def setup(axes):
-        plot_workspace(robot, axes["plane"])
-        pair_legend(axes["sigma"], robot)
-        drive_legend(axes["null"], robot)
-        legend(axes["force"], [("all drives", {"color": AFTER})])
+    def setup(picture):
+        draw_workspace(picture, "plane", robot)
+        pair_legend(picture, "sigma", robot)
+        drive_legend(picture, "null", robot)
+        picture.legend("force", [("all drives", {"color": AFTER})])
 
-    way = "place on the path in %"
+    way = {"xlabel": "place on the path in %", "xlim": (0, 100)}
+    force = {"xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal", "xlim": (-2, 2), "ylim": (-2, 2)}
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "sigma": {"title": "Pairs", "xlabel": way, "ylabel": "σ_min in rad/m", "xlim": (0, 100), "ylim": (0, 8)},
-        "null": {"title": "Null vector", "xlabel": way, "ylabel": "component", "xlim": (0, 100), "ylim": (-1.05, 1.05)},
-        "force": {
-            "title": "Forces",
-            "xlabel": "f_x in N",
-            "ylabel": "f_y in N",
-            "aspect": "equal",
-            "xlim": (-2, 2),
-            "ylim": (-2, 2),
-        },
+        "sigma": {"title": "Pairs", "ylabel": "σ_min in rad/m", "ylim": (0, 8)} | way,
+        "null": {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05)} | way,
+        "force": {"title": "Forces"} | force,
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
@@ -189,6 +216,8 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         size=(9.2, 6.6),
         setup=setup,
         live=True,
+        about="The machine at a place of its path; how well each pair of drives grips along the path, the components of "
+        "the null vector, and the forces that the drives and each pair can produce.",
     )
 
 
@@ -215,18 +244,17 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             picture.fit(panel, top)
             picture.line(panel, t.t[[0, -1]], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=1)
         energy = [t.dt * np.sum(robot.resistance * (v / robot.torque_constant) ** 2) for v in (least, c)]
-        changes = [sign_changes(v) for v in (least, c)]
         return {
-            "changes of sign without": per_drive(changes[0], 0),
-            "with": per_drive(changes[1], 0),
+            "changes of sign without": per_drive(sign_changes(least), 0),
+            "with": per_drive(sign_changes(c), 0),
             "heat without": f"{energy[0]:.2f} J",
             "heat with": f"{energy[1]:.2f} J",
             "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
         }
 
-    def setup(axes):
-        drive_legend(axes["without"], robot)
-        drive_legend(axes["with"], robot)
+    def setup(picture):
+        drive_legend(picture, "without", robot)
+        drive_legend(picture, "with", robot)
 
     panels = {
         name: {"title": title, "xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
@@ -236,13 +264,11 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
         "side": slider("side of the triangle in mm", 60, 300, 5, 240),
     }
-    return explorer(draw, controls, panels, setup=setup, live=True)
+    about = "Torques of the drives along the triangle, without prestress and with it."
+    return explorer(draw, controls, panels, setup=setup, live=True, about=about)
 
 
 def sign_changes(c: np.ndarray) -> np.ndarray:
     """How often each column of c (k, m) changes its sign, zeros not counted, (m,)."""
-    count = []
-    for column in c.T:
-        signs = np.sign(column[np.abs(column) > 1e-9])
-        count.append(int(np.count_nonzero(np.diff(signs))))
-    return np.array(count)
+    signs = [np.sign(column[np.abs(column) > 1e-9]) for column in c.T]
+    return np.array([int(np.count_nonzero(np.diff(s))) for s in signs])

@@ -10,8 +10,9 @@ from ..figures.style import ALARM, NEUTRAL, arm_colour
 from ..machine.manipulator import Manipulator
 from ..mechanics.trajectory import triangle
 from ..simulation.energy import antagonism_form
-from .builder import Explorer, explorer, log_slider, slider
-from .parts import frictionless, offset_sliders
+from .controls import log_slider, offset_sliders, slider
+from .explorer import Explorer, explorer
+from .geometry import frictionless
 
 # Energies in J of the level lines.
 LEVELS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -46,7 +47,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 picture.line("map", *ring, color=shade, linewidth=1.6)
                 if np.abs(ring[:, 45]).max() < 11:
                     picture.text("map", *ring[:, 45], f"{level:g} J", fontsize=9, color=shade, va="bottom")
-        picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none")
+        picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
+        picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)
         shares = costs * (directions.T @ dq) ** 2
         for k, share in enumerate(shares):
@@ -56,13 +58,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         for i in range(robot.n_arms):
             for k in range(robot.n_arms):
                 at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
-                picture.bar(
-                    "directions",
-                    at,
-                    directions[i, k] * np.sign(directions[:, k].sum() or 1),
-                    0.2,
-                    facecolor=arm_colour(i),
-                )
+                component = directions[i, k] * np.sign(directions[:, k].sum() or 1)
+                picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
         picture.line("directions", [0.5, robot.n_arms + 0.5], [0, 0], color=NEUTRAL, linewidth=0.8)
         return {
             "antagonistic energy": f"{dq @ S @ dq:.2f} J",
@@ -70,19 +67,15 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             "principal costs": " / ".join(f"{c:.3f}" for c in np.maximum(costs, 0)) + " J/mrad²",
         }
 
-    ticks = {
-        "xlim": (0.5, robot.n_arms + 0.5),
-        "xlabel": "principal direction, cheapest first",
-        "xticks": range(1, robot.n_arms + 1),
-    }
+    def setup(picture):
+        arms = [(str(i + 1) if i else "drive 1", {"color": arm_colour(i), "linewidth": 7}) for i in range(robot.n_arms)]
+        picture.legend("directions", arms)
+
+    ticks = {"xlim": (0.5, robot.n_arms + 0.5), "xticks": range(1, robot.n_arms + 1)}
+    ticks |= {"xlabel": "principal direction, cheapest first"}
+    frame = {"xlim": (-12, 12), "ylim": (-12, 12), "aspect": "equal"}
     panels = {
-        "map": {
-            "xlabel": "offset 1 in mrad",
-            "ylabel": "offset 2 in mrad",
-            "xlim": (-12, 12),
-            "ylim": (-12, 12),
-            "aspect": "equal",
-        },
+        "map": {"xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
         "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
         "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.05, 1.05), **ticks},
     }
@@ -92,4 +85,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         "side": slider("side of the triangle in mm", 20, 240, 10, 120),
         "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
     }
-    return explorer(draw, controls, panels)
+    about = (
+        "Level lines of the antagonistic energy over two offsets, the share of each principal direction in it, and "
+        "what these directions are."
+    )
+    return explorer(draw, controls, panels, size=(9.4, 3.8), setup=setup, about=about)

@@ -7,15 +7,20 @@ from functools import lru_cache
 import numpy as np
 
 from ..control.laws import PD
-from ..figures.machine import plane_limits, plot_path, plot_workspace
+from ..figures.machine import plane_limits
+from ..figures.marks import draw_machine, draw_workspace, drive_legend
 from ..figures.style import AFTER, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
-from .builder import Explorer, choice, explorer, slider, switch
-from .parts import TIME, draw_machine, drive_legend, frictionless
+from .controls import choice, slider, switch
+from .explorer import Explorer, explorer
+from .geometry import TIME, frictionless
 from .runs import LAWS
+
+# Metres of arrow for 1 N, and the newtons of the arrow that shows it.
+SCALE, UNIT = 0.4, 0.25
 
 
 def animation(robot: Manipulator | None = None) -> Explorer:
@@ -35,17 +40,18 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         run, force, error = recorded(filter, offsets)
         k = min(round(1e-3 * time / run.dt), len(run.t) - 1)
         draw_machine(picture, "plane", robot, run.q[k])
-        # 0.4 m of arrow for 1 N.
         total = force[k].sum(axis=0)
         for vector, colour in [*zip(force[k], map(arm_colour, range(N)), strict=True), (total, AFTER)]:
-            picture.arrow("plane", run.x[k], 0.4 * vector, 0.012, facecolor=colour, edgecolor="white", zorder=6)
+            picture.arrow("plane", run.x[k], SCALE * vector, 0.009, facecolor=colour, edgecolor="white", zorder=6)
+        picture.handle("plane", *run.x[k], along=path.x[::25], time=1e3 * path.t[::25])
         for panel, values in (("torque", 1e3 * run.c), ("error", error[:, None])):
             for i, column in enumerate(values.T):
                 style = arm_line(i) if panel == "torque" else {"color": AFTER}
                 picture.trace(panel, run.t, column, **style)
                 picture.line(panel, run.t[k], column[k], marker="o", markersize=6, color=style["color"], zorder=5)
             picture.fit(panel, values, symmetric=panel == "torque", least=0.5)
-            picture.line(panel, run.t[[k, k]], picture.axes[panel].get_ylim(), color=NEUTRAL, linewidth=0.9, zorder=1)
+            picture.line(panel, run.t[[k, k]], picture.ylim(panel), color=NEUTRAL, linewidth=0.9, zorder=1)
+            picture.handle(panel, run.t[k], None, time=(1e3, 0))
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
         return {
             "time": f"{run.t[k]:.2f} s",
@@ -55,30 +61,27 @@ def animation(robot: Manipulator | None = None) -> Explorer:
             "path error": f"{error[k]:.2f} mm",
         }
 
-    def setup(axes):
-        plot_workspace(robot, axes["plane"])
-        plot_path(path, axes["plane"])
-        axes["plane"].set(**plane)
-        drive_legend(axes["torque"], robot)
+    def setup(picture):
+        draw_workspace(picture, "plane", robot)
+        picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
+        corner = np.array([plane["xlim"][1] - 1.15 * SCALE * UNIT, plane["ylim"][1] - 0.06])
+        picture.arrow("plane", corner, [SCALE * UNIT, 0], 0.009, facecolor=AFTER)
+        words = {"ha": "center", "va": "bottom", "fontsize": 10}
+        picture.text("plane", corner[0] + SCALE * UNIT / 2, corner[1] + 0.015, f"{UNIT:g} N", **words)
+        drive_legend(picture, "torque", robot)
 
-    plane = plane_limits(robot, 0.05) | {"title": "Arrows: 0.4 m for 1 N; black: their sum"}
+    plane = plane_limits(robot, 0.05) | {"title": "Forces of the drives; black: their sum"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {
         "plane": plane,
         "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
-        "error": {"title": "Distance from the path point", "ylabel": "path error in mm", **time},
+        "error": {"title": "Distance from the path", "ylabel": "path error in mm", **time},
     }
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
         "filter": choice("antagonism filter", LAWS.keys()),
         "offsets": switch("calibration offsets −5, −6, 12 mrad", True),
     }
-    return explorer(
-        draw,
-        controls,
-        panels,
-        layout=[["plane", "torque"], ["plane", "error"]],
-        size=(9.2, 4.8),
-        setup=setup,
-        play="time",
-    )
+    layout = [["plane", "torque"], ["plane", "error"]]
+    about = "The machine on its way along the triangle; arrows are the forces of the drives on the end-effector."
+    return explorer(draw, controls, panels, layout=layout, size=(9.2, 4.8), setup=setup, play="time", about=about)

@@ -8,17 +8,19 @@ import numpy as np
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
-from ..figures.machine import plot_workspace
-from ..figures.maps import grid_points, on_grid, pair_line, pair_name
-from ..figures.style import AFTER, NEUTRAL, arm_line
+from ..figures.maps import pair_line, pair_name
+from ..figures.marks import draw_workspace, drive_legend, offset_values, pair_legend, per_drive
+from ..figures.style import AFTER, ALARM, NEUTRAL, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
-from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
-from .builder import Explorer, choice, explorer, slider
-from .geometry import pair_legend
-from .parts import TIME, drive_legend, frictionless, legend, offset_sliders, per_drive
+from .controls import choice, offset_sliders, slider
+from .explorer import Explorer, explorer
+from .geometry import TIME, frictionless, singular_curves
+
+# Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
+MOST = {"torque": 1000.0, "error": 100.0}
 
 
 def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
@@ -36,15 +38,6 @@ def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
 def distance(points, curve) -> float:
     """Smallest distance in m between points (k, 2) and points (j, 2)."""
     return float(np.linalg.norm(points[:, None] - curve[None], axis=-1).min())
-
-
-def singular_curves(robot: Manipulator) -> dict:
-    """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
-    from contourpy import contour_generator
-
-    x, y, inside, points = grid_points(robot, 161)
-    values = on_grid(inside, act.distal_cross_products(robot, inverse_kinematics(robot, points)))
-    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(act.drive_pairs(robot))}
 
 
 def computed_torque(robot: Manipulator | None = None) -> Explorer:
@@ -82,14 +75,16 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.line("map", t.t, norms("redundant coordinates", side), color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", t.t, np.minimum(norm, 1e6), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
-        offset = 1e-3 * np.array([offsets[f"offset_{i + 1}"] for i in range(N)])
-        run = simulate(robot, law_of(law, rate), path(side), offset)
+        run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error = 1e3 * run.c, 1e3 * run.error
         for i in range(N):
             picture.trace("torque", run.t, torque[:, i], **arm_line(i))
             picture.trace("error", run.t, error[:, i], **arm_line(i))
-        picture.fit("torque", torque, least=50.0)
-        picture.fit("error", error, least=5.0)
+        for panel, values, least in (("torque", torque, 300.0), ("error", error, 20.0)):
+            picture.fit(panel, values, least=least, most=MOST[panel])
+            if np.abs(values).max() > picture.ylim(panel)[1]:
+                words = f"goes on to {np.abs(values).max():.0f}"
+                picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {
@@ -98,32 +93,23 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             "energy": per_drive(run.energy, 2) + f" J, in all {run.energy.sum():.2f} J",
         }
 
-    def setup(axes):
-        plot_workspace(robot, axes["plane"])
-        axes["plane"].set(**plane)
+    def setup(picture):
+        draw_workspace(picture, "plane", robot)
         for pair, lines in curves.items():
             for line in lines:
-                axes["plane"].plot(*line.T, linewidth=1.0, **pair_line(robot, pair))
-        pair_legend(axes["plane"], robot)
-        axes["map"].set_yscale("log")
-        axes["map"].set_ylim(1e-3, 1e2)
-        legend(axes["map"], [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})])
-        drive_legend(axes["torque"], robot)
-        drive_legend(axes["error"], robot)
+                picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
+        pair_legend(picture, "plane", robot)
+        picture.legend("map", [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})])
+        drive_legend(picture, "torque", robot)
+        drive_legend(picture, "error", robot)
 
-    reach = robot.base
-    plane = {
-        "xlabel": "x in m",
-        "ylabel": "y in m",
-        "aspect": "equal",
-        "xlim": (reach[:, 0].min(), reach[:, 0].max()),
-        "ylim": (reach[:, 1].min() - 0.06, reach[:, 1].max() + 0.02),
-        "title": " ",
-    }
+    low, high = robot.base.min(axis=0) - [0, 0.06], robot.base.max(axis=0) + [0, 0.02]
+    plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal"}
     time = {"xlabel": TIME, "xlim": (0, 5)}
+    feedback = {"ylabel": "norm in N m s²/rad", "yscale": "log", "ylim": (1e-3, 1e2)}
     panels = {
-        "plane": plane,
-        "map": {"title": "Feedback", "ylabel": "norm in N m s²/rad", **time},
+        "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1]), "title": "Path"},
+        "map": {"title": "Feedback", **feedback, **time},
         "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
         "error": {"title": "Error", "ylabel": "angle error in mrad", **time},
     }
@@ -132,6 +118,9 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         "side": slider("side of the triangle in mm", 100, 300, 5, 170),
         "rate": slider("poles at −1/s times", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
-    return explorer(
-        draw, controls, panels, layout=[["plane", "map"], ["torque", "error"]], size=(9.2, 6.2), setup=setup
+    layout = [["plane", "map"], ["torque", "error"]]
+    about = (
+        "A path beside the curves on which a pair of drives is singular, and what computed torque control makes of it: "
+        "the norm of its feedback map, torques and errors."
     )
+    return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=setup, about=about)

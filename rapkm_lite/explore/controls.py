@@ -1,0 +1,90 @@
+"""Controls of an explorer: ipywidgets with a label above the track, and how a value of the picture reaches them."""
+
+from __future__ import annotations
+
+import math
+
+import ipywidgets as widgets
+
+from ..machine.manipulator import Manipulator
+
+
+def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
+    """A slider; whole numbers when all four are.  The label names the unit."""
+    whole = all(isinstance(v, int) for v in (low, high, step, value))
+    kind = widgets.IntSlider if whole else widgets.FloatSlider
+    form = {} if whole else {"readout_format": f".{max(0, math.ceil(-math.log10(step) - 1e-9))}f"}
+    return kind(value, min=low, max=high, step=step, description=label, **form, **_common())
+
+
+def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
+    """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`."""
+    step = math.log10(high / low) / steps
+    # A browser moves a value between two steps to the nearer one, so the steps are laid through the value.
+    first = math.log10(value) - step * round(math.log10(value / low) / step)
+    ends = {"base": 10, "min": first, "max": first + steps * step, "step": step}
+    return widgets.FloatLogSlider(value, description=label, readout_format=".3g", **ends, **_common())
+
+
+def choice(label: str, options, value=None) -> widgets.Widget:
+    """A drop-down list of words, or of (word, value) pairs."""
+    options = list(options)
+    first = options[0][1] if isinstance(options[0], tuple) else options[0]
+    return widgets.Dropdown(options=options, value=first if value is None else value, description=label, **_common())
+
+
+def switch(label: str, value: bool = False) -> widgets.Widget:
+    """A box to tick."""
+    return widgets.Checkbox(value, description=label, indent=False, **_common())
+
+
+def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
+    """One slider per drive, offset_1, offset_2, ..., in mrad."""
+    return {
+        f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(v))
+        for i, v in enumerate((tuple(values) * robot.n_arms)[: robot.n_arms])
+    }
+
+
+def check(name: str, widget, value) -> None:
+    """Raise ValueError for a value that the control cannot take."""
+    if isinstance(widget, widgets.Dropdown):
+        allowed = [option[1] if isinstance(option, tuple) else option for option in widget.options]
+        if value not in allowed:
+            raise ValueError(f"{name} = {value!r}; allowed: {', '.join(map(repr, allowed))}")
+    elif hasattr(widget, "min"):
+        low, high = _ends(widget)
+        slack = 1e-12 * max(abs(low), abs(high))
+        if not low - slack <= value <= high + slack:
+            raise ValueError(f"{name} = {value!r}; allowed: {low:g} to {high:g}")
+
+
+def snap(widget, value):
+    """The nearest value that a slider has a step for; a control without steps takes the value as it is."""
+    if not hasattr(widget, "min"):
+        return value
+    log = isinstance(widget, widgets.FloatLogSlider)
+    low, high = _ends(widget)
+    value = min(max(value, low), high)
+    at = math.log(value, widget.base) if log else value
+    at = widget.min + widget.step * round((at - widget.min) / widget.step)
+    if log:
+        return float(widget.base**at)
+    return int(at) if isinstance(widget, widgets.IntSlider) else round(min(max(at, low), high), 12)
+
+
+def moved(widget, steps: int):
+    """The value `steps` steps further on a slider."""
+    if isinstance(widget, widgets.FloatLogSlider):
+        return snap(widget, widget.value * widget.base ** (steps * widget.step))
+    return snap(widget, widget.value + steps * widget.step)
+
+
+def _ends(widget) -> tuple[float, float]:
+    if isinstance(widget, widgets.FloatLogSlider):
+        return widget.base**widget.min, widget.base**widget.max
+    return widget.min, widget.max
+
+
+def _common() -> dict:
+    return {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}

@@ -1,0 +1,289 @@
+"""An explorer: a draw function, its controls, a picture that can be taken in hand, and the numbers that matter."""
+
+from __future__ import annotations
+
+import base64
+import html
+import inspect
+import io
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+
+import anywidget
+import ipywidgets as widgets
+import traitlets
+from PIL import Image, features
+
+from ..figures.marks import Picture, encode, png, scene
+from ..machine.arguments import ConvergenceError
+from ..simulation.compiled import COMPILED
+from ..simulation.runs import SimulationError
+from .controls import check, moved, snap
+
+HERE = Path(__file__).parent
+# A slider that is dragged redraws at once as long as a step takes no more seconds than this.
+PATIENCE = 0.3
+# Older front ends, like Colab's, queue what a dragged slider sends.
+_CONTINUOUS = COMPILED and int(widgets.__version__.split(".")[0]) >= 8
+# Where no kernel runs the stored picture stands alone, without the line that says that a widget is missing.
+_ALONE = (
+    "<style>.jp-OutputArea-child:has(.rapkm-stored) + .jp-OutputArea-child:has(.jupyter-widgets)"
+    ":not(:has(.rapkm, .noUi-target, button, input, select)){display:none}</style>"
+)
+
+
+class Canvas(anywidget.AnyWidget):
+    """The picture in the page."""
+
+    _esm = (HERE / "stage.js").read_text(encoding="utf-8")
+    _css = (HERE / "stage.css").read_text(encoding="utf-8")
+    scene = traitlets.Dict().tag(sync=True)
+
+
+def explorer(
+    draw: Callable,
+    controls: dict,
+    panels: dict,
+    *,
+    layout=None,
+    widths=None,
+    size=(9.4, 3.3),
+    setup=None,
+    play: str | None = None,
+    live: bool | None = None,
+    about: str = "",
+) -> Explorer:
+    """Build an explorer from ``draw(picture, **controls)`` and draw it once.
+
+    draw : puts marks into the `Picture`, and returns the numbers that matter, a dict of name -> text (or None).
+    controls : name -> widget, from `slider`, `log_slider`, `choice`, `switch`, or any widget with a value; the names
+        are the arguments of `draw` (a ``**rest`` takes what it does not name).
+    panels, layout, widths, size, setup : see `Picture`.
+    play : name of a whole-number slider that gets a play button.
+    live : redraw while a slider is dragged; default only with the compiled engine.
+    about : a sentence of what is to be seen, for those who do not see it; default the first line of `draw`'s docstring.
+    Raises ValueError, naming both sides, when the controls and the arguments of `draw` differ.
+
+    >>> from rapkm_lite import explore
+    >>> def draw(picture, gain):
+    ...     picture.line("a", [0, 1], [0, gain])
+    ...     return {"gain": f"{gain:g} N m/rad"}
+    >>> explore.explorer(draw, {"gain": explore.slider("gain in N m/rad", 1, 9, 1, 5)}, {"a": {"xlabel": "time in s"}})
+    Explorer(draw: gain = 5)
+    """
+    parameters = list(inspect.signature(draw).parameters.values())[1:]
+    names = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
+    rest = len(names) < len(parameters)
+    if not set(names) <= set(controls) or (not rest and set(controls) - set(names)):
+        raise ValueError(
+            f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
+            f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
+        )
+    if play is not None and play not in controls:
+        raise ValueError(f"play = {play!r}; allowed: one of {', '.join(controls)}")
+    picture = Picture(panels, layout, widths, size, setup)
+    return Explorer(draw, controls, picture, play, COMPILED if live is None else live, about)
+
+
+class Explorer:
+    """Controls, picture and numbers; shown by ``display(explorer)``, as a plain picture where no kernel runs.
+
+    controls : name -> widget.  picture : the `Picture`.  numbers : name -> text of the last step.
+    problem : the sentence shown instead of a result, or "".
+    """
+
+    def __init__(self, draw, controls: dict, picture: Picture, play: str | None, live: bool, about: str = ""):
+        self.draw, self.controls, self.picture = draw, dict(controls), picture
+        self.numbers: dict[str, str] = {}
+        self.problem = ""
+        self.about = about or (inspect.getdoc(draw) or "").split("\n")[0]
+        # The draw function of a ready-made explorer is local to the function that bears its name.
+        self.name = draw.__qualname__.split(".")[0]
+        self._defaults = {name: widget.value for name, widget in controls.items()}
+        self._held, self._watched, self._slow = False, False, 0
+        self._told: dict = {}
+        labels = {name: widget.description for name, widget in controls.items()}
+        self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, "labels": labels})
+        self.canvas.on_msg(lambda _, content, buffers: self._message(content))
+        cells = []
+        for name, widget in self.controls.items():
+            if hasattr(widget, "continuous_update"):
+                widget.continuous_update = live and _CONTINUOUS
+            widget.observe(self._changed, "value")
+            widget.add_class("rapkm-control")
+            cells += [self._player(widget), widget] if name == play else [widget]
+        button = widgets.Button(description="Reset", tooltip="back to the first setting", layout={"width": "90px"})
+        button.on_click(lambda _: self.reset())
+        grid = {"display": "grid", "grid_template_columns": "repeat(auto-fill, minmax(250px, 1fr))"}
+        bar = widgets.Box([*cells, button], layout=grid | {"grid_gap": "2px 18px", "align_items": "flex-end"})
+        self.widget = _Shown([bar, self.canvas], layout={"max_width": "100%"})
+        self.widget.add_class("rapkm-explorer")
+        self.update()
+
+    def _player(self, widget) -> widgets.Widget:
+        ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
+        play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
+        self._link = widgets.jslink((play, "value"), (widget, "value"))
+        # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
+        speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
+        return widgets.HBox([play, speed])
+
+    @property
+    def values(self) -> dict:
+        """The setting of every control."""
+        return {name: widget.value for name, widget in self.controls.items()}
+
+    @property
+    def code(self) -> str:
+        """The line of Python that makes this explorer with this setting."""
+        made = f"explore.{self.name}()" if self.draw.__module__.startswith(__package__) else "explorer"
+        changed = [f"{k}={v!r}" for k, v in self.values.items() if v != self._defaults[k]]
+        return f"{made}.set({', '.join(changed)})"
+
+    @property
+    def sentence(self) -> str:
+        """What is to be seen, in words."""
+        said = [self.problem] if self.problem else [f"{name}: {text}." for name, text in self.numbers.items()]
+        return " ".join([self.about, *said]).strip()
+
+    @property
+    def png(self) -> bytes:
+        """The picture as it is stored."""
+        return png(self.picture, self.problem)
+
+    def set(self, **values) -> Explorer:
+        """Move controls from code and redraw once.
+
+        Raises ValueError for an unknown control or a value outside its range.
+        """
+        for name, value in values.items():
+            if name not in self.controls:
+                raise ValueError(f"there is no control {name!r}; allowed: {', '.join(self.controls)}")
+            check(name, self.controls[name], value)
+        with self._quiet():
+            for name, value in values.items():
+                self.controls[name].value = value
+        self.update()
+        self._send()
+        return self
+
+    def reset(self) -> None:
+        """Back to the first setting."""
+        self.set(**self._defaults)
+
+    def update(self) -> None:
+        """Draw the present setting; a setting that cannot be computed is explained in the picture."""
+        self.picture.begin()
+        self.problem = ""
+        start = time.perf_counter()
+        try:
+            self.numbers = self.draw(self.picture, **self.values) or {}
+        except (ValueError, SimulationError, ConvergenceError) as error:
+            self.problem, self.numbers = f"No result for this setting: {error}", {}
+        # One slow step may be a cache that fills; from the second in a row on sliders wait for their release.
+        self._slow = self._slow + 1 if time.perf_counter() - start > PATIENCE else 0
+        if self._slow == 2:
+            for widget in self.controls.values():
+                if hasattr(widget, "continuous_update"):
+                    widget.continuous_update = False
+
+    def close(self) -> None:
+        """Take the widgets and their callbacks away."""
+        for widget in self.controls.values():
+            widget.unobserve(self._changed, "value")
+        self.canvas.close()
+        self.widget.close()
+
+    @contextmanager
+    def _quiet(self):
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+
+    def _changed(self, change) -> None:
+        if not self._held:
+            self._step()
+            self._send()
+
+    def _step(self) -> None:
+        """Update for the browser, where a mistake in the draw function would be seen by nobody."""
+        try:
+            self.update()
+        except Exception as error:
+            self.problem, self.numbers = f"The picture cannot be drawn: {type(error).__name__}: {error}", {}
+
+    def _message(self, content: dict) -> None:
+        """A page asks: "hello" from a new view, "grab" with values or steps for controls from a hand on a handle."""
+        if content.get("kind") == "hello":
+            self._told.clear()
+            self._watched = True
+            self._post({"kind": "fixed"}, self.picture.fixed)
+            self._send()
+        elif content.get("kind") == "grab":
+            question = {"from": content.get("from"), "seq": content.get("seq")}
+            try:
+                wishes = {k: snap(self.controls[k], v) for k, v in (content.get("to") or {}).items()}
+                wishes |= {k: moved(self.controls[k], n) for k, n in (content.get("by") or {}).items()}
+                with self._quiet():
+                    for name, value in wishes.items():
+                        self.controls[name].value = value
+                    self._step()
+                    self._follow()
+                self._send(**question)
+            except Exception:
+                self.canvas.send({"kind": "lost", **question})
+                raise
+
+    def _follow(self) -> None:
+        """A handle that was stopped short takes its sliders along."""
+        for handle in self.picture.handles:
+            x, y = handle["at"]
+            if handle["along"] is None and y is not None:
+                for name, (a, b, *c) in handle["set"].items():
+                    self.controls[name].value = snap(self.controls[name], a * x + b * y + sum(c))
+
+    def _send(self, **question) -> None:
+        if self._watched:
+            places = {k: v if isinstance(v, (int, float, str)) else str(v) for k, v in self.values.items()}
+            said = {"numbers": list(self.numbers.items()), "problem": self.problem, "sentence": self.sentence}
+            self._post({"kind": "picture", "places": places, "code": self.code, **said, **question}, self.picture.marks)
+
+    def _post(self, message: dict, marks) -> None:
+        header, buffers = encode(self.picture, marks, self._told)
+        self.canvas.send(message | header, buffers)
+
+    def stored(self) -> dict:
+        """The picture and its words as a MIME bundle, for readers without a kernel."""
+        said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
+        picture, kind = self.png, "png"
+        bundle = {"image/png": base64.b64encode(picture).decode(), "text/plain": "\n".join([repr(self), *said])}
+        if features.check("webp"):
+            file, kind = io.BytesIO(), "webp"
+            Image.open(io.BytesIO(picture)).convert("RGB").save(file, "WEBP", quality=80)
+            picture = file.getvalue()
+        source = f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
+        words = html.escape(self.sentence, quote=True)
+        bundle["text/html"] = f'<img class="rapkm-stored" alt="{words}" src="{source}">{_ALONE}'
+        return bundle
+
+    def _ipython_display_(self, **kwargs) -> None:
+        """Two outputs: the stored picture, and the widget, which hides it as soon as a kernel has answered."""
+        from IPython.display import display
+
+        display(self.stored(), raw=True)
+        display(self.widget)
+
+    def __repr__(self):
+        setting = ", ".join(f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}" for k, v in self.values.items())
+        return f"Explorer({self.name}: {setting})"
+
+
+class _Shown(widgets.VBox):
+    """A box whose text is short where nothing but text can be shown."""
+
+    def __repr__(self):
+        return "Explorer"

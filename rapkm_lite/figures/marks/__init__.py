@@ -1,0 +1,13 @@
+"""Pictures as recorded marks, for two renderers: a canvas in the page and, for stored pictures, Matplotlib.
+
+>>> picture = Picture({"a": {"xlabel": "time in s"}})
+>>> picture.line("a", [0, 1], [0, 2], color="#004488")
+>>> [mark.kind for mark in picture.marks]
+['line']
+"""
+
+from .encode import decode, encode, scene
+from .palette import Palette
+from .parts import bars, draw_machine, draw_workspace, drive_legend, offset_values, pair_legend, per_drive
+from .picture import Picture
+from .stored import figure, png

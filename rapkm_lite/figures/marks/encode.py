@@ -1,0 +1,86 @@
+"""Marks as a message for the canvas: a header for JSON and one buffer of 32-bit numbers, and back for the tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .palette import Palette, canvas_style
+from .picture import Mark, Picture
+
+
+def scene(picture: Picture) -> dict:
+    """What the canvas must know once: panels, their places and labels."""
+    plain = {
+        name: {k: v if isinstance(v, str) else np.asarray(v).tolist() for k, v in panel.items()}
+        for name, panel in picture.panels.items()
+    }
+    return {"panels": plain, "layout": picture.layout, "widths": picture.widths, "size": picture.size}
+
+
+def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list[bytes]]:
+    """Header and buffers of `marks` with the frames and handles of the picture.
+
+    known : what the other side has been told; styles and maps that are in it are not sent again.  A mark is
+    [kind, panel, style, count of points, words?]; the points of all marks follow each other in the first buffer, the
+    values of new maps stand in the others.
+    """
+    styles: dict[int, dict] = {}
+    images, buffers, parts, rows = {}, [], [], []
+
+    def style_of(kind: str, style: dict) -> int:
+        key = (kind, tuple(style.items()))
+        if key not in known:
+            known[key] = len(known)
+            styles[known[key]] = canvas_style(*key)
+        return known[key]
+
+    for mark in marks:
+        row = [mark.kind, mark.panel, None, len(mark.data)]
+        if mark.kind == "legend":
+            row.append([[words, style_of("line", style)] for words, style in mark.words])
+        elif mark.kind == "scale":
+            row.append([_colours(mark.words[0]), mark.words[1]])
+        else:
+            row[2] = style_of(mark.kind, mark.style)
+        if mark.kind == "image":
+            values, extent, palette = mark.words
+            key = ("image", id(values))
+            if key not in known:
+                # The array is kept with its number, which is its own only as long as it lives.
+                known[key] = (len(known), values)
+                filled = np.ma.filled(np.ma.asarray(values, dtype=np.float32), np.nan)
+                images[known[key][0]] = [*filled.shape, *extent]
+                buffers.append(filled.astype("<f4").tobytes())
+            row.append([known[key][0], _colours(palette)])
+        elif mark.kind in ("label", "words", "title"):
+            row.append(mark.words)
+        rows.append(row)
+        parts.append(mark.data.ravel())
+    handles = []
+    for handle in picture.handles:
+        entry = {"panel": handle["panel"], "at": [None if v is None else float(v) for v in handle["at"]]}
+        if handle["along"] is None:
+            entry["set"] = {k: [float(v) for v in (*values, 0.0)[:3]] for k, values in handle["set"].items()}
+        else:
+            entry["set"], entry["along"] = dict.fromkeys(handle["set"]), len(handle["along"])
+            parts += [np.ravel(handle["along"]), *map(np.ravel, handle["set"].values())]
+        if handle["grip"] is not None:
+            entry["grip"] = np.asarray(handle["grip"], dtype=float).tolist()
+        handles.append(entry)
+    numbers = np.concatenate(parts) if parts else np.empty(0)
+    header = {"marks": rows, "styles": styles, "images": images, "frames": picture.frames, "handles": handles}
+    return header, [numbers.astype("<f4").tobytes(), *buffers]
+
+
+def decode(header: dict, buffers: list[bytes], styles: dict) -> list[tuple]:
+    """The marks of a message as (kind, panel, style, numbers (k, 2)); new styles are added to `styles`."""
+    styles |= header["styles"]
+    numbers, marks, at = np.frombuffer(buffers[0], "<f4"), [], 0
+    for kind, panel, style, count, *_ in header["marks"]:
+        marks.append((kind, panel, styles.get(style), numbers[at : at + 2 * count].reshape(-1, 2)))
+        at += 2 * count
+    return marks
+
+
+def _colours(palette: Palette) -> dict:
+    return {"levels": palette.levels, "light": palette.light, "dark": palette.dark}

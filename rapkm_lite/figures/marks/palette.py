@@ -1,0 +1,99 @@
+"""Colours of a map in classes, and the styles that marks may have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
+
+LINE = {
+    "color",
+    "linewidth",
+    "linestyle",
+    "alpha",
+    "zorder",
+    "marker",
+    "markersize",
+    "markerfacecolor",
+    "markeredgewidth",
+    "solid_capstyle",
+}
+PATCH = {"facecolor", "edgecolor", "linewidth", "linestyle", "alpha", "zorder", "fill"}
+WORDS = {"color", "fontsize", "fontweight", "ha", "va", "alpha", "zorder"}
+STYLES = {"line": LINE, "bar": PATCH, "polygon": PATCH, "label": WORDS, "words": WORDS, "title": WORDS - {"ha", "va"}}
+STYLES |= {"image": {"zorder"}}
+MARKERS = ("o", "s", "D", "x", "+")
+_DASHES = {"-": (), "solid": (), "--": (3.7, 1.6), ":": (1.0, 1.65), "-.": (6.4, 1.6, 1.0, 1.6), "none": None, "": None}
+_ORDER = {"image": 0.0, "bar": 1.0, "polygon": 1.0, "line": 2.0}
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Classes of a map: one colour between each two neighbouring `levels`, for white paper and for a dark theme.
+
+    >>> Palette((0.0, 1.0, 2.0), ("#888888", "#EEEEEE"), ("#777777", "#333333")).classes
+    2
+    """
+
+    levels: tuple[float, ...]
+    light: tuple[str, ...]
+    dark: tuple[str, ...]
+
+    def __post_init__(self):
+        if not len(self.light) == len(self.dark) == len(self.levels) - 1:
+            raise ValueError(
+                f"{len(self.light)} light and {len(self.dark)} dark colours for {len(self.levels)} levels; "
+                "allowed: one colour of each kind between neighbouring levels"
+            )
+
+    @property
+    def classes(self) -> int:
+        """Number of colours."""
+        return len(self.light)
+
+    def matplotlib(self) -> dict:
+        """The keywords ``cmap`` and ``norm`` of the light colours."""
+        return {"cmap": ListedColormap(self.light), "norm": BoundaryNorm(self.levels, self.classes)}
+
+
+def checked(kind: str, style: dict) -> dict:
+    """The style as it is; raises ValueError for a keyword or a word that the canvas does not know."""
+    allowed = STYLES[kind]
+    unknown = sorted(set(style) - allowed)
+    if unknown:
+        raise ValueError(f"{kind} has no style {unknown[0]!r}; allowed: {', '.join(sorted(allowed))}")
+    if style.get("marker", "o") not in MARKERS:
+        raise ValueError(f"marker = {style['marker']!r}; allowed: {', '.join(MARKERS)}")
+    line = style.get("linestyle", "-")
+    if line not in _DASHES and not isinstance(line, tuple):
+        raise ValueError(f"linestyle = {line!r}; allowed: {', '.join(map(repr, _DASHES))} or (0, (on, off, ...))")
+    return style
+
+
+@lru_cache(maxsize=2048)
+def canvas_style(kind: str, items: tuple) -> dict:
+    """What the canvas needs of a style given as (keyword, value) pairs; lengths in points."""
+    style = dict(items)
+    out = {"z": style.get("zorder", _ORDER.get(kind, 3.0)), "alpha": style.get("alpha", 1.0)}
+    line = style.get("linestyle", "-")
+    dash = line[1] if isinstance(line, tuple) else _DASHES[line]
+    if kind == "line":
+        colour = to_hex(style.get("color", "#222222"))
+        out |= {"color": colour, "width": 0.0 if dash is None else style.get("linewidth", 1.7), "dash": dash or ()}
+        out |= {"cap": style.get("solid_capstyle", "butt"), "marker": style.get("marker"), "size": 6.0}
+        face = style.get("markerfacecolor", colour)
+        out |= {"face": to_hex(face), "edge": style.get("markeredgewidth", 1.0), "size": style.get("markersize", 6.0)}
+    elif kind in ("bar", "polygon"):
+        face = style.get("facecolor", "#222222") if style.get("fill", True) else "none"
+        edge = style.get("edgecolor", "none")
+        out |= {"face": None if face == "none" else to_hex(face), "color": None if edge == "none" else to_hex(edge)}
+        out |= {"width": style.get("linewidth", 1.0), "dash": dash or ()}
+    elif kind != "image":
+        out |= {"color": to_hex(style.get("color", "#222222")), "size": style.get("fontsize", 10.5)}
+        out |= {
+            "bold": style.get("fontweight") == "bold",
+            "ha": style.get("ha", "left"),
+            "va": style.get("va", "baseline"),
+        }
+    return out

@@ -1,0 +1,84 @@
+"""Marks that several pictures share: the machine, its workspace, bars per drive, legends."""
+
+from __future__ import annotations
+
+import numpy as np
+from contourpy import contour_generator
+
+from ...mechanics.actuation import drive_pairs
+from ...mechanics.maps import sampling_box
+from ..machine import arm_points
+from ..maps import pair_line, pair_name
+from ..style import NEUTRAL, arm_colour, arm_line
+
+
+def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -> None:
+    """The arms at one pose q (2N,): filled circles are drives with their numbers, open ones passive joints."""
+    chains = arm_points(robot, q)
+    open_joint = {"markersize": 6.5, "markerfacecolor": "white", "markeredgewidth": 2}
+    for i in range(robot.n_arms) if arms is None else arms:
+        colour, points = arm_colour(i), chains[i]
+        picture.line(panel, *points.T, color=colour, linewidth=4, solid_capstyle="round", zorder=3)
+        picture.line(panel, *points[0], color=colour, marker="o", markersize=10 + 5 * names, zorder=4)
+        picture.line(panel, *points[1], color=colour, marker="o", zorder=4, **open_joint)
+        if names:
+            look = {"color": "white", "fontsize": 9, "fontweight": "bold", "ha": "center", "va": "center", "zorder": 5}
+            picture.text(panel, *points[0], str(i + 1), **look)
+    tip = {"marker": "s", "markersize": 7, "markerfacecolor": "white", "markeredgewidth": 1.8}
+    picture.line(panel, *chains[0, 2], color=NEUTRAL, zorder=7, **tip)
+
+
+def workspace_outline(robot, n: int = 161) -> np.ndarray:
+    """Rings (k, 2) in m around the points that all arms reach, separated by rows of NaN."""
+    left, right, low, high = sampling_box(robot)
+    wide, tall = 0.01 * (right - left), 0.01 * (high - low)
+    x, y = np.linspace(left - wide, right + wide, n), np.linspace(low - tall, high + tall, n)
+    reach = np.linalg.norm(np.stack(np.meshgrid(x, y), axis=-1)[..., None, :] - robot.base, axis=-1)
+    l1, l2 = robot.lengths.T
+    inner = np.abs(l1 - l2)
+    # Arms of equal links reach their own base, a single point that would only dent the outline.
+    room = np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
+    rings = contour_generator(x, y, room).lines(0.0)
+    return np.concatenate([part for ring in rings for part in (ring, [[np.nan, np.nan]])])[:-1]
+
+
+def draw_workspace(picture, panel: str, robot, colour: str = "#EEF2F6") -> None:
+    """Shade the points that all arms reach."""
+    look = {"facecolor": colour, "edgecolor": NEUTRAL, "linewidth": 0.8}
+    picture.polygon(panel, workspace_outline(robot), zorder=0.2, **look)
+
+
+def drive_legend(picture, panel: str, robot, words: str = "drive") -> None:
+    """A legend of the arms' colours."""
+    names = [f"{words} {i + 1}" if i == 0 else str(i + 1) for i in range(robot.n_arms)]
+    picture.legend(panel, [(name, arm_line(i)) for i, name in enumerate(names)])
+
+
+def pair_legend(picture, panel: str, robot) -> None:
+    """A legend of the first pairs' lines."""
+    pairs = drive_pairs(robot)[:4]
+    picture.legend(panel, [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)])
+
+
+def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") -> None:
+    """Two or more bars per drive with their numbers; groups are (values per drive, keywords of the bar)."""
+    for k, (values, style) in enumerate(groups):
+        for i, value in enumerate(values):
+            at = i + 1 + (k - (len(groups) - 1) / 2) * width
+            picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
+            words = format(value + 0.0, form).replace("-", "−")
+            picture.text(panel, at, value, words, ha="center", fontsize=9, va="bottom" if value >= 0 else "top")
+
+
+def per_drive(values, digits: int) -> str:
+    """Numbers of all drives in one text, without a negative zero.
+
+    >>> per_drive([0.25, -0.001], 2)
+    '0.25 / 0.00'
+    """
+    return " / ".join(f"{np.round(v, digits) + 0.0:.{digits}f}" for v in values)
+
+
+def offset_values(values: dict, n: int) -> np.ndarray:
+    """The offsets (n,) in rad from the settings offset_1, offset_2, ... in mrad."""
+    return 1e-3 * np.array([values[f"offset_{i + 1}"] for i in range(n)])

@@ -1,0 +1,184 @@
+"""A picture as recorded marks: what a draw function says, without saying who paints it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .palette import Palette, checked
+
+# Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
+PANEL = {"title", "xlabel", "ylabel", "xlim", "ylim", "aspect", "xticks", "yticks", "yscale", "small"}
+
+
+class Mark(NamedTuple):
+    """One recorded mark: its numbers (k, 2), its style by Matplotlib's keywords, its words."""
+
+    kind: str
+    panel: str
+    data: np.ndarray
+    style: dict
+    words: Any = ""
+
+
+class Picture:
+    """Named panels and the marks that a draw function puts into them at every step.
+
+    panels : name -> keywords of ``Axes.set``: xlabel, ylabel, title, xlim, ylim, aspect, xticks, yticks, yscale.
+    layout : rows of panel names as in ``Figure.subplot_mosaic``; default one row.
+    widths : relative widths of the columns.  size : inches, their ratio is that of the picture.
+    setup : function of the picture that draws once what never changes (workspace, legend).
+    Raises ValueError for an unknown keyword of a panel, KeyError for an unknown panel.
+
+    >>> picture = Picture({"a": {"ylim": (0, 2)}})
+    >>> picture.line("a", [0, 1], [0, 2], colour="red")
+    Traceback (most recent call last):
+    ValueError: line has no style 'colour'; allowed: alpha, color, linestyle, linewidth, marker, markeredgewidth, ...
+    """
+
+    def __init__(self, panels: dict, layout=None, widths=None, size=(9.4, 3.3), setup=None):
+        for name, settings in panels.items():
+            unknown = sorted(set(settings) - PANEL)
+            if unknown:
+                raise ValueError(f"panel {name!r} has no {unknown[0]!r}; allowed: {', '.join(sorted(PANEL))}")
+        self.panels = {name: dict(settings) for name, settings in panels.items()}
+        self.layout = [list(row) for row in layout or [list(panels)]]
+        self.widths = list(widths or [1] * len(self.layout[0]))
+        self.size = tuple(size)
+        self.frames = {k: [*p.get("xlim", (0, 1)), *p.get("ylim", (0, 1))] for k, p in panels.items()}
+        self.begin()
+        if setup is not None:
+            setup(self)
+        self.fixed = self.marks
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what the last step drew."""
+        self.marks: list[Mark] = []
+        self.handles: list[dict] = []
+
+    def line(self, panel: str, x, y, **style) -> None:
+        """A curve, or markers with ``linestyle="none"``; a gap where a number is not finite."""
+        data = np.stack(np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y)), -1)
+        self._add("line", panel, data, checked("line", style))
+
+    def trace(self, panel: str, t, y, points: int = 300, **style) -> None:
+        """A curve over time, thinned to the least and largest value in each of `points` spans."""
+        t, y = np.asarray(t), np.asarray(y)
+        span = len(t) // points
+        if span > 2:
+            count = len(t) // span * span
+            blocks = y[:count].reshape(-1, span)
+            low, high = blocks.argmin(axis=1), blocks.argmax(axis=1)
+            start = np.arange(0, count, span)
+            ends = np.stack([start + np.minimum(low, high), start + np.maximum(low, high)], -1)
+            keep = np.concatenate([ends.ravel(), [len(t) - 1]])
+            t, y = t[keep], y[keep]
+        self.line(panel, t, y, **style)
+
+    def text(self, panel: str, x: float, y: float, words: str, inside: bool = False, **style) -> None:
+        """Words at (x, y) in data coordinates, or in fractions of the panel when `inside`."""
+        kind = "words" if inside else "label"
+        self._add(kind, panel, np.array([[x, y]], dtype=float), checked(kind, style), words)
+
+    def title(self, panel: str, words: str, **style) -> None:
+        """Words above the panel, in place of its title."""
+        self._add("title", panel, np.empty((0, 2)), checked("title", style), words)
+
+    def bar(self, panel: str, at: float, height: float, width: float = 0.8, **style) -> None:
+        """A bar from zero, centred at `at`."""
+        left, right = at - width / 2, at + width / 2
+        corners = np.array([[left, 0.0], [right, 0.0], [right, height], [left, height]])
+        self._add("bar", panel, corners, checked("bar", style))
+
+    def polygon(self, panel: str, points, **style) -> None:
+        """A closed polygon through points (k, 2); rows that are not finite begin another ring."""
+        self._add("polygon", panel, np.asarray(points, dtype=float), checked("polygon", style))
+
+    def arrow(self, panel: str, start, vector, width: float = 0.006, **style) -> None:
+        """An arrow from `start` (2,) along `vector` (2,), in data coordinates; nothing when shorter than `width`."""
+        start, vector = np.asarray(start, dtype=float), np.asarray(vector, dtype=float)
+        length = float(np.hypot(*vector))
+        checked("polygon", style)
+        if length > width:
+            along = vector / length
+            side = np.array([-along[1], along[0]])
+            neck = length - min(4 * width, 0.6 * length)
+            ways = [(0, 0.5), (neck, 0.5), (neck, 1.6), (length, 0), (neck, -1.6), (neck, -0.5), (0, -0.5)]
+            self.polygon(panel, [start + s * along + w * width * side for s, w in ways], **style)
+
+    def image(self, panel: str, values, extent, palette: Palette, clip=None, **style) -> None:
+        """A map of values (rows, columns) over extent (x0, x1, y0, y1), in the classes of `palette`.
+
+        clip : a polygon (k, 2) outside of which nothing is painted.  Keep the array: a map is sent once as long as the
+        same array is given.
+        """
+        outline = np.empty((0, 2)) if clip is None else np.asarray(clip, dtype=float)
+        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))
+
+    def legend(self, panel: str, entries) -> None:
+        """A legend above the panel; entries are (words, keywords of a line)."""
+        words = [(words, checked("line", {"linewidth": 2, **style})) for words, style in entries]
+        self._add("legend", panel, np.empty((0, 2)), {}, words)
+
+    def scale(self, panel: str, palette: Palette, label: str) -> None:
+        """The colours of a map with their levels, beside the panel."""
+        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))
+
+    def handle(self, panel: str, x, y, /, along=None, grip=None, **controls) -> None:
+        """A point of the picture that can be taken by hand and moves controls.
+
+        x, y : where it is; ``y=None``: a line over the whole height that is pushed to the left and right.
+        controls : name -> (a, b, c) with value = a x + b y + c, c may be missing; with `along`, points (k, 2) of a
+        curve that the handle cannot leave, name -> the value at each point.
+        grip : two points (2, 2); the line between them takes hold of the handle too.
+        """
+        self._check(panel)
+        for name, values in controls.items():
+            if along is None and len(values) not in (2, 3):
+                raise ValueError(f"{name} = {values!r}; allowed: (a, b) or (a, b, c), with value = a x + b y + c")
+            if along is not None and len(values) != len(along):
+                raise ValueError(f"{name} has {len(values)} values for {len(along)} points; allowed: one for each")
+        self.handles.append(
+            {"panel": panel, "at": (x, y), "set": controls, "along": along, "grip": grip},
+        )
+
+    def limits(self, panel: str, x=None, y=None) -> None:
+        """Set the limits of a panel."""
+        self._check(panel)
+        frame = self.frames[panel]
+        frame[:2] = x if x is not None else frame[:2]
+        frame[2:] = y if y is not None else frame[2:]
+
+    def xlim(self, panel: str) -> tuple[float, float]:
+        """The horizontal limits of a panel."""
+        self._check(panel)
+        return tuple(self.frames[panel][:2])
+
+    def ylim(self, panel: str) -> tuple[float, float]:
+        """The vertical limits of a panel."""
+        self._check(panel)
+        return tuple(self.frames[panel][2:])
+
+    def fit(self, panel: str, *values, symmetric: bool = True, least: float = 1e-9, most: float = np.inf) -> None:
+        """Vertical limits that hold all `values`, in steps of 1, 1.5, 2, 3, 5, 7 so that they seldom change.
+
+        The limits shrink only when the values fill less than half of them; they do not grow beyond `most`.
+        """
+        largest = max(least, *(float(np.max(np.abs(v))) for v in values if np.size(v)))
+        low, now = self.ylim(panel)
+        largest = min(largest, most / 1.05)
+        if not 0.45 * now <= 1.05 * largest <= now or (symmetric and low != -now):
+            decade = 10.0 ** np.floor(np.log10(1.05 * largest))
+            steps = (1, 1.5, 2, 3, 5, 7, 10)
+            now = float(next(s * decade for s in steps if s * decade >= 1.05 * largest * (1 - 1e-12)))
+        self.limits(panel, y=(-now if symmetric else 0.0, now))
+
+    def _check(self, panel: str) -> None:
+        if panel not in self.panels:
+            raise KeyError(f"there is no panel {panel!r}; allowed: {', '.join(self.panels)}")
+
+    def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words="") -> None:
+        self._check(panel)
+        self.marks.append(Mark(kind, panel, data, style, words))

@@ -1,0 +1,121 @@
+"""A recorded picture painted by Matplotlib: the one that is stored in a notebook, and exports."""
+
+from __future__ import annotations
+
+import io
+import re
+import textwrap
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+from PIL import Image
+
+from ..style import ALARM, STYLE
+from .picture import Mark, Picture
+
+_RC = mpl.rc_params_from_file(STYLE, use_default_template=False)
+
+
+def mathtext(words: str) -> str:
+    r"""Words with K_P as Matplotlib's true subscript.
+
+    >>> print(mathtext("K_P 1 in N m/rad"))
+    $\mathrm{K}_{\mathrm{P}}$ 1 in N m/rad
+    """
+    return re.sub(r"([^\W_]+)_(\w+)", r"$\\mathrm{\1}_{\\mathrm{\2}}$", words)
+
+
+def figure(picture: Picture, problem: str = "") -> Figure:
+    """A Matplotlib figure of the picture; `problem` is a sentence in its middle."""
+    with mpl.rc_context(_RC):
+        made = Figure(figsize=picture.size, dpi=96, layout="constrained")
+        FigureCanvasAgg(made)
+        axes = made.subplot_mosaic(picture.layout, width_ratios=picture.widths)
+        for name, ax in axes.items():
+            settings = {k: v for k, v in picture.panels[name].items() if k != "small"}
+            settings |= {k: mathtext(settings[k]) for k in ("title", "xlabel", "ylabel") if k in settings}
+            frame = picture.frames[name]
+            ax.set(**settings | {"xlim": frame[:2], "ylim": frame[2:]})
+            ax.set_autoscale_on(False)
+        for mark in [*picture.fixed, *picture.marks]:
+            _PAINT[mark.kind](axes[mark.panel], mark)
+        if problem:
+            box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
+            words = textwrap.fill(problem, int(8.5 * picture.size[0]))
+            made.text(0.5, 0.5, words, ha="center", va="center", color=ALARM, fontsize=11.5, zorder=100, bbox=box)
+    return made
+
+
+def png(picture: Picture, problem: str = "", dpi: float = 144) -> bytes:
+    """The picture as a PNG of 256 colours."""
+    drawn = figure(picture, problem)
+    file = io.BytesIO()
+    with mpl.rc_context(_RC):
+        drawn.savefig(file, dpi=dpi)
+    image = Image.open(file).convert("RGB").quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    file = io.BytesIO()
+    image.save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _line(ax, mark: Mark) -> None:
+    ax.add_line(Line2D(*mark.data.T, **mark.style))
+
+
+def _path(points: np.ndarray) -> Path:
+    """Closed rings, separated by rows that are not finite."""
+    breaks = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    rings = [r[np.isfinite(r).all(axis=1)] for r in np.split(points, breaks)]
+    return Path.make_compound_path(*(Path(np.vstack([r, r[:1]]), closed=True) for r in rings if len(r)))
+
+
+def _patch(ax, mark: Mark) -> None:
+    ax.add_patch(PathPatch(_path(mark.data), **{"edgecolor": "none", **mark.style}))
+
+
+def _words(ax, mark: Mark) -> None:
+    where = {"transform": ax.transAxes} if mark.kind == "words" else {"clip_on": True}
+    ax.text(*mark.data[0], mathtext(mark.words), **where, **mark.style)
+
+
+def _title(ax, mark: Mark) -> None:
+    ax.set_title(mathtext(mark.words), **mark.style)
+
+
+def _image(ax, mark: Mark) -> None:
+    values, extent, palette = mark.words
+    drawn = ax.imshow(values, origin="lower", extent=extent, **palette.matplotlib(), **{"zorder": 0, **mark.style})
+    ax.set(aspect="equal")
+    if len(mark.data):
+        drawn.set_clip_path(_path(mark.data), ax.transData)
+
+
+def _legend(ax, mark: Mark) -> None:
+    handles = [Line2D([], [], **style) for _, style in mark.words]
+    words = [mathtext(words) for words, _ in mark.words]
+    spacing = {"handlelength": 1.7, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
+    ax.legend(handles, words, ncols=len(words), loc="lower right", bbox_to_anchor=(1, 1), **spacing)
+
+
+def _scale(ax, mark: Mark) -> None:
+    palette, label = mark.words
+    ax.figure.colorbar(ScalarMappable(**palette.matplotlib()), ax=ax, shrink=0.85, pad=0.02, label=mathtext(label))
+
+
+_PAINT = {
+    "line": _line,
+    "bar": _patch,
+    "polygon": _patch,
+    "label": _words,
+    "words": _words,
+    "title": _title,
+    "image": _image,
+    "legend": _legend,
+    "scale": _scale,
+}
