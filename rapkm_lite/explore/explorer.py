@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import inspect
-import io
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -14,9 +11,8 @@ from pathlib import Path
 import anywidget
 import ipywidgets as widgets
 import traitlets
-from PIL import Image, features
 
-from ..figures.marks import Picture, encode, png, scene
+from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
@@ -27,11 +23,6 @@ HERE = Path(__file__).parent
 PATIENCE = 0.3
 # Older front ends, like Colab's, queue what a dragged slider sends.
 _CONTINUOUS = COMPILED and int(widgets.__version__.split(".")[0]) >= 8
-# Where no kernel runs the stored picture stands alone, without the line that says that a widget is missing.
-_ALONE = (
-    "<style>.jp-OutputArea-child:has(.rapkm-stored) + .jp-OutputArea-child:has(.jupyter-widgets)"
-    ":not(:has(.rapkm, .noUi-target, button, input, select)){display:none}</style>"
-)
 
 
 class Canvas(anywidget.AnyWidget):
@@ -205,9 +196,16 @@ class Explorer:
             self._held = False
 
     def _changed(self, change) -> None:
-        if not self._held:
-            self._step()
-            self._send()
+        if self._held:
+            return
+        said, value = "", change["new"]
+        near = snap(change["owner"], value)
+        if not isinstance(value, str) and near != value and abs(near - value) > 1e-9 * abs(value):
+            said = f"{value:g} was rounded to {near:g}"
+            with self._quiet():
+                change["owner"].value = near
+        self._step()
+        self._send(note=said)
 
     def _step(self) -> None:
         """Update for the browser, where a mistake in the draw function would be seen by nobody."""
@@ -246,11 +244,11 @@ class Explorer:
                 for name, (a, b, *c) in handle["set"].items():
                     self.controls[name].value = snap(self.controls[name], a * x + b * y + sum(c))
 
-    def _send(self, **question) -> None:
+    def _send(self, **more) -> None:
         if self._watched:
             places = {k: v if isinstance(v, (int, float, str)) else str(v) for k, v in self.values.items()}
             said = {"numbers": list(self.numbers.items()), "problem": self.problem, "sentence": self.sentence}
-            self._post({"kind": "picture", "places": places, "code": self.code, **said, **question}, self.picture.marks)
+            self._post({"kind": "picture", "places": places, "code": self.code, **said, **more}, self.picture.marks)
 
     def _post(self, message: dict, marks) -> None:
         header, buffers = encode(self.picture, marks, self._told)
@@ -259,16 +257,7 @@ class Explorer:
     def stored(self) -> dict:
         """The picture and its words as a MIME bundle, for readers without a kernel."""
         said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
-        picture, kind = self.png, "png"
-        bundle = {"image/png": base64.b64encode(picture).decode(), "text/plain": "\n".join([repr(self), *said])}
-        if features.check("webp"):
-            file, kind = io.BytesIO(), "webp"
-            Image.open(io.BytesIO(picture)).convert("RGB").save(file, "WEBP", quality=80)
-            picture = file.getvalue()
-        source = f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
-        words = html.escape(self.sentence, quote=True)
-        bundle["text/html"] = f'<img class="rapkm-stored" alt="{words}" src="{source}">{_ALONE}'
-        return bundle
+        return {**bundle(self.png, self.sentence), "text/plain": "\n".join([repr(self), *said])}
 
     def _ipython_display_(self, **kwargs) -> None:
         """Two outputs: the stored picture, and the widget, which hides it as soon as a kernel has answered."""

@@ -5,19 +5,18 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from contourpy import contour_generator
 from scipy.ndimage import distance_transform_edt
 
 from ..figures.machine import arm_points, plane_limits
 from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
 from ..figures.marks import Palette, draw_machine, draw_workspace, drive_legend, pair_legend, per_drive
-from ..figures.marks.parts import workspace_outline
+from ..figures.marks.plane import clamped, singular_curves, workspace_outline
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
-from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
+from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
 from .controls import choice, slider
 from .explorer import Explorer, explorer
@@ -36,27 +35,6 @@ MAP = Palette(
 def frictionless(robot: Manipulator | None) -> Manipulator:
     """The given machine, or the testbed without friction."""
     return load().replace(friction=0.0) if robot is None else robot
-
-
-def clamped(robot: Manipulator, point) -> np.ndarray:
-    """The point (2,) in m, or the last one that all arms reach on the way to it from the middle of the drives."""
-    if reachable(robot, point):
-        return np.asarray(point)
-    start = robot.base.mean(axis=0)
-    low, high = 0.0, 1.0
-    for _ in range(40):
-        middle = (low + high) / 2
-        inside = reachable(robot, start + middle * (point - start))
-        low, high = (middle, high) if inside else (low, middle)
-    # A millimetre inside, where no arm is quite stretched.
-    return start + max(low - 1e-3 / np.linalg.norm(point - start), 0.0) * (point - start)
-
-
-def singular_curves(robot: Manipulator, mode=None) -> dict:
-    """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
-    x, y, inside, points = grid_points(robot, 161)
-    values = on_grid(inside, act.distal_cross_products(robot, inverse_kinematics(robot, points, mode)))
-    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(act.drive_pairs(robot))}
 
 
 def machine(robot: Manipulator | None = None) -> Explorer:
@@ -216,8 +194,8 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         size=(9.2, 6.6),
         setup=setup,
         live=True,
-        about="The machine at a place of its path; how well each pair of drives grips along the path, the components of "
-        "the null vector, and the forces that the drives and each pair can produce.",
+        about="The machine at a place of its path; how well each pair of drives grips along the path, the components "
+        "of the null vector, and the forces that the drives and each pair can produce.",
     )
 
 

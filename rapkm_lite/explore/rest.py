@@ -8,7 +8,7 @@ import numpy as np
 
 from ..control.laws import PD
 from ..figures.machine import plane_limits
-from ..figures.marks import bars, draw_machine, draw_workspace, drive_legend, offset_values, per_drive
+from ..figures.marks import bars, clamped, draw_machine, draw_workspace, drive_legend, offset_values, per_drive
 from ..figures.style import NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
@@ -18,14 +18,14 @@ from ..mechanics.trajectory import hold
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .geometry import TIME, clamped, frictionless
+from .geometry import TIME, frictionless
 
 
 def steady_state(robot: Manipulator | None = None) -> Explorer:
     """Offsets and gains of each drive: the error at rest of theory (14) beside a simulation that settles there."""
     robot = frictionless(robot)
     N = robot.n_arms
-    still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.0, 1e-3))
+    still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
         offset = offset_values(values, N)
@@ -68,7 +68,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     drives = {"xticks": range(1, N + 1), "xlabel": "drive", "xlim": (0.4, N + 0.6)}
     panels = {
         "plane": plane_limits(robot, 0.05),
-        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1)},
+        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
         "rest": {"ylabel": "error at rest in mrad", **drives},
         "torque": {"ylabel": "torque at rest in mN m", **drives},
     }

@@ -636,6 +636,7 @@ export function mount(el, scene, link) {
         return span;
       }),
     );
+    say(message.note ?? "");
     root.classList.add("live");
     paint();
     root.dataset.drawn = ++state.drawn;
@@ -717,15 +718,6 @@ export function mount(el, scene, link) {
       control.dataset.named = "";
     }
   }
-  const typed = ({ target }) => {
-    if (!target.classList?.contains("widget-readout")) return;
-    const before = target.textContent.trim();
-    setTimeout(() => {
-      const after = target.textContent.trim();
-      if (before !== after && Number(before) !== Number(after)) say(`${before} was rounded to ${after}`);
-    }, 200);
-  };
-  box?.addEventListener("focusout", typed, true);
 
   // Theme and size.  A new style sheet may come late, so colours are looked up again for a while.
   const look = () => {
@@ -753,7 +745,6 @@ export function mount(el, scene, link) {
       sizes.disconnect();
       dark.removeEventListener("change", look);
       window.removeEventListener("resize", paint);
-      box?.removeEventListener("focusout", typed, true);
       root.remove();
     },
     { say },

@@ -9,7 +9,7 @@ import numpy as np
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
 from ..figures.maps import pair_line, pair_name
-from ..figures.marks import draw_workspace, drive_legend, offset_values, pair_legend, per_drive
+from ..figures.marks import draw_workspace, drive_legend, offset_values, pair_legend, per_drive, singular_curves
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
@@ -17,7 +17,7 @@ from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .geometry import TIME, frictionless, singular_curves
+from .geometry import TIME, frictionless
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}

@@ -10,4 +10,5 @@ from .encode import decode, encode, scene
 from .palette import Palette
 from .parts import bars, draw_machine, draw_workspace, drive_legend, offset_values, pair_legend, per_drive
 from .picture import Picture
-from .stored import figure, png
+from .plane import clamped, singular_curves, workspace_outline
+from .stored import bundle, figure, png

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from contourpy import contour_generator
 
 from ...mechanics.actuation import drive_pairs
-from ...mechanics.maps import sampling_box
 from ..machine import arm_points
 from ..maps import pair_line, pair_name
 from ..style import NEUTRAL, arm_colour, arm_line
+from .plane import workspace_outline
 
 
 def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -> None:
@@ -26,20 +25,6 @@ def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -
             picture.text(panel, *points[0], str(i + 1), **look)
     tip = {"marker": "s", "markersize": 7, "markerfacecolor": "white", "markeredgewidth": 1.8}
     picture.line(panel, *chains[0, 2], color=NEUTRAL, zorder=7, **tip)
-
-
-def workspace_outline(robot, n: int = 161) -> np.ndarray:
-    """Rings (k, 2) in m around the points that all arms reach, separated by rows of NaN."""
-    left, right, low, high = sampling_box(robot)
-    wide, tall = 0.01 * (right - left), 0.01 * (high - low)
-    x, y = np.linspace(left - wide, right + wide, n), np.linspace(low - tall, high + tall, n)
-    reach = np.linalg.norm(np.stack(np.meshgrid(x, y), axis=-1)[..., None, :] - robot.base, axis=-1)
-    l1, l2 = robot.lengths.T
-    inner = np.abs(l1 - l2)
-    # Arms of equal links reach their own base, a single point that would only dent the outline.
-    room = np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
-    rings = contour_generator(x, y, room).lines(0.0)
-    return np.concatenate([part for ring in rings for part in (ring, [[np.nan, np.nan]])])[:-1]
 
 
 def draw_workspace(picture, panel: str, robot, colour: str = "#EEF2F6") -> None:

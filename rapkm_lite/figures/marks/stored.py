@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import html
 import io
 import re
 import textwrap
@@ -14,10 +16,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from PIL import Image
+from PIL import Image, features
 
 from ..style import ALARM, STYLE
 from .picture import Mark, Picture
+
+# Where no kernel runs the stored picture stands alone, without the line that says that a widget is missing.
+_ALONE = (
+    "<style>.jp-OutputArea-child:has(.rapkm-stored) + .jp-OutputArea-child:has(.jupyter-widgets)"
+    ":not(:has(.rapkm, .noUi-target, button, input, select)){display:none}</style>"
+)
+
 
 _RC = mpl.rc_params_from_file(STYLE, use_default_template=False)
 
@@ -62,6 +71,17 @@ def png(picture: Picture, problem: str = "", dpi: float = 144) -> bytes:
     file = io.BytesIO()
     image.save(file, "PNG", optimize=True)
     return file.getvalue()
+
+
+def bundle(picture: bytes, sentence: str) -> dict:
+    """A PNG as a MIME bundle: the picture for exports, and a smaller copy with `sentence` as its alternative text."""
+    file, kind = io.BytesIO(picture), "png"
+    if features.check("webp"):
+        image, file, kind = Image.open(file).convert("RGB"), io.BytesIO(), "webp"
+        image.save(file, "WEBP", quality=80)
+    source = f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+    shown = f'<img class="rapkm-stored" alt="{html.escape(sentence, quote=True)}" src="{source}">{_ALONE}'
+    return {"image/png": base64.b64encode(picture).decode(), "text/html": shown}
 
 
 def _line(ax, mark: Mark) -> None:

@@ -1,0 +1,47 @@
+"""The workspace as lines and points: its outline, its singular curves, the way back into it."""
+
+from __future__ import annotations
+
+import numpy as np
+from contourpy import contour_generator
+
+from ...machine.manipulator import Manipulator
+from ...mechanics.actuation import distal_cross_products, drive_pairs
+from ...mechanics.kinematics import inverse_kinematics, reachable
+from ...mechanics.maps import sampling_box
+from ..maps import grid_points, on_grid
+
+
+def workspace_outline(robot, n: int = 161) -> np.ndarray:
+    """Rings (k, 2) in m around the points that all arms reach, separated by rows of NaN."""
+    left, right, low, high = sampling_box(robot)
+    wide, tall = 0.01 * (right - left), 0.01 * (high - low)
+    x, y = np.linspace(left - wide, right + wide, n), np.linspace(low - tall, high + tall, n)
+    reach = np.linalg.norm(np.stack(np.meshgrid(x, y), axis=-1)[..., None, :] - robot.base, axis=-1)
+    l1, l2 = robot.lengths.T
+    inner = np.abs(l1 - l2)
+    # Arms of equal links reach their own base, a single point that would only dent the outline.
+    room = np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
+    rings = contour_generator(x, y, room).lines(0.0)
+    return np.concatenate([part for ring in rings for part in (ring, [[np.nan, np.nan]])])[:-1]
+
+
+def clamped(robot: Manipulator, point) -> np.ndarray:
+    """The point (2,) in m, or the last one that all arms reach on the way to it from the middle of the drives."""
+    if reachable(robot, point):
+        return np.asarray(point)
+    start = robot.base.mean(axis=0)
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        inside = reachable(robot, start + middle * (point - start))
+        low, high = (middle, high) if inside else (low, middle)
+    # A millimetre inside, where no arm is quite stretched.
+    return start + max(low - 1e-3 / np.linalg.norm(point - start), 0.0) * (point - start)
+
+
+def singular_curves(robot: Manipulator, mode=None) -> dict:
+    """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
+    x, y, inside, points = grid_points(robot, 161)
+    values = on_grid(inside, distal_cross_products(robot, inverse_kinematics(robot, points, mode)))
+    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(drive_pairs(robot))}
