@@ -10,6 +10,7 @@ from ...mechanics import actuation, antagonism
 from ...mechanics.kinematics import inverse_kinematics
 from ...simulation import energy
 from ..checker import Exercise
+from .lean_law import LEAN_LAW
 
 
 def _control_matrices(rng, count: int) -> np.ndarray:
@@ -262,4 +263,5 @@ EXERCISES = {
             "the torques are held between the samples: a sum, no trapezoidal rule": _trapezoids,
         },
     ),
+    "04.lean_law": LEAN_LAW,
 }

@@ -1,4 +1,4 @@
-"""Exercises of lesson 05: feedback map of CTC, explicit pseudoinverse (27), gain of the driven joints."""
+"""Exercises of lesson 05: feedback map of CTC, explicit pseudoinverse (27), a dead encoder, gain of driven joints."""
 
 from __future__ import annotations
 
@@ -7,39 +7,94 @@ import numpy as np
 from ...control.stability import effective_gain
 from ...machine.manipulator import load
 from ...mechanics.actuation import control_matrix, drive_pairs, redundant_control_matrix, weighted_pseudoinverse
-from ...mechanics.dynamics import forward_dynamics, minimal_dynamics, nullspace_projector, orthogonal_complement
+from ...mechanics.dynamics import (
+    forward_dynamics,
+    mass_matrix,
+    minimal_dynamics,
+    nullspace_projector,
+    orthogonal_complement,
+)
 from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.partition import explicit_pseudoinverse, select_independent
-from ..checker import Exercise
+from ..checker import Case, Exercise
+from .survivor import DEAD_ENCODER
 
 
-def _poses(rng, count: int) -> tuple:
-    robot = load().replace(friction=0.0)
-    return robot, inverse_kinematics(robot, rng.uniform(-0.08, 0.08, (count, 2)))
+def _machines() -> dict:
+    """Machines without friction by the words that a verdict has for them."""
+    files = {"three equal arms": "testbed", "unequal arms": "asymmetric", "four arms": "four_arms"}
+    return {words: load(name).replace(friction=0.0) for words, name in files.items()}
+
+
+def _poses(robot, rng, count: int) -> np.ndarray:
+    return inverse_kinematics(robot, rng.uniform(-0.06, 0.06, (count, 2)))
+
+
+def _minimal(robot, q, pair) -> tuple[np.ndarray, np.ndarray]:
+    """Control matrix and mass matrix in the angles of a pair, or for None of the end-effector."""
+    Gbar, _, _ = minimal_dynamics(robot, q, np.zeros(robot.n_joints), pair)
+    return control_matrix(robot, q, pair), Gbar
 
 
 def feedback_map(robot, q, pair) -> np.ndarray:
     """A (A^T A)^-1 Gbar (m, 2): torques per feedback acceleration of the angles of `pair`, in N m per rad/s^2."""
-    Gbar, _, _ = minimal_dynamics(robot, q, np.zeros(robot.n_joints), pair)
-    return weighted_pseudoinverse(control_matrix(robot, q, pair)) @ Gbar
+    A, Gbar = _minimal(robot, q, pair)
+    return weighted_pseudoinverse(A) @ Gbar
 
 
 def _pairs_at_poses(rng) -> list[tuple]:
-    robot, poses = _poses(rng, 6)
-    return [(robot, q, pair) for q, pair in zip(poses, 2 * drive_pairs(robot), strict=True)]
+    cases = []
+    for words, robot in _machines().items():
+        pairs = drive_pairs(robot)
+        some = [pairs[k] for k in (0, 1, -1)]
+        cases += [Case(words, robot, q, pair) for q, pair in zip(_poses(robot, rng, 3), some, strict=True)]
+    robot = load().replace(friction=0.0)
+    near = inverse_kinematics(robot, [0.1, -0.069])  # the links of drives 1 and 2 are parallel at x = 0.1013 m
+    return [*cases, Case("a pose near the curve of the pair", robot, near, (0, 1))]
 
 
 def _acceleration(Phi, robot, q, pair) -> tuple[float, str]:
-    """Equation (2) with multipliers, from rest: the torques Phi v must accelerate the pair by v."""
+    """Equation (2) with multipliers, from rest: the torques Phi v must change the acceleration of the pair by v."""
     still = np.zeros(robot.n_joints)
-    worst = max(np.abs(forward_dynamics(robot, q, still, Phi @ v)[0][list(pair)] - v).max() for v in np.eye(2))
+    falling = forward_dynamics(robot, q, still, np.zeros(robot.n_arms))[0]
+    gained = [forward_dynamics(robot, q, still, Phi @ v)[0] - falling for v in np.eye(2)]
+    worst = max(np.abs(a[list(pair)] - v).max() for a, v in zip(gained, np.eye(2), strict=True))
     return worst, "the multiplier form (2) answers 1 rad/s^2 of wanted acceleration with an error in rad/s^2 of"
 
 
+def _mapped(change):
+    """A wrong map from (A^T)^+ and Gbar in the angles of the pair and (A^T)^+ and Gbar of the end-effector."""
+
+    def wrong(robot, q, pair):
+        (A, Gbar), (A_x, G_x) = _minimal(robot, q, pair), _minimal(robot, q, None)
+        return change(weighted_pseudoinverse(A), Gbar, weighted_pseudoinverse(A_x), G_x)
+
+    return wrong
+
+
+def _two_drives(robot, q, pair):
+    Phi = np.zeros((robot.n_arms, 2))
+    Phi[list(pair)] = _minimal(robot, q, pair)[1]
+    return Phi
+
+
+def _without_inverse(robot, q, pair):
+    A, Gbar = _minimal(robot, q, pair)
+    return A @ Gbar
+
+
 def _partitions(rng) -> list[tuple]:
-    robot, poses = _poses(rng, 8)
-    A = redundant_control_matrix(robot, poses)
-    return list(zip(A, select_independent(A), strict=True))
+    cases, nudged = [], []
+    for words, robot in _machines().items():
+        A = redundant_control_matrix(robot, _poses(robot, rng, 3))
+        left, _, right = np.linalg.svd(A, full_matrices=False)
+        rounded = A + 1e-12 * left[..., 2:3] * right[..., 2:3, :]
+        for k, rows in enumerate(select_independent(A)):
+            cases.append(Case(words, A[k], rows))
+            nudged.append(Case("a matrix with rounding errors of 1e-12", rounded[k], rows))
+    robot = load()
+    A = redundant_control_matrix(robot, inverse_kinematics(robot, [0.01, 0.02]))
+    return [*cases, *nudged, *(Case("another order of rows", A, np.array(rows)) for rows in ((0, 2), (2, 0), (2, 1)))]
 
 
 def _penrose(X, A_tilde, rows) -> tuple[float, str]:
@@ -49,48 +104,218 @@ def _penrose(X, A_tilde, rows) -> tuple[float, str]:
     return max(np.abs(d).max() for d in defects), "the four Penrose conditions are violated by"
 
 
+def _blocks(change, sort=True):
+    """A wrong matrix from (A~_1^T)^+, B and the right bottom block; change -> (top, bottom)."""
+
+    def wrong(A_tilde, rows):
+        first, rest = list(rows), [i for i in range(len(A_tilde)) if i not in rows]
+        left = np.linalg.solve(A_tilde[first] @ A_tilde[first].T, A_tilde[first])
+        B = left @ A_tilde[rest].T
+        right = np.linalg.solve(np.eye(len(rest)) + B.T @ B, B.T @ left)
+        top, bottom = change(left, B, right, A_tilde[first])
+        if not sort:
+            return np.vstack([top, bottom])
+        result = np.empty_like(A_tilde)
+        result[first], result[rest] = top, bottom
+        return result
+
+    return wrong
+
+
+def _rows_for_inverse(A_tilde, rows):
+    """(27) with A~_1 where (A~_1^T)^+ belongs."""
+    first, rest = list(rows), [i for i in range(len(A_tilde)) if i not in rows]
+    B = A_tilde[first] @ A_tilde[rest].T
+    result = np.empty_like(A_tilde)
+    result[rest] = np.linalg.solve(np.eye(len(rest)) + B.T @ B, B.T @ A_tilde[first])
+    result[first] = A_tilde[first] - B @ result[rest]
+    return result
+
+
+def _driven(robot) -> np.ndarray:
+    return np.diag(np.repeat([1.0, 0.0], robot.n_arms))
+
+
+def _shares(robot, q) -> np.ndarray:
+    return np.linalg.eigvals(effective_gain(orthogonal_complement(robot, q), _driven(robot))).real
+
+
 def gain_for_bandwidth(robot, q, omega: float) -> float:
     """Gain K_P (1/s^2) of the driven joints alone whose slowest direction at the poses q (k, 2N) reaches omega^2."""
-    driven = np.diag(np.repeat([1.0, 0.0], robot.n_arms))
-    share = np.linalg.eigvals(effective_gain(orthogonal_complement(robot, q), driven)).real
-    return omega**2 / share.min()
+    return omega**2 / _shares(robot, q).min()
 
 
 def _bandwidths(rng) -> list[tuple]:
-    robot, poses = _poses(rng, 24)
-    speeds = rng.uniform(5.0, 40.0, 4)
-    return [(robot, q, omega) for q, omega in zip(poses.reshape(4, 6, -1), speeds, strict=True)]
+    return [
+        Case(words, robot, _poses(robot, rng, 6), float(omega))
+        for words, robot in _machines().items()
+        for omega in rng.uniform(5.0, 40.0, 2)
+    ]
 
 
 def _slowest(K, robot, q, omega) -> tuple[float, str]:
-    """N_J I_a N_J has the eigenvalues of the effective gain and four zeros, without any choice of q2."""
+    """N_J I_a N_J has the eigenvalues of the effective gain and zeros, without any choice of q2."""
     N_J = nullspace_projector(robot, q)
     slow = float(K) * np.linalg.eigvalsh(N_J[..., : robot.n_arms] @ N_J[..., : robot.n_arms, :])[..., -2].min()
     return abs(slow - omega**2), "the slowest direction along these poses misses omega^2, in 1/s^2, by"
 
 
+def _printed_gain(independent):
+    """(35) as printed, without (F^T F)^-1, in one choice of q2."""
+
+    def wrong(robot, q, omega):
+        F = orthogonal_complement(robot, q, independent)
+        return omega**2 / np.linalg.eigvalsh(F.mT @ _driven(robot) @ F).min()
+
+    return wrong
+
+
+def _line_2(robot, q, omega):
+    F, G = orthogonal_complement(robot, q), mass_matrix(robot, q)
+    gain = np.linalg.solve(F.mT @ G @ F, F.mT @ G @ _driven(robot) @ F)
+    return omega**2 / np.linalg.eigvals(gain).real.min()
+
+
+def _singular_value(robot, q, omega):
+    gain = effective_gain(orthogonal_complement(robot, q), _driven(robot))
+    return omega**2 / np.linalg.svd(gain, compute_uv=False).min()
+
+
 EXERCISES = {
     "05.feedback_map": Exercise(
         feedback_map,
-        "accelerations need forces by Gbar, forces need torques by (A^T)^+, both in the angles of the pair",
-        "N m per rad/s^2",
-        _pairs_at_poses,
-        _acceleration,
+        hints=(
+            "Look at (20) and change nothing but v_2. Which part of the law does it pass through?",
+            "A change of v_2 becomes a force by Gbar and torques by (A^T)^+, both in the angles of the same pair.",
+            "With A and Gbar of the pair: A @ np.linalg.solve(A.T @ A, Gbar).",
+        ),
+        unit="N m per rad/s^2",
+        cases=_pairs_at_poses,
+        invariant=_acceleration,
+        close=1e-3,
+        improve="solve with A^T A exactly, without a damping or a coarse difference",
+        mistakes={
+            "the inverse of A^T A is missing: A Gbar is not (A^T)^+ Gbar": _without_inverse,
+            "the factor Gbar is missing: (A^T)^+ alone takes forces to torques, not accelerations": _mapped(
+                lambda L, G, L_x, G_x: L
+            ),
+            "Gbar is that of the end-effector, A that of the pair: both must be in the angles of the pair (frame)": (
+                _mapped(lambda L, G, L_x, G_x: L @ G_x)
+            ),
+            "A is that of the end-effector, Gbar that of the pair: both must be in the angles of the pair (frame)": (
+                _mapped(lambda L, G, L_x, G_x: L_x @ G)
+            ),
+            "this is the map for accelerations of the end-effector: pass the pair to both functions (another frame)": (
+                _mapped(lambda L, G, L_x, G_x: L_x @ G_x)
+            ),
+            "Gbar is inverted: it takes accelerations to forces, its inverse does the opposite": _mapped(
+                lambda L, G, L_x, G_x: L @ np.linalg.inv(G)
+            ),
+            "only the two drives of the pair work here: (A^T)^+ shares the force among all drives": _two_drives,
+            "this is the map from torques to accelerations, the inverse of the wanted one": (
+                lambda robot, q, pair: np.linalg.pinv(feedback_map(robot, q, pair))
+            ),
+            "this is Gbar, the force; the torques need the factor (A^T)^+": _mapped(lambda L, G, L_x, G_x: G),
+        },
     ),
     "05.explicit_pseudoinverse": Exercise(
         explicit_pseudoinverse,
-        "with B = (A~_1^T)^+ A~_2^T first the bottom block, (I + B^T B)^-1 B^T (A~_1^T)^+; the top one is "
-        "(A~_1^T)^+ minus B times it; then put the rows into the order of the drives",
-        "(without unit)",
-        _partitions,
-        _penrose,
+        hints=(
+            "The two drives of rows can make any wrench alone. What do the others take over when the torques are to "
+            "be as short as possible?",
+            "The gradient of |y - B c_2|^2 + |c_2|^2 vanishes at (I + B^T B) c_2 = B^T y, and c_1 = y - B c_2, with "
+            "y = (A~_1^T)^+ w.",
+            "With L = np.linalg.solve(A1 @ A1.T, A1) and B = L @ A2.T: bottom = np.linalg.solve(I + B.T @ B, "
+            "B.T @ L), top = L - B @ bottom; result[rows] = top, the other rows = bottom.",
+        ),
+        unit="(without unit)",
+        cases=_partitions,
+        invariant=_penrose,
+        close=1e-3,
+        improve="solve the least-squares problem for c_2 exactly",
+        mistakes={
+            "the default cut-off of pinv takes rounding for a third direction and divides by it: its rank must be "
+            "given, or decided by rows": lambda A_tilde, rows: np.linalg.pinv(A_tilde.T),
+            "the blocks are stacked, A~_1 first: the rows stand in another order than the drives": _blocks(
+                lambda L, B, right, A1: (L - B @ right, right), sort=False
+            ),
+            "the drives outside rows are switched off: this is (A~_1^T)^+, with zeros for the rest": _blocks(
+                lambda L, B, right, A1: (L, 0 * right)
+            ),
+            "the identity is missing in (I + B^T B)^-1": _blocks(
+                lambda L, B, right, A1: (L - B @ np.linalg.pinv(B) @ L, np.linalg.pinv(B) @ L)
+            ),
+            "the top block is not reduced: what the other drives take over must be subtracted, c_1 = y - B c_2": (
+                _blocks(lambda L, B, right, A1: (L, right))
+            ),
+            "the top block has the wrong sign: c_1 = y - B c_2, not plus": _blocks(
+                lambda L, B, right, A1: (L + B @ right, right)
+            ),
+            "the factor B is missing in the top block, c_1 = y - B c_2": _blocks(
+                lambda L, B, right, A1: (L - right, right)
+            ),
+            "the inverse (I + B^T B)^-1 is missing in the bottom block": _blocks(
+                lambda L, B, right, A1: (L - B @ B.T @ L, B.T @ L)
+            ),
+            "the inverse of A~_1 A~_1^T is missing in (A~_1^T)^+": _rows_for_inverse,
+        },
     ),
     "05.gain_for_bandwidth": Exercise(
         gain_for_bandwidth,
-        "take effective_gain of the matrix that selects the driven joints at every pose, and its smallest eigenvalue",
-        "1/s^2",
-        _bandwidths,
-        _slowest,
+        hints=(
+            "The corrected (35) says which share of a gain acts. Which pose and which direction decide?",
+            "rk.effective_gain of the matrix that selects the driven joints, at every pose; its smallest eigenvalue "
+            "over all of them is the share that is left of K_P.",
+            "K_P times the smallest eigenvalue is omega^2: omega**2 / np.linalg.eigvals(gain).real.min().",
+        ),
+        unit="1/s^2",
+        cases=_bandwidths,
+        invariant=_slowest,
         tolerance=1e-6,
+        close=1e-3,
+        improve="take the eigenvalue itself instead of searching for the gain",
+        mistakes={
+            "the largest share is taken: this makes the fastest direction right; the smallest one is wanted": (
+                lambda robot, q, omega: omega**2 / _shares(robot, q).max()
+            ),
+            "the natural frequency goes with the square root of the gain: omega must be squared (a factor omega)": (
+                lambda robot, q, omega: omega / _shares(robot, q).min()
+            ),
+            "the share multiplies the gain, so omega^2 must be divided by it": (
+                lambda robot, q, omega: omega**2 * _shares(robot, q).min()
+            ),
+            "only the first pose counts here; the slowest of all poses is wanted": (
+                lambda robot, q, omega: omega**2 / _shares(robot, q[0]).min()
+            ),
+            "the mean over the poses is taken; the slowest of all is wanted": (
+                lambda robot, q, omega: omega**2 / _shares(robot, q).min(axis=1).mean()
+            ),
+            "the mean of both directions is taken; the slow one is wanted": (
+                lambda robot, q, omega: omega**2 / _shares(robot, q).mean(axis=1).min()
+            ),
+            "the fast direction of the worst pose is taken; the slow one is wanted": (
+                lambda robot, q, omega: omega**2 / _shares(robot, q).max(axis=1).min()
+            ),
+            "the factor (F^T F)^-1 is missing, as in the printed (35): the result depends on the coordinates": (
+                _printed_gain(None)
+            ),
+            "the factor (F^T F)^-1 is missing, as in the printed (35), here in the angles of drives 1 and 2": (
+                _printed_gain((0, 1))
+            ),
+            "this is the gain of line 2 of (32), with the mass matrix between": _line_2,
+            "singular values are taken for eigenvalues: those of the effective gain depend on the coordinates": (
+                _singular_value
+            ),
+            "this is the gain on all joints; on the driven joints alone only a share of it acts": (
+                lambda robot, q, omega: omega**2
+            ),
+            "the passive joints are selected, the complement of the driven ones": (
+                lambda robot, q, omega: omega**2 / (1 - _shares(robot, q)).min()
+            ),
+            "this is the natural frequency that omega^2 would leave, not the gain": (
+                lambda robot, q, omega: omega * np.sqrt(_shares(robot, q).min())
+            ),
+        },
     ),
+    "05.dead_encoder": DEAD_ENCODER,
 }

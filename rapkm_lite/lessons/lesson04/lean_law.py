@@ -1,0 +1,89 @@
+"""A design exercise: the lowest energy with unequal motors, judged in closed loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...control.laws import PD, AntagonismFilter
+from ...machine.manipulator import load
+from ...mechanics.trajectory import triangle
+from ...simulation.runs import SimulationError, simulate
+from ..checker import Exercise, Measured
+
+OFFSETS = ((4e-3, -2e-3, 5e-3), (-3e-3, -3e-3, -3e-3))
+ERROR, ENERGY = 2.0, 3.0  # mm, J
+
+
+def _machine():
+    return load().replace(friction=0.0, resistance=[0.3, 0.6, 2.4])
+
+
+def lean_law(robot):
+    """PD control behind the filter that weighs each torque by the heat it makes."""
+    W = robot.resistance / robot.torque_constant**2
+    return AntagonismFilter(PD(10.0, 0.27), W=W)
+
+
+def _runs(make) -> list[Measured]:
+    """The larger error and the larger bill of two runs with offsets that the law does not know."""
+    robot = _machine()
+    law, path = make(robot), triangle(robot, dt=2e-3)
+    error, energy = 0.0, 0.0
+    for offset in OFFSETS:
+        try:
+            run = simulate(robot, law, path, offset)
+        except SimulationError as lost:
+            if lost.__cause__ is not None:
+                raise
+            return [Measured(f"largest error (lost at {lost.time:.2f} s)", np.inf, "mm", ERROR)]
+        error = max(error, 1e3 * float(np.linalg.norm(run.x - path.x, axis=1).max()))
+        energy = max(energy, float(run.energy.sum()))
+        if energy > 2 * ENERGY or error > 2 * ERROR:
+            break
+    return [Measured("largest error", error, "mm", ERROR), Measured("energy", energy, "J", ENERGY)]
+
+
+def _filtered(test):
+    """True for a filter around something whose weights, one per drive, pass the test."""
+
+    def made(make) -> bool:
+        law = make(_machine())
+        return isinstance(law, AntagonismFilter) and test(law, law.W)
+
+    return made
+
+
+def _ratios(W) -> np.ndarray:
+    """The weights of the drives, relative to the first."""
+    diagonal = np.diag(W) if W.ndim == 2 else np.broadcast_to(W, 3)
+    return diagonal / diagonal[0]
+
+
+LEAN_LAW = Exercise(
+    lean_law,
+    hints=(
+        "Two things cost: the drives' quarrel, and torque in the hot motor that a cold one could give. What removes "
+        "the first, and what shifts the second?",
+        "Heat is R_el (c/k_t)^2 per drive: with these weights the filter looks for the least heat. And a gain decides "
+        "the error, hardly the bill.",
+        "rk.AntagonismFilter(rk.PD(10.0, 0.27), W=robot.resistance / robot.torque_constant**2).",
+    ),
+    judge=_runs,
+    close=0.03,
+    improve="try another gain: a stiffer loop follows closer, and under a filter it costs nothing",
+    mistakes={
+        "there is no filter: the drives pay for their quarrel (the antagonism is not removed)": (
+            lambda make: isinstance(make(_machine()), PD)
+        ),
+        "the filter believes the true pose, which no controller knows; take the measured one": _filtered(
+            lambda law, W: law.pose == "true"
+        ),
+        "the weights are forgotten: this filter makes c^2 small, not the heat R_el (c/k_t)^2 (W is missing)": (
+            _filtered(lambda law, W: isinstance(law.law, PD) and (W is None or np.ptp(_ratios(W)) < 1e-9))
+        ),
+        "the weights are upside down: the hot drive must be spared, its weight is the largest (inverse)": (
+            _filtered(lambda law, W: isinstance(law.law, PD) and W is not None and _ratios(W)[2] < 1.0)
+        ),
+    },
+    points=10,
+)

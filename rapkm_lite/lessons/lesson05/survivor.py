@@ -1,0 +1,96 @@
+"""A design exercise: a law that survives one dead encoder, judged in closed loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...control.computed_torque import CTC, RedundantAPD, RedundantCTC, SwitchedCTC
+from ...control.laws import PD, AntagonismFilter
+from ...machine.manipulator import load
+from ...mechanics.actuation import inverse_dynamics
+from ...mechanics.trajectory import triangle
+from ...simulation.faults import EncoderDropout
+from ...simulation.runs import SimulationError, simulate
+from ..checker import Exercise, Measured
+
+OFFSET = (4e-3, -2e-3, 5e-3)
+START, LIMIT = 0.75, 6.0  # s, mm
+
+
+def _model():
+    return load().replace(friction=0.0)
+
+
+def survivor(robot):
+    """Feed-forward torques, and PD feedback of those drives whose readings move."""
+
+    def law(t, q_a, qd_a, desired):
+        alive = (qd_a != 0.0) | ~np.any(qd_a)
+        feedback = 7.05 * (q_a - desired.q_a) + 0.225 * (qd_a - desired.qd_a)
+        return inverse_dynamics(robot, desired.q, desired.qd, desired.qdd) - alive * feedback
+
+    return law
+
+
+def _runs(make) -> list[Measured]:
+    """The largest distance from the path for each dead encoder; the machine has friction, the law's model none."""
+    law, path = make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)
+    found = []
+    for drive in range(3):
+        dead = EncoderDropout(drive, START, 10.0)
+        try:
+            run = simulate(load(), law, path, OFFSET, model=_model(), faults=[dead])
+            words, size = "", 1e3 * float(np.linalg.norm(run.x - path.x, axis=1).max())
+        except SimulationError as error:
+            if error.__cause__ is not None:
+                raise
+            words, size = f" (lost at {error.time:.2f} s)", np.inf
+        found.append(Measured(f"encoder {drive + 1} dead{words}: largest error", size, "mm", LIMIT))
+        if size > LIMIT:
+            break
+    return found
+
+
+def _blind(make) -> bool:
+    """True for a function that gives the same torques whatever the encoders read."""
+    law, desired = make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)[300]
+    given = [law(0.6, desired.q_a + error, desired.qd_a + 10 * error, desired) for error in (0.0, 0.01, -0.02)]
+    return bool(np.ptp(np.array(given, dtype=float), axis=0).max() < 1e-12)
+
+
+def _kind(*kinds):
+    return lambda make: isinstance(make(_model()), kinds)
+
+
+DEAD_ENCODER = Exercise(
+    survivor,
+    hints=(
+        "A frozen reading is a number like any other. What does it do that a moving drive never does?",
+        "Its rate is exactly zero while others move. Without that drive's error the feedback is weaker: which torques "
+        "can be known without any encoder?",
+        "alive = (qd_a != 0) | ~np.any(qd_a); c = rk.inverse_dynamics(robot, desired.q, desired.qd, desired.qdd) "
+        "- alive * (K_P * (q_a - desired.q_a) + K_D * (qd_a - desired.qd_a)).",
+    ),
+    unit="mm",
+    judge=_runs,
+    close=0.1,
+    improve="feed forward the torques of the motion, so that the feedback has less to do, or choose other gains",
+    mistakes={
+        "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
+            _blind
+        ),
+        "PD follows the frozen reading: its drive pushes against an error that is not there (a dead encoder must be "
+        "noticed)": _kind(PD),
+        "the filter removes antagonism, but the force of the frozen error stays: a dead encoder must be noticed": (
+            lambda make: isinstance(law := make(_model()), AntagonismFilter) and isinstance(law.law, PD)
+        ),
+        "a fixed pair survives only if the dead encoder is the third one: which one died must be noticed": _kind(CTC),
+        "switching looks at the pose, not at the health of the encoders: a dead one must be noticed": (
+            _kind(SwitchedCTC)
+        ),
+        "redundant coordinates fit the pose to all encoders, also to the dead one: it must be noticed and left out": (
+            _kind(RedundantCTC, RedundantAPD)
+        ),
+    },
+    points=10,
+)
