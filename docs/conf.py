@@ -1,0 +1,38 @@
+"""Sphinx: the pages that docs/pages prepares in docs/_work."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import rapkm_lite
+
+project = "rapkm_lite"
+author = "the rapkm_lite authors"
+copyright = "2026, the rapkm_lite authors; lessons under CC-BY-4.0, code under BSD-3-Clause"
+version = release = rapkm_lite.__version__
+language = "en-GB"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "pages.hooks"]
+root_doc = "contents"
+exclude_patterns = ["**/LICENSE*"]
+default_role = "py:obj"
+add_module_names = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+nb_execution_mode = "off"
+nb_merge_streams = True
+nb_render_markdown_format = "myst"
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_heading_anchors = 4
+myst_dmath_double_inline = True
+# The stored Python version of a lesson is not that of the reader.
+suppress_warnings = ["mystnb.unknown_mime_type"]
+mathjax_path = "tex-svg.js"
+mathjax3_config = {"tex": {"tags": "none"}, "svg": {"fontCache": "local"}}
+html_theme = "furo"
+html_title = "rapkm_lite"
+html_static_path = ["pages/static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {"navigation_with_keys": True}

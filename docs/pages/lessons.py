@@ -1,0 +1,129 @@
+"""Lessons as pages: anchors of the equations, words for pictures, links that hold on the site."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+WIDGET = "application/vnd.jupyter.widget-view+json"
+# A row of the index: its anchor and number, and further on the lesson that explains it.
+ROW = re.compile(r'<a id="eq-(\d+)"></a>.*?\| (\d\d_\w+) \|')
+
+
+def lesson_of_equation(index: str) -> dict[int, str]:
+    """The lesson that the equation index names for each number."""
+    return {int(row[1]): row[2] for row in map(ROW.search, index.splitlines()) if row}
+
+
+def linked(text: str) -> str:
+    """Links to an anchor inside another page, as HTML: the anchors are no headings, which MyST would look for."""
+    pattern = re.compile(r"\[([^\]\n]+)\]\(([\w./-]+)\.(?:md|ipynb)#([\w-]+)\)")
+    return pattern.sub(r'<a href="\2.html#\3">\1</a>', text)
+
+
+def index_page(text: str, functions: dict[str, str]) -> str:
+    """The equation index with links to the places in the lessons and to the reference.
+
+    functions : page of the reference by public name.
+    """
+    lines = []
+    for line in linked(text).splitlines():
+        row = ROW.search(line)
+        if row:
+            place = f'<a href="{row[2]}.html#eq-{row[1]}">{row[2]}</a>'
+            line = line.replace(f"| {row[2]} |", f"| {place} |")
+        if line.startswith("|"):
+            line = re.sub(r"`(\w+)`", lambda name: _to_reference(name[1], functions), line)
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def _to_reference(name: str, functions: dict[str, str]) -> str:
+    page = functions.get(name)
+    return f'<a href="../reference/{page}.html#rapkm_lite.{name}"><code>{name}</code></a>' if page else f"`{name}`"
+
+
+def places(cells: list[dict], numbers: list[int]) -> dict[int, list[int]]:
+    """Numbers of equations by the Markdown cell where each is written out, or else first named."""
+    found: dict[int, list[int]] = {}
+    for number in numbers:
+        patterns = [
+            rf"\\tag\{{[^}}]*\b{number}\b",
+            rf"\$\$[^$]*\({number}\)[^$]*\$\$",
+            rf"\({number}\)",
+            _range(number),
+        ]
+        found.setdefault(next(_first(cells, p) for p in patterns if _first(cells, p) is not None), []).append(number)
+    return found
+
+
+def _range(number: int) -> str:
+    """A pattern for ranges such as (12)–(14); it matches the beginning of every lesson when nothing else does."""
+    pairs = [(a, b) for a in range(max(1, number - 6), number + 1) for b in range(number, number + 7) if a < b]
+    return "|".join(rf"\({a}\)–\({b}\)" for a, b in pairs) + "|^# "
+
+
+def _first(cells, pattern: str) -> int | None:
+    markdown = ((k, "".join(cell["source"])) for k, cell in enumerate(cells) if cell["cell_type"] == "markdown")
+    return next((k for k, text in markdown if re.search(pattern, text)), None)
+
+
+def lesson_page(path: Path, numbers: list[int], depth: str = "") -> str:
+    """A notebook for the site.
+
+    numbers : equations that get their anchor here.  depth : the way from its page to the folder of the index.
+    """
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    cells = notebook["cells"]
+    anchors = places(cells, numbers)
+    for k, cell in enumerate(cells):
+        text = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            marks = "".join(
+                f'<a class="to-index" id="eq-{n}" href="{depth}equations.html#eq-{n}">({n}) in the index</a>\n'
+                for n in anchors.get(k, [])
+            )
+            text = linked(text).replace("](solutions)", "](solutions/index.md)")
+            # A heading stays the first line of its cell.
+            head, rest = re.match(r"(#[^\n]*\n?)?(.*)", text, re.DOTALL).groups()
+            cell["source"] = f"{head or ''}\n{marks}\n{rest}" if marks else text
+        else:
+            _outputs(cell, _next_words(cells, k))
+    return json.dumps(notebook, ensure_ascii=False)
+
+
+def _next_words(cells, k: int) -> str:
+    """The paragraph after a cell, in plain words."""
+    text = next(("".join(c["source"]) for c in cells[k + 1 :] if c["cell_type"] == "markdown"), "")
+    first = re.sub(r"[*_`#>$\\{}|]|<[^>]*>|\]\([^)]*\)|\[", "", text.split("\n\n")[0])
+    return re.sub(r"\s+", " ", first).strip()[:300] or "Picture of this cell"
+
+
+def _outputs(cell: dict, words: str) -> None:
+    """One form of each output, with words for every picture, and nothing that waits for a kernel."""
+    kept = []
+    for output in cell.get("outputs", []):
+        data = output.get("data", {})
+        if WIDGET in data and "image/png" not in data:
+            continue
+        data.pop(WIDGET, None)
+        if "image/png" in data:
+            data.pop("text/html", None)
+            plain = "".join(data.pop("text/plain", ""))
+            alt = output.get("metadata", {}).get("image/png", {}).get("alt") or cell["metadata"].get("alt") or words
+            alt = alt[min(len(kept), len(alt) - 1)] if isinstance(alt, list) else alt
+            cell["metadata"]["mystnb"] = {"image": {"alt": alt if "<" not in plain or alt else plain}}
+        kept.append(output)
+    cell["outputs"] = kept
+
+
+def without_dead_links(text: str, folder: Path) -> str:
+    """Links to pages of the same folder stay; those to other files of the repository become their words."""
+
+    def keep(link: re.Match) -> str:
+        target = link[2]
+        page = target.endswith(".md") and "/" not in target and (folder / target).exists()
+        return link[0] if page or target.startswith(("http", "#")) else link[1]
+
+    return re.sub(r"(?<!!)\[([^\]\n]+)\]\(([^)\s]+)\)", keep, text)
