@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -100,6 +100,26 @@ class Trajectory(Desired):
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles)."""
         return self if robot.same_kinematics(self.robot) else follow(robot, self.t, self.x, self.xd, self.xdd)
+
+    def with_set_points(self, q_a, qd_a=None) -> Trajectory:
+        """The same path with other set-points for the drives, which need not close the loops (fig. 3).
+
+        A drive that interpolates on its own, or whose clock is late, gets such angles.  Only laws that work on base
+        angles and rates, such as `PD`, follow them; x, elbow angles and accelerations stay those of the path.
+        q_a : (k, N) rad.  qd_a : (k, N) rad/s; default: central differences of q_a.
+        Raises ValueError for other shapes, or numbers that are not finite.
+
+        >>> import rapkm_lite as rk
+        >>> path = rk.circle(rk.load(), radius=0.05, duration=1.0)
+        >>> late = path.with_set_points(np.concatenate([path.q_a[:1], path.q_a[:-1]]))
+        >>> bool(np.all(late.q_a[1:] == path.q_a[:-1])), late.x is path.x
+        (True, True)
+        """
+        k, N = len(self), self.n_arms
+        q_a = exact_array("q_a", q_a, k, N)
+        qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, k, N)
+        q, qd = (np.hstack([new, old[:, N:]]) for new, old in ((q_a, self.q), (qd_a, self.qd)))
+        return replace(self, q=q, qd=qd)
 
     def __repr__(self):
         return f"Trajectory({len(self)} samples, {self.t[-1]:g} s, {self.robot.name!r})"

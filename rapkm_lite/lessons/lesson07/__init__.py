@@ -1,0 +1,1 @@
+"""Lesson 07: drives that do not wait for each other (fig. 3)."""
