@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 
 def _summary(options) -> None:
@@ -26,6 +27,16 @@ def _lessons(options) -> None:
     print(f"    python -m jupyter lab {files[0]}")
 
 
+def _grade(options) -> None:
+    from .lessons.grading.grader import grade
+    from .lessons.grading.tables import bar, by_exercise, by_student, write_csv
+
+    grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
+    if options.csv:
+        write_csv(Path(options.csv), grades)
+    print(by_exercise(grades), by_student(grades), sep="\n\n")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rapkm_lite", description=__doc__)
@@ -35,6 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lessons = commands.add_parser("lessons", help="copy the lessons into a folder")
     lessons.add_argument("folder")
     lessons.set_defaults(run=_lessons)
+    grades = commands.add_parser("grade", help="grade a folder of submitted lessons")
+    grades.add_argument("submissions", help="a folder with STUDENT/04_title.ipynb, or loose notebooks")
+    grades.add_argument("--csv", help="file for one row per student and exercise")
+    grades.add_argument("--seconds", type=float, default=20.0, help="limit of a statement or a check (20)")
+    grades.add_argument("--jobs", type=int, help="submissions at a time (as many as processors)")
+    grades.set_defaults(run=_grade)
     options = parser.parse_args(arguments)
     try:
         return options.run(options) or 0

@@ -80,11 +80,11 @@ def check(name: str, answer: Any) -> Any:
     raw = answer.own if isinstance(answer, Answer) else answer
     own = None if result.word == "todo" else raw
     _latest[name] = result.word, own
-    return _going_on(exercise, result.word, own)
+    return going_on(exercise, result.word, own)
 
 
-def _going_on(exercise: Exercise, word: str, own: Any) -> Any:
-    """What the lesson goes on with."""
+def going_on(exercise: Exercise, word: str, own: Any) -> Any:
+    """What the lesson goes on with after a verdict on the student's `own` answer (None: there is none)."""
     reference = exercise.reference
     value = exercise.is_value(exercise.cases(np.random.default_rng(0)))
     if value:

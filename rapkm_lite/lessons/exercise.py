@@ -72,6 +72,7 @@ class Exercise:
     raw : True where `judge` reads the answer as it stands, words and NaN too, and returns a `Result`.
     secret : True where `check` must not hand out the package's answer.
     points : what a right or close answer is worth.
+    called : the name of the answer in the lesson, where it is not the last part of the exercise's name.
     """
 
     reference: Callable | object
@@ -88,6 +89,7 @@ class Exercise:
     unique: bool = True
     secret: bool = False
     points: float = 5.0
+    called: str = ""
     hint: str = ""
 
     def __post_init__(self):

@@ -154,6 +154,7 @@ EXERCISES = {
         mistakes=mistakes.GAPS,
     ),
     "01.orthogonal_complement": Exercise(
+        called="complement",
         reference=orthogonal_complement,
         hints=(
             "Two of the velocities are given and the others are unknown. How many equations does (4) have, and how "

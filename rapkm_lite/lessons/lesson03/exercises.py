@@ -158,6 +158,7 @@ EXERCISES = {
     ),
     "03.counts": Exercise(
         counts_needed,
+        called="counts_needed",
         hints=(
             "By how much does the torque of one drive jump from count to count, and what can friction take up?",
             "One step of the torque is K_P 2 pi / counts; the friction band reaches from -f_c to f_c.",

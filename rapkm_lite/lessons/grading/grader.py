@@ -1,0 +1,154 @@
+"""Grade a folder of submissions: a process for each, started again without what hangs or dies in it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..checker import exercises
+from .submission import Submission, found
+
+# Starts of one submission at most, each without what the one before hung in.
+_STARTS = 8
+
+
+@dataclass(frozen=True)
+class Grade:
+    """One exercise of one student."""
+
+    student: str
+    exercise: str
+    verdict: str
+    points: float
+    of: float
+    sentence: str
+    mistake: str
+
+
+def grade(
+    folder: Path, seconds: float = 20.0, jobs: int | None = None, progress: Callable | None = None
+) -> list[Grade]:
+    """Grades of all submissions under a folder, sorted by student and exercise.
+
+    seconds : limit of each statement and each check; a whole notebook gets ten times as much.
+    jobs : submissions graded at a time; None: as many as there are processors.
+    progress : called with (done, all, submission) after each one.
+    Raises ValueError when the folder holds no submissions or `seconds` or `jobs` is not positive.
+    """
+    if not seconds > 0.0:
+        raise ValueError(f"seconds = {seconds!r}; allowed: a positive number")
+    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    if jobs < 1:
+        raise ValueError(f"jobs = {jobs!r}; allowed: 1 or more")
+    submissions = found(folder, {name[:2] for name in exercises()})
+    grades: list[Grade] = []
+    with ThreadPoolExecutor(jobs) as pool:
+        running = {pool.submit(grade_one, submission, seconds): submission for submission in submissions}
+        for done, future in enumerate(as_completed(running), 1):
+            grades += future.result()
+            if progress:
+                progress(done, len(submissions), running[future])
+    return sorted(grades, key=lambda g: (g.student, g.exercise))
+
+
+def grade_one(submission: Submission, seconds: float) -> list[Grade]:
+    """Grades of one notebook, for every exercise of its lesson."""
+    results = _results(submission, seconds, whole=False)
+    if any(word == "wrong" and "NameError" in sentence for word, sentence, _ in results.values()):
+        # Something that an answer uses was not among the statements chosen for it.
+        results = _results(submission, seconds, whole=True)
+    grades = []
+    for name, exercise in exercises().items():
+        if name.startswith(f"{submission.lesson}."):
+            word, sentence, mistake = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
+            points = exercise.points if word in ("ok", "close") else 0.0
+            grades.append(Grade(submission.student, name, word, points, exercise.points, sentence, mistake))
+    return grades
+
+
+def _results(submission: Submission, seconds: float, whole: bool) -> dict[str, tuple[str, str, str]]:
+    """Verdict, sentence and mistake by exercise, from as many starts as it takes."""
+    skip: list[str] = []
+    results: dict[str, tuple[str, str, str]] = {}
+    ends = time.monotonic() + 10 * seconds
+    for _ in range(_STARTS):
+        stopped = ""
+        with tempfile.TemporaryDirectory() as place:
+            for event in _events(submission, Path(place), seconds, ends, whole, skip):
+                if "result" in event:
+                    name, word, sentence, mistake = event["result"]
+                    results[name] = word, sentence, mistake
+                stopped = event.get("begin", "" if "done" in event else stopped)
+                if "trouble" in event:
+                    return results | {
+                        name: ("wrong", event["trouble"], "cannot be read")
+                        for name in exercises()
+                        if name.startswith(f"{submission.lesson}.") and name not in results
+                    }
+        if not stopped or time.monotonic() > ends:
+            break
+        skip.append(stopped)
+    return results
+
+
+def _events(
+    submission: Submission, place: Path, seconds: float, ends: float, whole: bool, skip: list[str]
+) -> Iterator[dict]:
+    """What a worker tells, until it is done, dies, or says nothing for longer than the limit."""
+    log = place / "log.jsonl"
+    log.touch()
+    command = [sys.executable, "-m", "rapkm_lite.lessons.grading.worker", str(submission.path.resolve())]
+    command += [submission.lesson, str(log), *(["--whole"] if whole else [])]
+    command += [word for key in skip for word in ("--skip", key)]
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": (place / "errors").open("w")}
+    worker = subprocess.Popen(command, cwd=place, env=_environment(), start_new_session=os.name == "posix", **quiet)
+    heard, finished = time.monotonic(), False
+    try:
+        with log.open(encoding="utf-8") as lines:
+            while not finished:
+                over = worker.poll() is not None
+                news = lines.readlines()
+                for line in news:
+                    heard = time.monotonic()
+                    event = json.loads(line)
+                    finished = finished or "done" in event
+                    yield event
+                now = time.monotonic()
+                if over or now > ends or now - heard > seconds + 20.0 * (not log.stat().st_size):
+                    break
+                time.sleep(0.02)
+        if not finished and not log.stat().st_size:
+            lines = (place / "errors").read_text(errors="replace").strip().splitlines() or ["nothing is said"]
+            yield {"trouble": f"the notebook cannot be run: {lines[-1][:200]}"}
+    finally:
+        _end(worker)
+        quiet["stderr"].close()
+
+
+def _environment() -> dict[str, str]:
+    """One thread each, no screen, and the package that grades."""
+    here = str(Path(__file__).parents[3])
+    paths = [here, *filter(None, [os.environ.get("PYTHONPATH")])]
+    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    own = {"MPLBACKEND": "Agg", "PYTHONPATH": os.pathsep.join(paths), "RAPKM_LITE_STRICT": "0"}
+    return os.environ | one | own
+
+
+def _end(worker: subprocess.Popen) -> None:
+    """End a worker and what it started."""
+    if os.name == "posix":
+        try:
+            os.killpg(worker.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+    worker.kill()
+    worker.wait()

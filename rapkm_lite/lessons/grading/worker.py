@@ -1,0 +1,145 @@
+"""The process in which one submission runs: its statements, the real checks, one line of JSON per event.
+
+    python -m rapkm_lite.lessons.grading.worker NOTEBOOK LESSON LOG [--whole] [--skip KEY ...]
+
+Written to LOG: {"begin": key} before a statement or an exercise, {"result": [name, word, sentence, mistake]}, and
+{"done": true}.  What hangs or dies is the last thing begun; the caller starts again and lets it be skipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import io
+import json
+import linecache
+import sys
+from pathlib import Path
+from typing import Any
+
+import rapkm_lite.checks
+from rapkm_lite.lessons import checker
+from rapkm_lite.lessons.answers import Answer, Ended, Result, guarded
+from rapkm_lite.lessons.grading.submission import Statement, called, needed, sources, statements
+
+
+class Bench:
+    """Runs the statements of one notebook and judges what they answer."""
+
+    def __init__(self, lesson: str, log: Path, skip: set[str]):
+        self.exercises = {n: e for n, e in checker.exercises().items() if n.startswith(f"{lesson}.")}
+        self.log, self.skip = log.open("a", encoding="utf-8"), skip
+        self.judge, self.going_on = checker.judge, checker.going_on
+        self.results: dict[str, Result] = {}
+        # Answers found without a check: by exercise, with the cell they stand in.
+        self.bound: dict[str, list[tuple[int, Any]]] = {name: [] for name in self.exercises}
+        self.failed: dict[int, str] = {}
+
+    def tell(self, **event) -> None:
+        self.log.write(json.dumps(event) + "\n")
+        self.log.flush()
+
+    def check(self, name: str, answer: Any) -> Any:
+        """Stands in for `check`: judges, remembers the last answer that is one, prints nothing."""
+        if name not in self.exercises:
+            raise ValueError(f"name = {name!r}; allowed: {', '.join(sorted(self.exercises))}")
+        result = self.judged(name, answer)
+        if result.word != "todo" or name not in self.results:
+            self.results[name] = result
+        own = answer.own if isinstance(answer, Answer) else answer
+        lost = result.word == "todo" or f"check {name}" in self.skip
+        return self.going_on(self.exercises[name], result.word, None if lost else own)
+
+    def judged(self, name: str, answer: Any) -> Result:
+        if f"check {name}" in self.skip:
+            return Result("wrong", "your code does not come to an end, or ends the process", "no end")
+        if str(getattr(answer, "__module__", "")).startswith("rapkm_lite.lessons") and not isinstance(answer, Answer):
+            return Result("todo", "not yet: this is the package's own answer")
+        self.tell(begin=f"check {name}")
+        with quiet():
+            result = self.judge(name, answer)
+        self.tell(end=f"check {name}")
+        return result
+
+    def run(self, chosen: list[Statement], texts: list[str]) -> None:
+        """Run statements in a fresh module; after an error the rest of its cell is left out, as in a notebook."""
+        space: dict[str, Any] = {"__name__": "__main__", "display": lambda *shown, **named: None}
+        for cell, text in enumerate(texts):
+            linecache.cache[f"<cell {cell}>"] = (len(text), None, text.splitlines(keepends=True), f"<cell {cell}>")
+        names = {called(name, exercise): name for name, exercise in self.exercises.items()}
+        before: dict[str, Any] = {}
+        for statement in chosen:
+            if statement.key in self.skip or statement.cell in self.failed:
+                continue
+            self.tell(begin=statement.key)
+            code = compile(ast.Module([statement.node], []), f"<cell {statement.cell}>", "exec")
+            try:
+                with quiet():
+                    guarded(exec, code, space)
+            except Ended as end:
+                if end.result.word != "todo":
+                    self.failed[statement.cell] = end.result.sentence
+            for short, name in names.items():
+                value = space.get(short)
+                if value is not before.get(short) and value is not None and value is not Ellipsis:
+                    self.bound[name].append((statement.cell, value))
+                before[short] = value
+
+    def conclude(self, texts: list[str]) -> None:
+        """Judge the answers whose check was deleted or replaced, and tell all results."""
+        for name in self.exercises:
+            if name not in self.results or self.results[name].word == "todo":
+                self.results[name] = self.without_check(name, texts)
+            self.tell(result=[name, *self.results[name]])
+        self.tell(done=True)
+
+    def without_check(self, name: str, texts: list[str]) -> Result:
+        """The verdict on what bears the answer's name: the last of its cell, else the best anywhere."""
+        cells = {i for i, text in enumerate(texts) if f'"{name}"' in text or f"'{name}'" in text}
+        near = [value for cell, value in self.bound[name] if cell in cells]
+        for value in reversed(near):
+            result = self.judged(name, value)
+            if result.word != "todo":
+                return result
+        order = ["ok", "close", "wrong", "todo"]
+        tried = [self.judged(name, value) for _, value in self.bound[name][:5] if not cells]
+        if tried:
+            return min(tried, key=lambda result: order.index(result.word))
+        stopped = [self.failed[cell] for cell in sorted(cells) if cell in self.failed]
+        if stopped:
+            return Result("wrong", f"its cell: {stopped[0]}", "its cell stops")
+        return Result("todo", "not yet")
+
+
+def quiet() -> contextlib.ExitStack:
+    """Nothing that the student's code prints is kept."""
+    stack = contextlib.ExitStack()
+    stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+    stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+    return stack
+
+
+def main(arguments: list[str]) -> None:
+    """Run one submission as the module's text says."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("notebook", type=Path)
+    parser.add_argument("lesson")
+    parser.add_argument("log", type=Path)
+    parser.add_argument("--whole", action="store_true")
+    parser.add_argument("--skip", action="append", default=[])
+    given = parser.parse_args(arguments)
+    bench = Bench(given.lesson, given.log, set(given.skip))
+    texts = sources(given.notebook)
+    read, broken = statements(texts)
+    bench.failed |= {cell: f"cannot be read, {sentence}" for cell, sentence in broken.items()}
+    wanted = {called(name, exercise) for name, exercise in bench.exercises.items()}
+    doors: list[Any] = [rapkm_lite.checks, checker]
+    for door in doors:
+        door.check = bench.check
+    bench.run(read if given.whole else needed(read, wanted), texts)
+    bench.conclude(texts)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
