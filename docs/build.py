@@ -23,9 +23,9 @@ WORK, SITE = HERE / "_work", HERE / "_site"
 PLAN = """\
 # rapkm_lite
 
-Three motors drive a planar robot that needs only two. The extra one makes it stiffer, and lets the drives fight each other
-as soon as their encoders disagree by a few milliradians. These lessons show the fight, compute it, filter it away, and
-control the robot where minimal coordinates fail.
+Three motors drive a planar robot that needs only two. The extra one makes it stiffer, and lets the drives fight each
+other as soon as their encoders disagree by a few milliradians. These lessons show the fight, compute it, filter it
+away, and control the robot where minimal coordinates fail.
 
 <a href="index.html">Take the machine in your hands</a> first: the start page needs no installation.
 
@@ -80,8 +80,8 @@ def prepare(notebooks: Path) -> None:
     where = lessons.lesson_of_equation(index)
     names = sorted(path.stem for path in notebooks.glob("[0-9][0-9]_*.ipynb"))
     for name in [*names, "dashboard"]:
-        numbers = [number for number, lesson in where.items() if lesson == name]
-        write(WORK / f"lessons/{name}.ipynb", lessons.lesson_page(notebooks / f"{name}.ipynb", numbers))
+        anchors = [anchor for anchor, lesson in where.items() if lesson == name]
+        write(WORK / f"lessons/{name}.ipynb", lessons.lesson_page(notebooks / f"{name}.ipynb", anchors))
     solved = sorted(path.stem for path in (notebooks / "solutions").glob("[0-9][0-9]_*.ipynb"))
     for name in solved:
         page = lessons.lesson_page(notebooks / f"solutions/{name}.ipynb", [], "../")

@@ -25,7 +25,7 @@ def readable(lines: list[str]) -> list[str]:
             continue
         argument = ARGUMENT.fullmatch(line)
         if argument:
-            made += ["" if listed else "", f"* **{argument[1]}**: {escaped(argument[2])}"]
+            made += ["", f"* **{argument[1]}**: {escaped(argument[2])}"]
             listed = True
         elif listed and line.startswith(" "):
             made.append("  " + escaped(line.strip()))

@@ -8,12 +8,12 @@ from pathlib import Path
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 # A row of the index: its anchor and number, and further on the lesson that explains it.
-ROW = re.compile(r'<a id="eq-(\d+)"></a>.*?\| (\d\d_\w+) \|')
+ROW = re.compile(r'<a id="(eq-\d+|table-1)"></a>.*?\| (\d\d_\w+) \|')
 
 
-def lesson_of_equation(index: str) -> dict[int, str]:
-    """The lesson that the equation index names for each number."""
-    return {int(row[1]): row[2] for row in map(ROW.search, index.splitlines()) if row}
+def lesson_of_equation(index: str) -> dict[str, str]:
+    """The lesson that the equation index names for each anchor."""
+    return {row[1]: row[2] for row in map(ROW.search, index.splitlines()) if row}
 
 
 def linked(text: str) -> str:
@@ -23,45 +23,54 @@ def linked(text: str) -> str:
 
 
 def index_page(text: str, functions: dict[str, str]) -> str:
-    """The equation index with links to the places in the lessons and to the reference.
+    """The equation index, a block per equation instead of a wide table, with links to lessons and reference.
 
     functions : page of the reference by public name.
     """
     lines = []
     for line in linked(text).splitlines():
-        row = ROW.search(line)
-        if row:
-            place = f'<a href="{row[2]}.html#eq-{row[1]}">{row[2]}</a>'
-            line = line.replace(f"| {row[2]} |", f"| {place} |")
-        if line.startswith("|"):
-            line = re.sub(r"`(\w+)`", lambda name: _to_reference(name[1], functions), line)
-        lines.append(line)
+        if line.startswith("| eq. |"):
+            continue
+        if ROW.search(line):
+            lines += _block(*(part.strip() for part in line.strip("| ").split(" | ")), functions)
+        elif lines and lines[-1] == "" and re.match(r"\|---\|---\|---\|---\|---\|---\|", line):
+            continue
+        else:
+            lines.append(line)
     return "\n".join(lines) + "\n"
 
 
+def _block(number, printed, meaning, names, lesson, test, functions) -> list[str]:
+    """One equation: its number and words, its formula, and where it is explained, evaluated and tested."""
+    anchor = re.search(r'id="([\w-]+)"', number)[1]
+    formulas = [f"{formula.strip()}\n" for formula in printed.split("<br>")]
+    links = re.sub(r"`([\w.]+)`", lambda name: _to_reference(name[1], functions), names)
+    place = f'<a href="{lesson}.html#{anchor}">lesson {lesson[:2]}</a>'
+    return ["", f"{number} **{meaning}**", "", *formulas, f"{place} · {links} · {test}", ""]
+
+
 def _to_reference(name: str, functions: dict[str, str]) -> str:
-    page = functions.get(name)
+    page = functions.get(name.split(".")[0])
     return f'<a href="../reference/{page}.html#rapkm_lite.{name}"><code>{name}</code></a>' if page else f"`{name}`"
 
 
-def places(cells: list[dict], numbers: list[int]) -> dict[int, list[int]]:
-    """Numbers of equations by the Markdown cell where each is written out, or else first named."""
-    found: dict[int, list[int]] = {}
-    for number in numbers:
-        patterns = [
-            rf"\\tag\{{[^}}]*\b{number}\b",
-            rf"\$\$[^$]*\({number}\)[^$]*\$\$",
-            rf"\({number}\)",
-            _range(number),
-        ]
-        found.setdefault(next(_first(cells, p) for p in patterns if _first(cells, p) is not None), []).append(number)
+def places(cells: list[dict], anchors: list[str]) -> dict[int, list[str]]:
+    """Anchors of equations by the Markdown cell where each is written out, or else first named."""
+    found: dict[int, list[str]] = {}
+    for anchor in anchors:
+        hits = (_first(cells, pattern) for pattern in _patterns(anchor))
+        found.setdefault(next(k for k in hits if k is not None), []).append(anchor)
     return found
 
 
-def _range(number: int) -> str:
-    """A pattern for ranges such as (12)–(14); it matches the beginning of every lesson when nothing else does."""
-    pairs = [(a, b) for a in range(max(1, number - 6), number + 1) for b in range(number, number + 7) if a < b]
-    return "|".join(rf"\({a}\)–\({b}\)" for a, b in pairs) + "|^# "
+def _patterns(anchor: str) -> list[str]:
+    """What to look for, best first; the last one is the title of every lesson."""
+    if anchor == "table-1":
+        return ["Table 1", "^# "]
+    n = int(anchor.removeprefix("eq-"))
+    pairs = [(a, b) for a in range(max(1, n - 6), n + 1) for b in range(n, n + 7) if a < b]
+    ranges = "|".join(rf"\({a}\)–\({b}\)" for a, b in pairs)
+    return [rf"\\tag\{{[^}}]*\b{n}\b", rf"\$\$[^$]*\({n}\)[^$]*\$\$", rf"\({n}\)", ranges, "^# "]
 
 
 def _first(cells, pattern: str) -> int | None:
@@ -69,20 +78,20 @@ def _first(cells, pattern: str) -> int | None:
     return next((k for k, text in markdown if re.search(pattern, text)), None)
 
 
-def lesson_page(path: Path, numbers: list[int], depth: str = "") -> str:
+def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
     """A notebook for the site.
 
-    numbers : equations that get their anchor here.  depth : the way from its page to the folder of the index.
+    anchors : of the equations that are explained here.  depth : the way from its page to the folder of the index.
     """
     notebook = json.loads(path.read_text(encoding="utf-8"))
     cells = notebook["cells"]
-    anchors = places(cells, numbers)
+    found = places(cells, anchors)
     for k, cell in enumerate(cells):
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
             marks = "".join(
-                f'<a class="to-index" id="eq-{n}" href="{depth}equations.html#eq-{n}">({n}) in the index</a>\n'
-                for n in anchors.get(k, [])
+                f'<a class="to-index" id="{a}" href="{depth}equations.html#{a}">{_label(a)} in the index</a>\n'
+                for a in found.get(k, [])
             )
             text = linked(text).replace("](solutions)", "](solutions/index.md)")
             # A heading stays the first line of its cell.
@@ -91,6 +100,10 @@ def lesson_page(path: Path, numbers: list[int], depth: str = "") -> str:
         else:
             _outputs(cell, _next_words(cells, k))
     return json.dumps(notebook, ensure_ascii=False)
+
+
+def _label(anchor: str) -> str:
+    return "Table 1" if anchor == "table-1" else f"({anchor.removeprefix('eq-')})"
 
 
 def _next_words(cells, k: int) -> str:
