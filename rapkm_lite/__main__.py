@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     grades = commands.add_parser("grade", help="grade a folder of submitted lessons")
     grades.add_argument("submissions", help="a folder with STUDENT/04_title.ipynb, or loose notebooks")
     grades.add_argument("--csv", help="file for one row per student and exercise")
-    grades.add_argument("--seconds", type=float, default=20.0, help="limit of a statement or a check (20)")
+    grades.add_argument("--seconds", type=float, default=30.0, help="limit of a statement or a check (30)")
     grades.add_argument("--jobs", type=int, help="submissions at a time (as many as processors)")
     grades.set_defaults(run=_grade)
     options = parser.parse_args(arguments)

@@ -19,6 +19,7 @@ GROUPS = {
         "test_engine_js",
         "test_explore",
         "test_figures",
+        "test_grader",
         "test_lanes",
         "test_skeleton",
         "test_sweep",

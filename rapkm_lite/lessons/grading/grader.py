@@ -35,7 +35,7 @@ class Grade:
 
 
 def grade(
-    folder: Path, seconds: float = 20.0, jobs: int | None = None, progress: Callable | None = None
+    folder: Path, seconds: float = 30.0, jobs: int | None = None, progress: Callable | None = None
 ) -> list[Grade]:
     """Grades of all submissions under a folder, sorted by student and exercise.
 

@@ -1,0 +1,134 @@
+"""A class with everything that goes wrong in one: each student gets the points of what is right, and a sentence."""
+
+import csv
+import json
+
+import pytest
+
+from rapkm_lite.__main__ import main
+from rapkm_lite.lessons.grading.grader import grade
+from rapkm_lite.lessons.grading.submission import found, needed, statements
+from rapkm_lite.lessons.grading.tables import by_exercise, by_student, write_csv
+
+SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
+TORQUES = "def filtered_torques(A, c):\n    return A @ np.linalg.solve(A.T @ A, A.T @ c)\n"
+COMMAND = "def filtered_command(A, K_P, q, q_d):\n    return q - rk.antagonism_filter(gains(K_P) * A) @ (q - q_d)\n"
+HELPER = "def gains(K_P):\n    return K_P[:, None]\n"
+ENERGY = """def saved_energy(robot, A, c, dt):
+    kept = np.einsum("kij,kj->ki", rk.antagonism_filter(A), c)
+    return rk.copper_loss(robot, c, dt) - rk.copper_loss(robot, kept, dt)
+"""
+CHECKS = ['filtered_torques = check("04.filtered_torques", filtered_torques)']
+CHECKS += [f'{name} = check("04.{name}", {name})' for name in ("filtered_command", "saved_energy")]
+RIGHT = [TORQUES, HELPER + COMMAND, ENERGY]
+NAMES = ["04.filtered_torques", "04.filtered_command", "04.saved_energy"]
+ENDLESS = """def filtered_torques(A, c):
+    while True:
+        try:
+            len(c)
+        except:
+            pass
+"""
+
+
+def checked(bodies):
+    return [SETUP, *(f"{body}\n\n{check}" for body, check in zip(bodies, CHECKS, strict=True))]
+
+
+SUBMISSIONS = {
+    "ada": checked(RIGHT),
+    "ben": checked([TORQUES.replace("return A", "return -A"), *RIGHT[1:]]),
+    "cyd": checked([ENDLESS, *RIGHT[1:]]),
+    "dan": checked([TORQUES, "def filtered_command(*case):\n    raise SystemExit(0)\n", ENERGY]),
+    "eve": checked([TORQUES, "import os\ndef filtered_command(*case):\n    os._exit(0)\n", ENERGY]),
+    "fay": [SETUP, *RIGHT],
+    "gus": [
+        SETUP,
+        "def check(name, answer):\n    print('OK', name)\n",
+        *checked(["filtered_torques = 3\n", *RIGHT[1:]])[1:],
+    ],
+    "hal": checked([TORQUES + "return (", *RIGHT[1:]]),
+    "ivy": checked(["def filtered_torques(A, c):\n    raise NotImplementedError\n", *RIGHT[1:]]),
+    "jon": checked(["from rapkm_lite.lessons.lesson04.exercises import filtered_torques\n", *RIGHT[1:]]),
+    "kim": [SETUP, "while True: pass", *checked(RIGHT)[1:]],
+}
+# Student -> verdicts of the three exercises.
+VERDICTS = {
+    "ada": ["ok", "ok", "ok"],
+    "ben": ["wrong", "ok", "ok"],
+    "cyd": ["wrong", "ok", "ok"],
+    "dan": ["ok", "wrong", "ok"],
+    "eve": ["ok", "wrong", "ok"],
+    "fay": ["ok", "ok", "ok"],
+    "gus": ["wrong", "ok", "ok"],
+    "hal": ["wrong", "ok", "ok"],
+    "ivy": ["todo", "ok", "ok"],
+    "jon": ["todo", "ok", "ok"],
+    "kim": ["ok", "ok", "ok"],
+}
+
+
+def write(path, sources):
+    cells = [{"cell_type": "code", "source": source.splitlines(keepends=True)} for source in sources]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("class")
+    for student, sources in SUBMISSIONS.items():
+        write(folder / student / "04_antagonism_filter_energy.ipynb", sources)
+    (folder / "leo").mkdir()
+    (folder / "leo" / "04_antagonism_filter_energy.ipynb").write_text("no notebook")
+    return grade(folder, seconds=15.0)
+
+
+@pytest.mark.parametrize("student", SUBMISSIONS)
+def test_each_exercise_is_graded_on_its_own(student, graded):
+    own = {g.exercise: g for g in graded if g.student == student}
+    verdicts = [own[name].verdict for name in NAMES]
+    assert verdicts == VERDICTS[student], [own[name].sentence for name in NAMES]
+    assert [own[name].points for name in NAMES] == [
+        own[name].of * (word == "ok") for name, word in zip(NAMES, verdicts, strict=True)
+    ]
+    assert all(grade.sentence for grade in own.values())
+
+
+def test_sentences_say_what_happened(graded):
+    said = {(g.student, g.exercise): g.sentence for g in graded}
+    assert "opposite sign" in said["ben", NAMES[0]]
+    assert "does not come to an end" in said["cyd", NAMES[0]]
+    assert "SystemExit" in said["dan", NAMES[1]]
+    assert "SyntaxError" in said["hal", NAMES[0]]
+    assert "no notebook" in said["leo", NAMES[0]] or "cannot be" in said["leo", NAMES[0]]
+
+
+def test_the_tables_count_mistakes_and_points(graded, tmp_path):
+    write_csv(tmp_path / "grades.csv", graded)
+    rows = list(csv.DictReader((tmp_path / "grades.csv").open(encoding="utf-8")))
+    assert len(rows) == len(graded) and {row["verdict"] for row in rows} <= {"ok", "close", "wrong", "todo"}
+    assert "1 x the answer has the opposite sign" in by_exercise(graded)
+    line = next(line for line in by_student(graded).splitlines() if line.startswith("ben"))
+    assert line.split()[2] == "10"
+
+
+def test_only_what_the_answers_need_is_run():
+    texts = [
+        SETUP.replace("%", "# %"),
+        "x = 3\ny = x + 1\nprint(y)\n",
+        HELPER,
+        "gains.factor = x\n",
+        *checked(RIGHT)[1:],
+    ]
+    chosen = {s.key for s in needed(statements(texts)[0], {"filtered_torques", "filtered_command", "saved_energy"})}
+    assert {"1.0", "2.0", "3.0"} <= chosen and not {"1.1", "1.2"} & chosen
+
+
+def test_folders_without_submissions_are_refused(tmp_path, capsys):
+    with pytest.raises(ValueError, match="allowed: a folder that exists"):
+        found(tmp_path / "nowhere", {"04"})
+    with pytest.raises(ValueError, match="allowed: a folder with notebooks"):
+        found(tmp_path, {"04"})
+    assert main(["grade", str(tmp_path)]) == 2
+    assert "allowed: a folder with notebooks" in capsys.readouterr().err
