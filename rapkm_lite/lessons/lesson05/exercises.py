@@ -91,7 +91,7 @@ def _partitions(rng) -> list[tuple]:
         rounded = A + 1e-12 * left[..., 2:3] * right[..., 2:3, :]
         for k, rows in enumerate(select_independent(A)):
             cases.append(Case(words, A[k], rows))
-            nudged.append(Case("a matrix with rounding errors of 1e-12", rounded[k], rows))
+            nudged.append(Case(f"{words}, rounding errors of 1e-12", rounded[k], rows))
     robot = load()
     A = redundant_control_matrix(robot, inverse_kinematics(robot, [0.01, 0.02]))
     return [*cases, *nudged, *(Case("another order of rows", A, np.array(rows)) for rows in ((0, 2), (2, 0), (2, 1)))]
@@ -215,6 +215,9 @@ EXERCISES = {
             "this is the map from torques to accelerations, the inverse of the wanted one": (
                 lambda robot, q, pair: np.linalg.pinv(feedback_map(robot, q, pair))
             ),
+            "the pair is ignored: these are always the angles of drives 1 and 2": (
+                lambda robot, q, pair: feedback_map(robot, q, (0, 1))
+            ),
             "this is Gbar, the force; the torques need the factor (A^T)^+": _mapped(lambda L, G, L_x, G_x: G),
         },
     ),
@@ -311,6 +314,9 @@ EXERCISES = {
             ),
             "the passive joints are selected, the complement of the driven ones": (
                 lambda robot, q, omega: omega**2 / (1 - _shares(robot, q)).min()
+            ),
+            "3/7 is the share at the centroid of the testbed; it changes with the pose and the machine": (
+                lambda robot, q, omega: omega**2 * 7 / 3
             ),
             "this is the natural frequency that omega^2 would leave, not the gain": (
                 lambda robot, q, omega: omega * np.sqrt(_shares(robot, q).min())
