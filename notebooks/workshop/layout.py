@@ -53,9 +53,9 @@ def figure_list() -> str:
 
 
 def cells(text: str) -> list[nbformat.NotebookNode]:
-    """Cells of a notebook written as text: a line ``# %%``, ``# %% [markdown]`` or ``# %% tags=[...]`` begins each one.
+    """Cells of a notebook written as text: ``# %%``, or ``# %% [markdown]`` with lines behind ``# ``, begins each one.
 
-    Lines of Markdown stand behind ``# ``.
+    Metadata follow on that line: ``# %% tags=["hide-output"] alt="What is seen."``.
     """
     made = []
     for block in re.split(r"^# %%", text, flags=re.M)[1:]:
@@ -63,8 +63,8 @@ def cells(text: str) -> list[nbformat.NotebookNode]:
         if "[markdown]" in head:
             made.append(nbformat.v4.new_markdown_cell(re.sub(r"^# ?", "", body, flags=re.M).strip()))
         else:
-            tags = ast.literal_eval(head.partition("=")[2] or "[]")
-            made.append(nbformat.v4.new_code_cell(body.strip(), metadata={"tags": tags} if tags else {}))
+            metadata = {key: ast.literal_eval(value) for key, value in re.findall(r'(\w+)=(\[.*?\]|".*?")', head)}
+            made.append(nbformat.v4.new_code_cell(body.strip(), metadata=metadata))
     return made
 
 
@@ -93,7 +93,7 @@ def new(name: str) -> None:
     question = notebook.cells[0].source.splitlines()[0].removeprefix("# ").partition(" · ")[2]
     lines = readme.read_text(encoding="utf-8").splitlines(keepends=True)
     last = max(k for k, line in enumerate(lines) if re.match(r"\| \[\d\d_", line))
-    lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 20 | – | – |\n")
+    lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 46 | – | – |\n")
     readme.write_text("".join(lines), encoding="utf-8")
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
     print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number}")
