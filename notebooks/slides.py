@@ -1,0 +1,39 @@
+"""Slides of a lesson: one HTML file that needs nothing else, for a projector without a network.
+
+    python notebooks/slides.py 04                # writes slides_04.html
+    python notebooks/slides.py 04 talk.html
+
+Made from the stored headings, formulas, pictures, questions and exercises; folded parts are left out, answers stay
+closed until somebody clicks.  Arrow keys turn the pages, the browser prints one page per slide.  Formulas need
+``latex2mathml`` (in ``docs/requirements.txt``).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import nbformat
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+
+def main(number: str, target: str = "") -> int:
+    """Write the slides of the lesson with this number; 2 when there is no such lesson."""
+    from workshop.deck import page, slides
+
+    found = sorted(HERE.glob(f"{number}_*.ipynb"))
+    if len(found) != 1:
+        allowed = ", ".join(path.stem[:2] for path in sorted(HERE.glob("[0-9][0-9]_*.ipynb")))
+        print(f"lesson = {number!r}; allowed: {allowed}", file=sys.stderr)
+        return 2
+    notebook = nbformat.read(found[0], as_version=4)
+    path = Path(target or f"slides_{number}.html")
+    path.write_text(page(notebook), encoding="utf-8")
+    print(f"{path}: {len(slides(notebook))} slides, {path.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:3]) if sys.argv[1:] else main(""))

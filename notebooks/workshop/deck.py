@@ -1,0 +1,163 @@
+"""Slides of a lesson: one HTML file from its headings, formulas, pictures, questions and exercises; nothing is loaded.
+
+Formulas become MathML, which browsers show by themselves.  Folded parts are left out; answers stay closed.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import mistune
+import nbformat
+from latex2mathml.converter import convert
+
+from .pictures import PNG, pictures, spoken
+from .storing import COVER, HIDDEN
+
+_MATH = re.compile(r"\$\$(.+?)\$\$|(?<![\\$])\$([^$\n]+(?:\n[^$\n]+)?)\$", re.S)
+_HEADING = re.compile(r"^(#+) +(.*?)(?: *\(\d+ min\))? *$")
+_QUESTION = re.compile(r"\*\*(?:Predict|Before you)\b")
+_EXERCISE = re.compile(r"(?:### |\*\*)Exercise\b")
+_DETAILS = re.compile(r"<details>.*?</details>", re.S)
+_PAGE = Path(__file__).with_name("deck.html")
+_markdown = mistune.create_markdown(escape=False, plugins=["table", "strikethrough"])
+
+
+def mathml(formula: str, block: bool) -> str:
+    """A LaTeX formula as MathML."""
+    plain = re.sub(r"\\tag\{(.*?)\}", r"\\qquad\\text{(\1)}", formula.strip())
+    return convert(plain, display="block" if block else "inline")
+
+
+def rendered(source: str) -> str:
+    """Markdown with formulas as HTML without links, which a projector does not follow."""
+    formulas: list[str] = []
+
+    def hold(match: re.Match) -> str:
+        formulas.append(mathml(match[1] or match[2], block=bool(match[1])))
+        return f"\x02{len(formulas) - 1}\x03"
+
+    page = str(_markdown(_MATH.sub(hold, source)))
+    page = re.sub("\x02(\\d+)\x03", lambda match: formulas[int(match[1])], page)
+    return re.sub(r"</?a\b[^>]*>", "", page)
+
+
+@dataclass
+class Slide:
+    """One slide: its kind (title, section, question, picture, exercise, list), heading and parts as HTML."""
+
+    kind: str
+    heading: str
+    parts: list[str] = field(default_factory=list)
+
+    def page(self) -> str:
+        head = "h1" if self.kind == "title" else "h2"
+        inner = "\n".join(self.parts)
+        return f'<section class="{self.kind}">\n<{head}>{rendered(self.heading)[3:-5]}</{head}>\n{inner}\n</section>'
+
+
+def shown(output: nbformat.NotebookNode) -> str:
+    """A stored picture as HTML with its words below."""
+    words, page = spoken(output), output.data.get("text/html", "")
+    if not words:
+        page = f'<img alt="" src="data:image/png;base64,{output.data[PNG]}">'
+    caption = f"<figcaption>{html.escape(words)}</figcaption>" if words else ""
+    return f"<figure>{page}{caption}</figure>"
+
+
+def closed(cell: nbformat.NotebookNode) -> str:
+    """The outputs of a hidden cell, to be opened."""
+    parts = []
+    for output in cell.outputs:
+        if output in pictures(cell):
+            parts.append(shown(output))
+        elif "text/html" in output.get("data", {}):
+            parts.append(output.data["text/html"])
+        else:
+            text = output.get("text", "") or output.get("data", {}).get("text/plain", "")
+            text = text.removeprefix(COVER).strip()
+            parts += [f"<pre>{html.escape(text)}</pre>"] if text else []
+    return f"<details><summary>Answer</summary>\n{''.join(parts)}\n</details>" if parts else ""
+
+
+def core(cells: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
+    """The cells outside folded parts."""
+    kept, level = [], 0
+    for cell in cells:
+        head = _HEADING.match(cell.source.lstrip().partition("\n")[0]) if cell.cell_type == "markdown" else None
+        if head and level and len(head[1]) <= level:
+            level = 0
+        if head and head[2].startswith("Dig deeper"):
+            level = len(head[1])
+        if not level:
+            kept.append(cell)
+    return kept
+
+
+class _Deck:
+    """Slides as they grow from cell to cell."""
+
+    def __init__(self) -> None:
+        self.slides: list[Slide] = []
+        self.section = ""
+        self.fresh = False  # nothing but the heading stands on the slide of the section so far
+
+    def add(self, kind: str, heading: str, *parts: str) -> None:
+        self.slides.append(Slide(kind, heading, [part for part in parts if part]))
+        self.fresh = False
+
+    def prose(self, source: str) -> None:
+        for block in re.split(r"\n\s*\n(?![^<]*</details>)", source.strip()):
+            self.block(block.strip())
+
+    def block(self, block: str) -> None:
+        head = _HEADING.match(block.partition("\n")[0])
+        if head and len(head[1]) <= 2:
+            self.section = head[2]
+            self.add("title" if len(head[1]) == 1 else "section", head[2])
+            self.fresh = True
+        elif _EXERCISE.match(block):
+            self.add("exercise", self.section, rendered(block.lstrip("# ")))
+        elif _QUESTION.match(block):
+            self.add("question", self.section, rendered(block))
+        elif block.startswith("<details"):
+            if self.slides and self.slides[-1].kind == "question":
+                self.slides[-1].parts.append(rendered(block))
+        elif self.slides and (self.fresh or self._belongs(block)):
+            self.slides[-1].parts.append(rendered(block))
+            self.fresh = False
+
+    def _belongs(self, block: str) -> bool:
+        """Formulas, lists and tables stay on the slides of title and sections."""
+        kind = self.slides[-1].kind
+        return kind in ("title", "section") and bool(re.match(r"\$\$|[-*\d|]|.*\n\$\$", block)) and len(block) < 900
+
+    def code(self, cell: nbformat.NotebookNode) -> None:
+        if HIDDEN in cell.metadata.get("tags", []):
+            if self.slides and self.slides[-1].kind == "question":
+                self.slides[-1].parts.append(closed(cell))
+            return
+        for output in pictures(cell):
+            self.add("picture", self.section, shown(output))
+
+
+def slides(notebook: nbformat.NotebookNode) -> list[Slide]:
+    """The slides of a lesson."""
+    deck = _Deck()
+    for cell in core(notebook.cells):
+        if cell.cell_type == "code":
+            deck.code(cell)
+        else:
+            deck.prose(cell.source)
+    return deck.slides
+
+
+def page(notebook: nbformat.NotebookNode) -> str:
+    """The HTML page with all slides of a lesson."""
+    made = slides(notebook)
+    title = html.escape(made[0].heading)
+    body = "\n".join(slide.page() for slide in made)
+    return _PAGE.read_text(encoding="utf-8").replace("{title}", title).replace("{slides}", body)
