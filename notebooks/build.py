@@ -4,6 +4,7 @@
     python notebooks/build.py 03 04          # the notebooks whose names begin so
     python notebooks/build.py overview       # the picture of the README
     python notebooks/build.py figures        # nothing but the list of all figures
+    python notebooks/build.py nbgrader FOLDER 04   # lessons for nbgrader: FOLDER/source/..., from the solutions
     python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
@@ -25,6 +26,7 @@ import nbformat
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+from workshop import nbgrader  # noqa: E402
 from workshop.layout import PACKAGE, SOLUTIONS, figure_list, new  # noqa: E402
 from workshop.storing import COVER, blank, student, tidy  # noqa: E402, F401
 
@@ -91,5 +93,7 @@ def main(wanted: list[str]) -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["new"]:
         new(*sys.argv[2:])
+    elif sys.argv[1:2] == ["nbgrader"]:
+        nbgrader.export(Path(sys.argv[2]), sys.argv[3:])
     else:
         main(sys.argv[1:])

@@ -21,6 +21,7 @@ GROUPS = {
         "test_figures",
         "test_grader",
         "test_lanes",
+        "test_nbgrader",
         "test_skeleton",
         "test_sweep",
         "test_types",

@@ -1,0 +1,111 @@
+"""The lessons as nbgrader's source: exercises as solution cells, each check in a locked cell of its own with points.
+
+``nbgrader generate_assignment`` and ``nbgrader autograde`` run on what ``export`` writes.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import nbformat
+
+from rapkm_lite.checks import exercises
+
+from .layout import SOLUTIONS
+
+# Comes back when nbgrader grades: a wrong answer raises, and the check is the package's own.
+_HIDDEN = """### BEGIN HIDDEN TESTS
+import os
+os.environ["RAPKM_LITE_STRICT"] = "1"
+from rapkm_lite.checks import check
+### END HIDDEN TESTS
+"""
+_REGION = re.compile(r"^### BEGIN SOLUTION *\n(.*?)^### END SOLUTION", re.M | re.S)
+CONFIG = """c = get_config()
+c.CourseDirectory.course_id = "rapkm_lite"
+c.ExecutePreprocessor.timeout = 120
+"""
+
+
+def marked(cell: nbformat.NotebookNode, grade_id: str, points: float | None = None) -> nbformat.NotebookNode:
+    """The cell with nbgrader's metadata: graded and locked when it has points, else the place for a solution."""
+    graded = points is not None
+    cell.metadata["nbgrader"] = {
+        "schema_version": 3,
+        "grade_id": grade_id.replace(".", "-"),
+        "grade": graded,
+        "solution": not graded,
+        "locked": graded,
+        "task": False,
+        **({"points": points} if graded else {}),
+    }
+    return cell
+
+
+def split(source: str) -> tuple[str, list[tuple[str, str]], str]:
+    """What stands before the checks of a cell, each check with the name of its exercise, and what stands behind."""
+    lines = source.splitlines(keepends=True)
+    checks = []
+    for node in ast.parse(source).body:
+        call = getattr(node, "value", None)
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "check":
+            name = ast.literal_eval(call.args[0])
+            checks.append((name, node.lineno - 1, node.end_lineno or node.lineno))
+    if not checks:
+        return source, [], ""
+    first, last = checks[0][1], checks[-1][2]
+    texts = [(name, "".join(lines[start:end])) for name, start, end in checks]
+    return "".join(lines[:first]).rstrip(), texts, "".join(lines[last:]).strip()
+
+
+def blanks(source: str) -> str:
+    """Names that a solution outside a function assigns are `...` before it, so that the lesson runs without it."""
+
+    def with_blanks(match: re.Match) -> str:
+        names = dict.fromkeys(re.findall(r"^(\w+) *=[^=]", match[1], re.M))
+        return "".join(f"{name} = ...\n" for name in names) + match[0]
+
+    return _REGION.sub(with_blanks, source)
+
+
+def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """The solved lesson as nbgrader's instructor version, without outputs."""
+    copy = nbformat.reads(nbformat.writes(lesson), as_version=4)
+    points = {name: exercise.points for name, exercise in exercises().items()}
+    cells = []
+    for cell in copy.cells:
+        if cell.cell_type != "code":
+            cells.append(cell)
+            continue
+        cell.outputs, cell.execution_count = [], None
+        body, checks, rest = split(cell.source)
+        if not checks and "### BEGIN SOLUTION" not in cell.source:
+            cells.append(cell)
+            continue
+        cell.source = blanks(body)
+        if body:
+            cells.append(marked(cell, f"{checks[0][0]}.answer" if checks else f"solution.{len(cells)}"))
+        for name, text in checks:
+            cells.append(marked(nbformat.v4.new_code_cell(_HIDDEN + text), name, points[name]))
+        if rest:
+            cells.append(nbformat.v4.new_code_cell(rest))
+    for number, cell in enumerate(cells):
+        cell.id = f"cell-{number:02d}"
+    copy.cells = cells
+    return copy
+
+
+def export(folder: Path, wanted: list[str]) -> list[Path]:
+    """Write FOLDER/source/04_title/04_title.ipynb for the lessons whose names begin so, and nbgrader's settings."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
+    made = []
+    for path in sorted(SOLUTIONS.glob("*.ipynb")):
+        if not wanted or any(path.name.startswith(word) for word in wanted):
+            place = folder / "source" / path.stem
+            place.mkdir(parents=True, exist_ok=True)
+            nbformat.write(assignment(nbformat.read(path, as_version=4)), place / path.name)
+            made.append(place / path.name)
+    return made

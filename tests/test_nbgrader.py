@@ -1,0 +1,81 @@
+"""The export for nbgrader, and nbgrader itself on a lesson where it is installed (the extra `nbgrader`)."""
+
+import importlib.util
+import shutil
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from rapkm_lite.checks import exercises
+
+NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+SOLVED = sorted((NOTEBOOKS / "solutions").glob("*.ipynb"))
+LESSON = "04_antagonism_filter_energy"
+INSTALLED = importlib.util.find_spec("nbgrader") is not None
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("course")
+    subprocess.run([sys.executable, str(NOTEBOOKS / "build.py"), "nbgrader", str(folder)], check=True)
+    return folder
+
+
+@pytest.mark.parametrize("path", SOLVED, ids=lambda path: path.stem)
+def test_every_exercise_has_a_locked_cell_with_its_points(path, course):
+    cells = nbformat.read(course / "source" / path.stem / path.name, as_version=4).cells
+    marks = [cell.metadata.nbgrader for cell in cells if "nbgrader" in cell.metadata]
+    graded = {mark.grade_id: mark.points for mark in marks if mark.grade}
+    known = {name.replace(".", "-"): e.points for name, e in exercises().items() if name[:2] == path.stem[:2]}
+    assert graded == known
+    assert len({mark.grade_id for mark in marks}) == len(marks)
+    for cell in cells:
+        if "### BEGIN SOLUTION" in cell.source:
+            assert cell.metadata.nbgrader.solution and "check(" not in cell.source
+        elif "nbgrader" in cell.metadata and cell.metadata.nbgrader.grade:
+            assert cell.metadata.nbgrader.locked and 'check("' in cell.source
+
+
+def nbgrader(course, *words):
+    done = subprocess.run([sys.executable, "-m", "nbgrader", *words], cwd=course, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+@pytest.mark.skipif(not INSTALLED, reason="nbgrader, an extra, is not installed")
+def test_nbgrader_makes_the_assignment_and_grades_it(course):
+    nbgrader(course, "generate_assignment", LESSON)
+    released = (course / "release" / LESSON / f"{LESSON}.ipynb").read_text(encoding="utf-8")
+    assert "SOLUTION" not in released and "RAPKM_LITE_STRICT" not in released
+    solved = nbformat.read(course / "source" / LESSON / f"{LESSON}.ipynb", as_version=4)
+    for student in ("blank", "mixed"):
+        place = course / "submitted" / student / LESSON
+        place.mkdir(parents=True)
+        shutil.copy(course / "release" / LESSON / f"{LESSON}.ipynb", place)
+    # Right answers but for the first, and its check taken out by the student.
+    given = nbformat.read(place / f"{LESSON}.ipynb", as_version=4)
+    answers = {c.metadata.nbgrader.grade_id: c.source for c in solved.cells if "nbgrader" in c.metadata}
+    for cell in given.cells:
+        mark = cell.metadata.get("nbgrader", {})
+        if mark.get("solution"):
+            cell.source = answers[mark["grade_id"]]
+        if mark.get("grade_id") == "04-filtered_torques-answer":
+            cell.source = "def filtered_torques(A, c):\n    return c"
+        elif mark.get("grade_id") == "04-filtered_torques":
+            cell.source = "pass"
+    nbformat.write(given, place / f"{LESSON}.ipynb")
+    nbgrader(course, "autograde", LESSON)
+    rows = sqlite3.connect(course / "gradebook.db").execute(
+        "select submitted_assignment.student_id, grade_cell_name.name, grade.auto_score from grade"
+        " join submitted_notebook on grade.notebook_id = submitted_notebook.id"
+        " join submitted_assignment on submitted_notebook.assignment_id = submitted_assignment.id"
+        " join base_cell as grade_cell_name on grade.cell_id = grade_cell_name.id"
+    )
+    scores = {(student, name): score for student, name, score in rows}
+    points = {name.replace(".", "-"): e.points for name, e in exercises().items() if name.startswith("04.")}
+    for name, full in points.items():
+        assert scores["blank", name] == 0.0
+        assert scores["mixed", name] == (0.0 if name == "04-filtered_torques" else full)
