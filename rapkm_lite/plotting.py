@@ -50,9 +50,12 @@ from .figures.tables import (
     table,
 )
 from .lessons.lesson00.figures import (
+    film_workshop,
+    plot_at_work,
     plot_working_modes,
 )
 from .lessons.lesson01.figures import (
+    film_loops,
     plot_complement_size,
     plot_configuration_space,
     plot_cut_tree,
@@ -115,6 +118,11 @@ from .lessons.lesson06.figures import (
     plot_placement,
     plot_readings,
 )
+from .lessons.lesson07.figures import (
+    plot_demand,
+    plot_five_bar_curves,
+    plot_spacing,
+)
 
 __all__ = [
     "AFTER",
@@ -135,8 +143,10 @@ __all__ = [
     "film",
     "film_filter",
     "film_force_polygon",
+    "film_loops",
     "film_mirror",
     "film_three_lines",
+    "film_workshop",
     "grid_points",
     "lines_per_drive",
     "mode_name",
@@ -147,6 +157,7 @@ __all__ = [
     "plane_axes",
     "plane_limits",
     "plot_antagonism",
+    "plot_at_work",
     "plot_available_forces",
     "plot_bands",
     "plot_chatter",
@@ -154,6 +165,7 @@ __all__ = [
     "plot_configuration_space",
     "plot_crossed_linkage",
     "plot_cut_tree",
+    "plot_demand",
     "plot_disagreement",
     "plot_ee_paths",
     "plot_effective_gain",
@@ -163,6 +175,7 @@ __all__ = [
     "plot_feedback_map",
     "plot_fight_map",
     "plot_filter_share",
+    "plot_five_bar_curves",
     "plot_gain_curve",
     "plot_gain_ratio",
     "plot_guaranteed_force",
@@ -189,6 +202,7 @@ __all__ = [
     "plot_readings",
     "plot_rest_torques",
     "plot_singular_poses",
+    "plot_spacing",
     "plot_step_response",
     "plot_synchronization",
     "plot_table1",

@@ -9,7 +9,7 @@ import nbformat
 from .pictures import describe
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
-HIDDEN, DEEPER = "hide-output", "dig-deeper"
+HIDDEN, DEEPER, SCENE = "hide-output", "dig-deeper", "hide-input"
 # JupyterLab shows the first line of a hidden output; tests/nbval-sanitize.cfg takes this one out of comparisons.
 COVER = "The answer is here; open it when you have your own.\n"
 _SOLUTION = re.compile(r"^([ \t]*)### BEGIN SOLUTION *\n(.*?)^[ \t]*### END SOLUTION *\n?", re.M | re.S)
@@ -47,8 +47,9 @@ def kept(cell: nbformat.NotebookNode) -> dict:
     if cell.cell_type == "markdown" and _DEEPER.match(cell.source):
         stored["jp-MarkdownHeadingCollapsed"] = True
         tags.append(DEEPER)
-    if cell.cell_type == "code" and HIDDEN in tags:
-        stored["jupyter"] = {"outputs_hidden": True}
+    if cell.cell_type == "code" and {HIDDEN, SCENE} & set(tags):
+        closed = {"outputs_hidden": HIDDEN, "source_hidden": SCENE}
+        stored["jupyter"] = {what: True for what, tag in closed.items() if tag in tags}
     if tags:
         stored["tags"] = tags
     if cell.metadata.get("alt"):

@@ -28,7 +28,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N = robot.n_arms
     path = triangle(robot)
-    calibration = {False: np.zeros(N), True: 1e-3 * np.resize([-5.0, -6.0, 12.0], N)}
+    calibration = {False: np.zeros(N), True: 1e-3 * np.resize([4.0, -2.0, 5.0], N)}
 
     @lru_cache(maxsize=8)
     def recorded(filter: str, offsets: bool):
@@ -80,7 +80,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
         "filter": choice("antagonism filter", LAWS.keys()),
-        "offsets": switch("calibration offsets −5, −6, 12 mrad", True),
+        "offsets": switch("calibration offsets 4, −2, 5 mrad", True),
     }
     layout = [["plane", "torque"], ["plane", "error"]]
     about = "The machine on its way along the triangle; arrows are the forces of the drives on the end-effector."

@@ -1,13 +1,18 @@
-"""Figures of lesson 00: the machine in all its working modes."""
+"""Figures of lesson 00: two machines at work, and the machine in all its working modes."""
 
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures.machine import plot_machine
+from ...control.laws import PD
+from ...figures.film import film
+from ...figures.machine import plot_machine, plot_path
 from ...figures.maps import mode_name
+from ...figures.style import NEUTRAL
 from ...mechanics.kinematics import inverse_kinematics, working_modes
+from ...mechanics.trajectory import follow, triangle
+from ...simulation.runs import simulate
 
 
 def plot_working_modes(robot, x, axes=None):
@@ -20,3 +25,51 @@ def plot_working_modes(robot, x, axes=None):
         ax.set_title(mode_name(mode), loc="center")
         ax.label_outer()
     return axes
+
+
+def plot_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""):
+    """The machine at q (2N,) on its path, and a meter beside it: `spent` of `most` energy, both in J."""
+    plot_path(path, ax, lw=0.9)
+    plot_machine(robot, q, ax, labels=False)
+    low, high = -0.28, 0.28
+    ax.plot([0.5, 0.5], [low, high], color="#DDDDDD", lw=9, solid_capstyle="butt")
+    ax.plot([0.5, 0.5], [low, low + (high - low) * spent / most], color=NEUTRAL, lw=9, solid_capstyle="butt")
+    ax.text(0.5, high + 0.02, f"{spent:.1f} J", ha="center", va="bottom", fontsize=11)
+    ax.text(-0.4, 0.34, title, fontweight="bold")
+    ax.set(xlim=(-0.42, 0.62), ylim=(-0.34, 0.38))
+    ax.set_axis_off()
+    return ax
+
+
+def film_workshop(robot, offset):
+    """Two machines with a lap of the triangle and five seconds of rest: encoders right, and wrong by offset (N,), rad.
+
+    The meters count the electric energy since the start.
+    """
+    lap = triangle(robot)
+    still = np.zeros((len(lap.t) - 1, 2))
+    x, xd, xdd = (np.concatenate([part, still + end]) for part, end in ((lap.x, lap.x[-1]), (lap.xd, 0), (lap.xdd, 0)))
+    path = follow(robot, lap.dt * np.arange(len(x)), x, xd, xdd)
+    runs = [simulate(robot, PD(7.05, 0.225), path, error) for error in (np.zeros(robot.n_arms), offset)]
+    weight = robot.resistance / robot.torque_constant**2
+    meters = []
+    for run in runs:
+        held = run.c[:-1]
+        power = weight * held**2 * run.dt + held * np.diff(run.q_a, axis=0)
+        meters.append(np.concatenate([[0.0], np.cumsum(power.sum(axis=1))]))
+    most = max(meter.max() for meter in meters)
+
+    def draw(axes, k):
+        for ax, run, meter, name in zip(axes, runs, meters, ("machine A", "machine B"), strict=True):
+            plot_at_work(robot, run.q[k], lap, meter[k], most, ax, f"{name}, {run.t[k]:.1f} s")
+
+    return film(
+        draw,
+        np.linspace(0, len(path.t) - 1, 36).astype(int),
+        "Two equal machines with three arms take their tool around the same triangle in five seconds and then stand "
+        f"still for five more. The meter of machine A stops at {meters[0][-1]:.1f} J. That of machine B rises faster, "
+        f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J.",
+        panels=2,
+        figsize=(7.6, 3.2),
+        seconds=10,
+    )

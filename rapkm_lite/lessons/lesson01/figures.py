@@ -8,6 +8,7 @@ import matplotlib.style
 import numpy as np
 from matplotlib.ticker import MultipleLocator
 
+from ...figures.film import film
 from ...figures.machine import plot_machine
 from ...figures.maps import mode_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, arm_text_colour, axes_or_new
@@ -136,7 +137,7 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
         with matplotlib.style.context(STYLE):
             ax = plt.figure(figsize=(6.4, 5.4)).add_subplot(projection="3d", computed_zorder=False)
     rims = []
-    shades = mpl.colormaps["cividis"](np.linspace(0.9, 0.3, len(modes)))
+    shades = mpl.colormaps["bone"](np.linspace(0.85, 0.45, len(modes)))
     for shade, mode in zip(shades, modes, strict=True):
         sheet = np.rad2deg(configuration_sheet(robot, mode))
         label = f"mode {mode_name(mode)}"
@@ -180,7 +181,7 @@ def plot_complement_size(trajectory, pairs, ax=None):
         ax.semilogy(trajectory.t, size, label=names, **arm_line(out))
     ax.axhline(1.0, color=NEUTRAL, lw=1.0, label="$N_J$: size 1 everywhere")
     ax.set(xlabel="time in s", ylabel="largest singular value of F", xlim=(0, trajectory.t[-1]))
-    ax.set_ylim(0.5, 1e6)
+    ax.set_ylim(0.5, 1e7)
     ax.legend(loc="upper center", ncols=2)
     return ax
 
@@ -212,3 +213,29 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     ax.legend(loc="upper left")
     ax.set_title(title)
     return ax
+
+
+def film_loops(robot, t, gaps: dict, runs: dict):
+    """A film of runs (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,)."""
+    size = 1e3 * max(gap.max() for gap in gaps.values())
+
+    def draw(axes, k):
+        for ax, (name, q) in zip(axes, runs.items(), strict=False):
+            plot_cut_tree(robot, q[k], ax).legend().remove()
+            ax.text(-0.26, 0.29, f"{name}, {t[k]:.1f} s", fontweight="bold")
+            ax.set(xlim=(-0.27, 0.36), ylim=(-0.25, 0.32))
+            ax.set_axis_off()
+        for (name, gap), (colour, dash) in zip(gaps.items(), ((ALARM, "-"), (AFTER, "--")), strict=True):
+            axes[-1].plot(t[: k + 1], 1e3 * gap[: k + 1], color=colour, ls=dash, label=name)
+        axes[-1].set(xlabel="time in s", ylabel="largest gap in mm", xlim=(0, t[-1]), ylim=(-0.03 * size, 1.1 * size))
+        axes[-1].legend(loc="upper left")
+
+    names = list(runs)
+    return film(
+        draw,
+        np.linspace(0, len(t) - 1, 26).astype(int),
+        f"Two simulations of the machine on its circle. {names[0]}: the tips drift apart, to {size:.0f} mm after "
+        f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero.",
+        panels=3,
+        figsize=(8.8, 3.0),
+    )

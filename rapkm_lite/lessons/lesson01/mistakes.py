@@ -199,6 +199,9 @@ COMPLEMENTS = {
     "these are two columns of the projector N_J: same plane, but no identity in the independent rows": (
         lambda robot, q, independent: _projector(robot, q)[:, independent]
     ),
+    "the columns are scaled to unit length: the rows of the independent joints are no identity any more": (
+        lambda robot, q, independent: (F := orthogonal_complement(robot, q, independent)) / np.linalg.norm(F, axis=0)
+    ),
     "this is the projector N_J; F has two columns": lambda robot, q, independent: _projector(robot, q),
     "the independent joints are counted from 1; the indices begin at 0": (
         lambda robot, q, independent: orthogonal_complement(robot, q, [(j - 1) % robot.n_joints for j in independent])
@@ -216,6 +219,7 @@ ACCELERATIONS = {
     "the factor C is missing: Coriolis and centrifugal torques of the tree": _projected(C=0.0),
     "Q is missing: the friction of the drives": _projected(Q=0.0),
     "C and Q are missing": _projected(C=0.0, Q=0.0),
+    "the drive torques c are missing": (lambda robot, q, qd, c, independent: forward_dynamics(robot, q, qd, 0 * c)[0]),
     "everything that depends on the velocity is missing": _projected(C=0.0, Q=0.0, GFdot=0.0, back=0.0),
     "the sign of Q is opposite: it stands on the left of (2)": _projected(Q=-1.0),
     "the sign of the velocity terms is opposite: they stand on the left of (2)": _projected(C=-1.0, Q=-1.0, GFdot=-1.0),
@@ -252,6 +256,9 @@ FORCES = {
         lambda robot, q, qd, c: (
             (constraint_jacobian(robot, q).T @ forward_dynamics(robot, q, qd, c)[1]).reshape(2, -1).T
         )
+    ),
+    "the drive torques c are missing": (
+        lambda robot, q, qd, c: (lambda L: np.insert(-L, 1, L.sum(axis=0), axis=0))(_multipliers(robot, q, qd, 0 * c))
     ),
     "these are the lengths of the forces; their two components are wanted": _pins_with(
         lambda L: np.linalg.norm(np.insert(-L, 1, L.sum(axis=0), axis=0), axis=1)

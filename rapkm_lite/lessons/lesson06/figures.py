@@ -41,8 +41,8 @@ def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
     return ax
 
 
-def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J"):
-    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace."""
+def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J", path=None):
+    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace, and one path."""
     ax = axes_or_new(ax, figsize=(5.6, 4.4))
     plot_workspace(robot, ax, colour="#F7F7F7")
     plot_machine(robot, np.zeros(robot.n_joints), ax, arms=[])
@@ -60,6 +60,8 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
         )
     marks = ax.scatter(*np.asarray(centres).T, c=values, marker="s", s=60, zorder=3)
     ax.figure.colorbar(marks, ax=ax, label=label)
+    if path is not None:
+        ax.plot(*path.x.T, color=ALARM, lw=2.0, zorder=4)
     ax.grid(False)
     ax.set(xlim=(-0.27, 0.27), ylim=(-0.2, 0.29))
     return ax
