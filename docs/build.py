@@ -16,9 +16,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path.insert(0, str(HERE))
 
-from pages import lessons, reference  # noqa: E402
+from pages import lessons, reference, start  # noqa: E402
 from sphinx.cmd.build import build_main  # noqa: E402
 
+# Where docs/lite.py puts the lessons that run in the browser.
+RUN = "lite/lab/index.html?path=00_start_here.ipynb"
 WORK, SITE = HERE / "_work", HERE / "_site"
 PLAN = """\
 # rapkm_lite
@@ -125,6 +127,7 @@ def main() -> int:
         arguments = ["-q", "-b", "html", "-c", str(HERE), "-d", doctrees, *strict, str(WORK), str(SITE)]
         status = build_main(arguments)
     shutil.copy(mathjax(), SITE / "_static/tex-svg.js")
+    (SITE / "index.html").write_text(start.page("contents.html", RUN), encoding="utf-8")
     size = sum(path.stat().st_size for path in SITE.rglob("*") if path.is_file())
     print(f"{SITE}: {len(list(SITE.rglob('*.html')))} pages, {size / 1e6:.1f} MB")
     return status
