@@ -597,8 +597,9 @@ export function mount(el, scene, link) {
     }
     if (open.size >= AFLOAT || !(Object.keys(waiting.to).length + Object.keys(waiting.by).length)) return;
     open.set(++seq, performance.now());
-    link.send({ kind: "grab", from: me, seq, ...waiting });
+    const wishes = waiting;
     waiting = { to: {}, by: {} };
+    link.send({ kind: "grab", from: me, seq, ...wishes });
     setTimeout(pump, PATIENCE + 50);
   }
 
