@@ -27,7 +27,7 @@ GROUPS = {
         "test_types",
     ],
     "oracle": ["test_oracles", "test_symbolic"],
-    "browser": ["test_lab"],
+    "browser": ["test_lab", "test_start"],
 }
 # Longer than their file lets one expect.
 SLOW = {
