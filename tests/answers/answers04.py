@@ -102,6 +102,19 @@ COMMANDS = [
     ("wrong", "columns scaled", lambda A, K, q, d: q - rk.antagonism_filter(A * K.mean()) @ (q - d), "gains"),
     ("wrong", "exchanged", lambda A, K, q, d: command(A, K, d, q), "exchanged"),
     ("wrong", "root of the gains", lambda A, K, q, d: command(A, np.sqrt(K), q, d), "root"),
+    ("wrong", "a wrong direction", lambda A, K, q, d: q - rk.command_filter(A, K) @ (d - q), "sign"),
+    ("wrong", "in mrad", lambda A, K, q, d: 1e3 * command(A, K, q, d), "1000"),
+    ("wrong", "gains squared", lambda A, K, q, d: command(A, K**2, q, d), "twice"),
+    (
+        "wrong",
+        "gains on both sides",
+        lambda A, K, q, d: q - K * (rk.command_filter(A, K) @ (q - d)),
+        "multiplied by the gains",
+    ),
+    ("wrong", "the matrix", lambda A, K, q, d: rk.command_filter(A, K), "shape"),
+    ("wrong", "zeros", lambda A, K, q, d: 0 * q, "zero"),
+    ("wrong", "reversed", lambda A, K, q, d: command(A, K, q, d)[::-1], "order"),
+    ("wrong", "opposite", lambda A, K, q, d: -command(A, K, q, d), "sign"),
 ]
 
 
@@ -153,10 +166,72 @@ SAVINGS = [
     ("wrong", "half", lambda r, A, c, dt: 0.5 * saved(r, A, c, dt), "half"),
     ("wrong", "mean power", lambda r, A, c, dt: saved(r, A, c, 1 / len(c)), "dt"),
     ("wrong", "shape", lambda r, A, c, dt: c - kept(A, c), "shape"),
+    ("wrong", "reversed", lambda r, A, c, dt: saved(r, A, c, dt)[::-1], "order"),
+    ("wrong", "absolute", lambda r, A, c, dt: np.abs(saved(r, A, c, dt)), "sign"),
+    ("wrong", "root", lambda r, A, c, dt: np.sqrt(np.abs(saved(r, A, c, dt))), ""),
+    ("wrong", "twice", lambda r, A, c, dt: 2 * saved(r, A, c, dt), "twice"),
+    ("wrong", "square of the difference", lambda r, A, c, dt: whole_matrix(r, A, c, dt), "Pythagoras"),
+    ("wrong", "complement filtered", lambda r, A, c, dt: loss(r, kept(A, c), dt), "remains"),
+    ("wrong", "zeros", lambda r, A, c, dt: np.zeros(3), "zero"),
+]
+
+
+def weights(robot):
+    return robot.resistance / robot.torque_constant**2
+
+
+def weighted(K_P, K_D):
+    return lambda robot: rk.AntagonismFilter(rk.PD(K_P, K_D), W=weights(robot))
+
+
+def fed_forward(robot):
+    """A function that is weighted by hand: the motion's torques and PD, projected with the weights."""
+    roots = np.sqrt(weights(robot))[:, None]
+
+    def law(t, q_a, qd_a, desired):
+        A = rk.control_matrix(robot, desired.q)
+        force = A.T @ (-7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a))
+        return (np.linalg.pinv((A / roots).T) @ force) / roots[:, 0]
+
+    return law
+
+
+def inside(robot):
+    return rk.AntagonismFilter(rk.RedundantCTC(1000.0, 60.0), W=np.diag(weights(robot)))
+
+
+LEAN = [
+    ("right", "weights", weighted(7.05, 0.225)),
+    ("right", "stiffer", weighted(20.0, 0.4)),
+    ("right", "weights up to a factor", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), W=robot.resistance)),
+    ("right", "around computed torque", inside),
+    ("right", "by hand", fed_forward),
+    ("close", "a little too soft", weighted(4.8, 0.19)),
+    ("wrong", "PD", lambda robot: rk.PD(7.05, 0.225), "no filter"),
+    ("wrong", "soft PD", lambda robot: rk.PD(2.0, 0.12), "no filter"),
+    ("wrong", "no weights", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225)), "weights are forgotten"),
+    ("wrong", "equal weights", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), W=2.0), "weights are forgotten"),
+    ("wrong", "inverse", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), W=1 / weights(robot)), "inverse"),
+    ("wrong", "true pose", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), "true", weights(robot)), "true pose"),
+    ("wrong", "too soft", weighted(2.0, 0.12), "missed"),
+    ("wrong", "commands", lambda robot: rk.CommandFilter(rk.PD(7.05, 0.225)), "energy"),
+    (
+        "wrong",
+        "squared weights",
+        lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), W=weights(robot) ** 2),
+        "energy",
+    ),
+    ("wrong", "computed torque", lambda robot: rk.RedundantCTC(1000.0, 60.0), "energy"),
+    ("wrong", "nothing", lambda robot: lambda t, q, qd, d: np.zeros(3), "mm"),
+    ("wrong", "no law", lambda robot: weights(robot), "law"),
+    ("wrong", "a law", rk.PD(7.05, 0.225), "function itself"),
+    ("wrong", "opposite sign", lambda robot: lambda t, q, qd, d: 7.05 * (q - d.q_a), "lost"),
+    ("wrong", "a crash", lambda robot: lambda t, q, qd, d: undefined, "NameError"),  # noqa: F821
 ]
 
 ANSWERS = {
     "04.filtered_torques": TORQUES,
     "04.filtered_command": COMMANDS,
     "04.saved_energy": SAVINGS,
+    "04.lean_law": LEAN,
 }

@@ -9,7 +9,7 @@ from ...machine.manipulator import Manipulator, load
 from ...mechanics import actuation, antagonism
 from ...mechanics.kinematics import inverse_kinematics
 from ...simulation import energy
-from ..checker import Exercise
+from ..checker import Case, Exercise
 from .lean_law import LEAN_LAW
 
 
@@ -92,10 +92,16 @@ def _command_with(change):
 
 def _log_cases(rng):
     robot = load()
-    return [
+    cases: list[tuple] = [
         (robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
         for R, dt in ((0.611, 1e-3), ([0.5, 0.7, 1.1], 2e-3), (0.611, 1e-2))
     ]
+    # Antagonism that takes most of the load off drive 1: with the filter this drive pays more.
+    A = _control_matrices(rng, 200)
+    moving, null = _kept(A, rng.normal(0, 0.04, (200, 3))), _null(A)
+    against = np.where(np.abs(null[:, :1]) > 0.3, moving[:, :1] / null[:, :1], 0.0)
+    c = moving - 0.8 * null * against
+    return [*cases, Case("a log in which a drive loses by the filter", robot, A, c, 1e-3)]
 
 
 def _pythagoras(got, robot, A, c, dt):
@@ -206,6 +212,12 @@ EXERCISES = {
             ),
             "the gains are under a root in the filter: this is no projection that keeps the force": (
                 lambda A, K_P, q, d: q - antagonism.antagonism_filter(np.sqrt(K_P)[:, None] * A) @ (q - d)
+            ),
+            "the gains come twice: K_P^2 A instead of K_P A (a factor K_P too many)": (
+                lambda A, K_P, q, d: q - antagonism.command_filter(A, K_P**2) @ (q - d)
+            ),
+            "the filtered error is multiplied by the gains; the drive does that on its own (units, N m against rad)": (
+                _command_with(lambda R, R_K, K, q, d: q - K * (R_K @ (q - d)))
             ),
             "measured and desired angles are exchanged, or the complement of the filter is used: the error along the "
             "null vector is kept and the rest removed": (

@@ -190,7 +190,7 @@ def plot_filter_share(run, share: float, axes=None):
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
-    >>> left, right = plot_filter_share(run, 0.5)
+    >>> ax = plot_filter_share(run, 0.5)
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.2))[1] if axes is None else axes
     fight = antagonistic_torque(run)

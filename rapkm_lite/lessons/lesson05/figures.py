@@ -130,7 +130,7 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
-    >>> left, right = plot_mirror(run, 1400, (0, 1))
+    >>> ax = plot_mirror(run, 1400, (0, 1))
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.6), width_ratios=[1, 1.2])[1] if axes is None else axes
     robot, desired = run.robot, run.trajectory.x

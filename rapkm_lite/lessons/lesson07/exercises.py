@@ -74,8 +74,9 @@ EXERCISES = {
             ),
             "the gain K_P is missing": lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, delay, 1.0),
             "the rates A xd are missing: a delay in s is no angle": (
-                lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, delay, K_P) * 0
-                - K_P * (np.eye(len(A)) - A @ np.linalg.pinv(A)) @ delay
+                lambda A, xd, delay, K_P: (
+                    tasks.delay_torque(A, xd, delay, K_P) * 0 - K_P * (np.eye(len(A)) - A @ np.linalg.pinv(A)) @ delay
+                )
             ),
             "the delays are averaged: equal delays contradict nothing": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, np.full(len(A), delay.mean()), K_P)
