@@ -58,7 +58,10 @@ def test_force_filter_removes_antagonism_and_nothing_else():
 def test_command_filter_equals_the_force_filter_only_for_equal_gains():
     q, qd, desired = state_and_target(TESTBED)
     A, offset = rk.control_matrix(TESTBED, q), np.array([0.004, -0.002, 0.005])
-    pair = lambda pd: [torque(f(pd), TESTBED, q, qd, desired, offset) for f in (rk.AntagonismFilter, rk.CommandFilter)]
+
+    def pair(pd):
+        return [torque(f(pd), TESTBED, q, qd, desired, offset) for f in (rk.AntagonismFilter, rk.CommandFilter)]
+
     force, command = pair(rk.PD(7.05, 0.225))
     assert_allclose(force, command, atol=1e-14)
     force, command = pair(rk.PD([4.0, 7.0, 10.0], [0.2, 0.2, 0.3]))
