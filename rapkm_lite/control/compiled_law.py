@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import one_of, whole_number
+from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
 from .grammar import LawValue
 
@@ -29,8 +29,8 @@ class CompiledLaw(LawValue):
     memory: int = 0
 
     def __post_init__(self):
-        if not callable(self.function):
-            raise ValueError(f"function = {self.function!r}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
+        if not callable(self.function) or isinstance(self.function, type):
+            raise ValueError(f"function = {short(self.function)}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
         if self.at is not None:
             one_of("at", self.at, SOURCES)
         self._set(memory=whole_number("memory", self.memory, 0))

@@ -16,8 +16,9 @@ from ..machine.arguments import (
     one_of,
     positive_definite,
     real_array,
+    switch,
 )
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, OptionalArray, OptionalPair, default
 from ..mechanics.actuation import (
     control_matrix,
@@ -66,7 +67,7 @@ class APD(LawValue):
         if self.W is not None:
             self._set(W=gain("W", self.W))
         if self.independent is not None:
-            self._set(independent=joint_indices("independent", self.independent, 2**31))
+            self._set(independent=joint_indices("independent", self.independent, None))
         super().__post_init__()
 
     def coordinates(self, memory):
@@ -143,10 +144,10 @@ class SwitchedCTC(LawValue):
 
     def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
         """The pair to use at one pose q (2N,), given the current one."""
-        measure = np.abs(distal_cross_products(model, exact_array("q", q, model.n_joints)))
+        measure = np.abs(distal_cross_products(model, exact_array("q", q, manipulator(model, "model").n_joints)))
         pairs, best = drive_pairs(model), int(np.argmax(measure))
         if current is not None:
-            j, k = sorted(joint_indices("current", current, model.n_arms))
+            j, k = sorted(joint_indices("current", current, model.n_arms, 2, "drive"))
             current = j, k
             if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
                 return current
@@ -154,7 +155,7 @@ class SwitchedCTC(LawValue):
 
     def pairs(self, model: Manipulator, q) -> np.ndarray:
         """The pairs (k, 2) used along the poses q (k, 2N); `Run.switches` counts the changes."""
-        q, current, chosen = real_array("q", q, model.n_joints), None, []
+        q, current, chosen = real_array("q", q, manipulator(model, "model").n_joints), None, []
         if q.ndim != 2:
             raise ValueError(f"q has shape {q.shape}; allowed: (k, {model.n_joints}), poses in the order of time")
         for pose in q:
@@ -164,6 +165,7 @@ class SwitchedCTC(LawValue):
 
     def fixed(self, pair) -> CTC:
         """The CTC law in force while `pair` is used."""
+        pair = joint_indices("pair", pair, None, 2, "drive")
         return CTC(self.K_P, self.K_D, pair, pose=self.pose)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
@@ -208,6 +210,8 @@ class RedundantAPD(LawValue):
 
     def __post_init__(self):
         self._check_pose()
+        if isinstance(self, RedundantCTC):
+            switch("projected", self.projected)
         one_of("rule", self.rule, PARTITION_RULES)
         self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
         super().__post_init__()
@@ -258,11 +262,12 @@ class RedundantCTC(RedundantAPD):
 
 def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles and rates as known: driven joints as measured, elbows from the pose."""
-    N = model.n_arms
+    N = manipulator(model, "model").n_arms
     q, qd = joint_vectors(model.n_joints, q=q, qd=qd)
     q_a, qd_a = measured(model, q_a, qd_a, desired)
-    check_leading(q=q.shape[:-1], q_a=q_a.shape[:-1])
-    elbows, rates = q[..., N:], qd[..., N:]
+    parts = {"q": q[..., N:], "qd": qd[..., N:], "q_a": q_a, "qd_a": qd_a}
+    lead = check_leading(**{name: part.shape[:-1] for name, part in parts.items()})
+    elbows, rates, q_a, qd_a = (np.broadcast_to(part, (*lead, N)) for part in parts.values())
     return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
 
 

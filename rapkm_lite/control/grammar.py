@@ -13,14 +13,24 @@ Errors are measured minus desired.
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import bounded, check_leading, joint_vectors, one_of, positive_definite, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import (
+    bounded,
+    check_leading,
+    joint_vectors,
+    of_kind,
+    one_of,
+    positive_definite,
+    real_array,
+    short,
+)
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Desired
 
@@ -76,6 +86,18 @@ class Function(Law):
     def __init__(self, function):
         self.function = function
 
+    def start(self, model, dt):
+        """A function that cannot be called so is refused before the run."""
+        try:
+            inspect.signature(self.function).bind("t", "q_a", "qd_a", "desired")
+        except TypeError as error:
+            raise ValueError(
+                f"law = {short(self.function)} cannot be called ({error}); allowed: a function "
+                "(t, q_a, qd_a, desired) -> c"
+            ) from None
+        except ValueError:
+            pass  # built-in functions have no signature
+
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
 
@@ -83,11 +105,11 @@ class Function(Law):
 def as_law(law) -> Law:
     """The law itself, or a callable in the grammar of a law; raises ValueError for anything else."""
     if not isinstance(law, type):
-        if hasattr(law, "start") and hasattr(law, "step"):
+        if callable(getattr(law, "start", None)) and callable(getattr(law, "step", None)):
             return law
         if callable(law):
             return Function(law)
-    raise ValueError(f"law = {law!r}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
+    raise ValueError(f"law = {short(law)}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
 
 
 def coordinates(law, memory) -> tuple[int, int] | None:
@@ -148,7 +170,8 @@ def gain(name: str, value, zero: bool = False) -> np.ndarray:
 
 def measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
     """The measured base angles and rates, after a check that they fit the model and the desired motion."""
-    q_a, qd_a = joint_vectors(model.n_arms, q_a=q_a, qd_a=qd_a)
+    q_a, qd_a = joint_vectors(manipulator(model, "model").n_arms, q_a=q_a, qd_a=qd_a)
+    of_kind("desired", desired, Desired, "a Desired, such as trajectory[k]")
     if desired.n_arms != model.n_arms:
         raise ValueError(f"desired has {desired.n_arms} arms, the model {model.n_arms}; allowed: the same number")
     check_leading(q_a=q_a.shape[:-1], desired=desired.q.shape[:-1])

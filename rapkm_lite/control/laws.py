@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, matvec, positive_definite, real_array
+from ..machine.arguments import bounded, matvec, positive_definite, real_array, whole_number
+from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
@@ -42,10 +43,11 @@ class PD(LawValue):
 
     def gains(self, m: int) -> tuple[np.ndarray, np.ndarray]:
         """K_P and K_D as (m, m) matrices."""
+        m = whole_number("m", m, 1)
         return positive_definite("K_P", self.K_P, m), positive_definite("K_D", self.K_D, m)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        K_P, K_D = self.gains(model.n_arms)
+        K_P, K_D = self.gains(manipulator(model, "model").n_arms)
         q_a, qd_a = measured(model, q_a, qd_a, desired)
         return -matvec(K_P, q_a - desired.q_a) - matvec(K_D, qd_a - desired.qd_a)
 
@@ -100,11 +102,18 @@ def _times(K: np.ndarray, e: np.ndarray) -> np.ndarray:
 
 def torque_limit(limit) -> np.ndarray:
     """A largest torque in N m, one number or (N,), not negative; infinity is no limit."""
-    endless = np.asarray(limit) == math.inf
+    endless = _is_infinite(limit)
     array = real_array("limit", np.where(endless, 0.0, limit) if np.any(endless) else limit)
     if array.ndim > 1 or array.size == 0:
         raise ValueError(f"limit has shape {array.shape}; allowed: one number or one per drive")
     return np.where(endless, math.inf, bounded("limit", array, 0.0, strict=False))
+
+
+def _is_infinite(value) -> np.ndarray:
+    try:
+        return np.asarray(value, dtype=float) == math.inf
+    except (TypeError, ValueError, OverflowError):
+        return np.zeros((), bool)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +150,7 @@ class AntagonismFilter(LawValue):
 
     def matrix(self, model, q) -> np.ndarray:
         """R (..., m, m) of (15) at the pose q (..., 2N)."""
-        A = control_matrix(model, q)
+        A = control_matrix(manipulator(model, "model"), q)
         return antagonism_filter(A) if self.W is None else weighted_pseudoinverse(A, self.W) @ A.mT
 
     def torque(self, model, q, qd, q_a, qd_a, desired):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, matvec, one_of, positive_number, solve
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
+from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix
 from ..mechanics.closure import estimate_pose
 from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
@@ -34,6 +34,20 @@ class Sample:
     __slots__ = ("_found", "_keeper", "_truth", "desired", "dt", "model", "q_a", "qd_a", "t")
 
     def __init__(self, keeper: Controller, t: float, q_a, qd_a, desired: Desired, truth=None):
+        of_kind("keeper", keeper, Controller, "the Controller that makes the samples")
+        q_a, qd_a = measured(keeper.model, q_a, qd_a, desired)
+        if truth is not None:
+            truth = exact_array("truth", truth, 2, 2)
+        self._fill(keeper, float(exact_array("t", t)), q_a, qd_a, desired, truth)
+
+    @classmethod
+    def _made(cls, *known) -> Sample:
+        """A sample of what was checked before."""
+        sample = object.__new__(cls)
+        sample._fill(*known)
+        return sample
+
+    def _fill(self, keeper, t, q_a, qd_a, desired, truth):
         self.t, self.dt, self.model, self.q_a, self.qd_a, self.desired = t, keeper.dt, keeper.model, q_a, qd_a, desired
         self._keeper, self._truth, self._found = keeper, truth, {}
 
@@ -93,7 +107,7 @@ class Controller:
     """
 
     def __init__(self, law, model: Manipulator, dt: float = 1e-3):
-        self.law, self.model, self.dt = law, model, positive_number("dt", dt)
+        self.law, self.model, self.dt = law, manipulator(model, "model"), positive_number("dt", dt)
         self.x: np.ndarray | None = None
         self.memory = as_law(law).start(model, self.dt)
 
@@ -104,9 +118,12 @@ class Controller:
 
     def __call__(self, t, q_a, qd_a, desired: Desired, truth=None) -> np.ndarray:
         q_a, qd_a = measured(self.model, q_a, qd_a, desired)
+        t = float(exact_array("t", t))
+        if truth is not None:
+            truth = exact_array("truth", truth, 2, 2)
         return self.command(t, q_a, qd_a, desired, truth)
 
     def command(self, t, q_a, qd_a, desired, truth=None) -> np.ndarray:
         """The same without a check of the measurement."""
-        c, self.memory = ask(self.law, self.memory, Sample(self, t, q_a, qd_a, desired, truth))
+        c, self.memory = ask(self.law, self.memory, Sample._made(self, t, q_a, qd_a, desired, truth))
         return c

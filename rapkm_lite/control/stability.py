@@ -8,13 +8,14 @@ from ..machine.arguments import (
     bounded,
     check_leading,
     exact_array,
+    joint_indices,
     joint_vectors,
     real_array,
     solve,
     tall_matrix,
     wide_matrix,
 )
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
 from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
@@ -67,7 +68,7 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))
     0.0021
     """
-    q, e, ed = joint_vectors(robot.n_joints, q=q, e=e, ed=ed)
+    q, e, ed = joint_vectors(manipulator(robot).n_joints, q=q, e=e, ed=ed)
     eps = float(bounded("eps", exact_array("eps", eps), 0.0, strict=False))
     Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
     K = joint_gain("K_P", K_P, robot.n_arms)
@@ -85,11 +86,12 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     >>> float(rk.feedback_norm(robot, q).round(4))
     0.0056
     """
-    still = np.zeros(robot.n_joints)
+    still = np.zeros(manipulator(robot).n_joints)
     if pair is None:
         A = redundant_control_matrix(robot, q)
         M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
     else:
+        pair = joint_indices("pair", pair, robot.n_arms, 2, "drive")
         # In end-effector coordinates first, so that a grid point on the curve is no special case.
         A = control_matrix(robot, q)
         a, b, c, d = (A[..., i, k] for i in pair for k in range(2))

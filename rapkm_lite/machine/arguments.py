@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 _FLOAT = np.dtype(float)
@@ -43,12 +47,19 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
 def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value)
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            holes = np.ma.count_masked(value)
+            raise ValueError(
+                f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)"
+            )
         # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
         if value is None or array.dtype.kind not in "iufO":
             raise TypeError
         array = array.astype(float, copy=False)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {_short(value)} is not numeric; allowed: real numbers") from None
+    except OverflowError:
+        raise ValueError(f"{name} = {short(value)} is too large; allowed: finite numbers, below 1e100") from None
+    except Exception:
+        raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers") from None
     if last and array.shape[-len(last) :] != last:
         want = "(" + ", ".join(["...", *map(str, last)]) + ")"
         raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
@@ -113,6 +124,14 @@ def positive_number(name: str, value) -> float:
     return float(bounded(name, exact_array(name, value), 0.0, strict=True))
 
 
+def small_number(name: str, value) -> float:
+    """Return `value` as a float between 0 and 1, such as a tolerance."""
+    number = positive_number(name, value)
+    if number >= 1.0:
+        raise ValueError(f"{name} = {number:g}; allowed: between 0 and 1")
+    return number
+
+
 def whole_number(name: str, value, low: int) -> int:
     """Return `value` as an int that is not below `low`."""
     number = float(bounded(name, exact_array(name, value), low, strict=False))
@@ -142,22 +161,42 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     return array
 
 
-def joint_indices(name: str, value, n: int, count: int = 2) -> tuple[int, ...]:
-    """Return `value` as `count` different 0-based joint indices below `n`."""
-    try:
-        indices = tuple(int(i) for i in value)
-        exact = indices == tuple(value) and not any(isinstance(i, bool | np.bool_) for i in value)
-    except (TypeError, ValueError):
-        indices, exact = (), False
-    if not exact or len(indices) != count or len(set(indices)) != count or not all(0 <= i < n for i in indices):
-        raise ValueError(f"{name} = {_short(value)}; allowed: {count} different joint indices from 0 to {n - 1}")
-    return indices
+def joint_indices(name: str, value, n: int | None, count: int = 2, what: str = "joint") -> tuple[int, ...]:
+    """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
+    numbers = value.tolist() if isinstance(value, np.ndarray) else value
+    exact = isinstance(numbers, Sequence) and all(
+        isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < (math.inf if n is None else n)
+        for i in numbers
+    )
+    if not exact or len(numbers) != count or len(set(numbers)) != count:
+        top = "from 0 on" if n is None else f"from 0 to {n - 1}"
+        raise ValueError(f"{name} = {short(value)}; allowed: {count} different {what} indices {top}")
+    return tuple(map(int, numbers))
 
 
 def one_of(name: str, value, allowed) -> str:
     """Return `value` when it is one of the names `allowed`."""
     if not isinstance(value, str) or value not in allowed:
-        raise ValueError(f"{name} = {_short(value)}; allowed: {', '.join(map(repr, allowed))}")
+        raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
+    return value
+
+
+def switch(name: str, value) -> bool:
+    """Return `value` as a bool when it is True or False."""
+    return bool(of_kind(name, value, (bool, np.bool_), "True or False"))
+
+
+def of_kind(name: str, value: Any, kind, allowed: str) -> Any:
+    """Return `value` when it is an instance of `kind`; the sentence says what is `allowed` otherwise."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} = {short(value)}; allowed: {allowed}")
+    return value
+
+
+def having(name: str, value: Any, allowed: str, *attributes: str) -> Any:
+    """Return `value`, no class, when it has the attributes that a value of another room would have."""
+    if isinstance(value, type) or not all(hasattr(value, attribute) for attribute in attributes):
+        raise ValueError(f"{name} = {short(value)}; allowed: {allowed}")
     return value
 
 
@@ -180,6 +219,10 @@ def _at(index) -> str:
     return f"[{', '.join(map(str, index))}]" if len(index) else ""
 
 
-def _short(value) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+def short(value) -> str:
+    """A value in at most 80 characters of one line, whatever it is."""
+    try:
+        words = " ".join(repr(value).split())
+    except Exception:
+        words = f"<{type(value).__name__}>"
+    return words if len(words) <= 80 else words[:77] + "..."

@@ -6,6 +6,8 @@ import difflib
 import tomllib
 from pathlib import Path
 
+from .arguments import of_kind, short
+
 UNITS = {
     "base": "m",
     "lengths": "m",
@@ -21,13 +23,30 @@ UNITS = {
     "load": "kg",
     "mode": "1",
 }
+UNITS_OF = {
+    "manipulator": UNITS,
+    "control": {"K_P": "N m/rad", "K_D": "N m s/rad", "dt": "s"},
+    "path": {"side": "m", "duration": "s", "centre": "m", "angle": "rad", "rest": "s"},
+    "sensor": {"offset": "rad", "encoder": "1", "velocity_filter": "s"},
+    "fault": {
+        "kind": None,
+        "drive": "1",
+        "time": "s",
+        "start": "s",
+        "stop": "s",
+        "jump": "rad",
+        "limit": "N m",
+    },
+}
+"""Keys of every table of a data file, and their units."""
 
 
-def known(what: str, key: str, allowed) -> None:
-    if key not in allowed:
-        close = difflib.get_close_matches(key, allowed, n=1)
+def known(what: str, key, allowed) -> None:
+    """Refuse a word that is none of those allowed, with the nearest one."""
+    if not isinstance(key, str) or key not in allowed:
+        close = difflib.get_close_matches(str(key), allowed, n=1)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
-        raise ValueError(f"unknown {what} {key!r}{hint}; allowed: {', '.join(sorted(allowed))}")
+        raise ValueError(f"unknown {what} {short(key)}{hint}; allowed: {', '.join(sorted(allowed))}")
 
 
 def data_path(name: str) -> Path:
@@ -39,11 +58,21 @@ def data_path(name: str) -> Path:
     >>> rk.data_path("testbed.toml").name
     'testbed.toml'
     """
+    return _data_file("name", name, name)
+
+
+def _data_file(argument: str, value, name) -> Path:
+    """A file of the folder data; the sentence names the argument that asks for it."""
     here = Path(__file__).resolve().parents[1]
-    for folder in (here / "data", here.parent / "data"):
-        if (folder / name).exists():
-            return folder / name
-    raise ValueError(f"there is no data file {name!r}; allowed: a file name from the folder data")
+    files: dict[str, Path] = {}
+    for folder in (here.parent / "data", here / "data"):
+        files |= {p.relative_to(folder).as_posix(): p for p in folder.rglob("*.*") if p.is_file()}
+    if isinstance(name, str) and name in files:
+        return files[name]
+    raise ValueError(
+        f"{argument} = {short(value)}: there is no data file {short(name)}; allowed: a file name from the folder data: "
+        f"{', '.join(sorted(k for k in files if k.endswith(('.toml', '.csv')) and '/' not in k))}"
+    )
 
 
 def read_toml(source: str | Path) -> dict:
@@ -51,27 +80,47 @@ def read_toml(source: str | Path) -> dict:
 
     Raises ValueError for an unreadable file or a unit other than SI.
     """
-    if not isinstance(source, str | Path):
-        raise ValueError(f"source = {source!r}; allowed: a name such as 'testbed', or a path that ends in .toml")
-    path = Path(source)
-    if path.suffix != ".toml":
-        path = data_path(f"{source}.toml")
+    of_kind("source", source, (str, Path), "a name such as 'testbed', or a path that ends in .toml")
+    path = Path(source) if str(source).endswith(".toml") else _data_file("source", source, f"{source}.toml")
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ValueError(f"the file {str(path)!r} cannot be read ({error.strerror}); allowed: a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"the file {str(path)!r} is not valid TOML: {error}") from None
-    return {key: _plain(key, value) for key, value in tables.items()}
+        raise _unread(path, f"cannot be read ({error.strerror})") from None
+    except RecursionError:
+        raise _unread(path, "is nested too deeply") from None
+    except ValueError as error:  # also a NUL in the path, and numbers of more digits than Python reads
+        raise _unread(path, f"is not valid TOML: {error}") from None
+    for key in tables:
+        known("TOML table", key, ["name", "about", *UNITS_OF])
+    return {key: _table(key, value) for key, value in tables.items()}
 
 
-def _plain(key: str, value):
-    if isinstance(value, dict) and "value" in value:
-        for part in value:
-            known(f"entry of {key!r}", part, ["value", "unit", "source"])
-        if key in UNITS and value.get("unit", UNITS[key]) != UNITS[key]:
-            raise ValueError(f"{key} has the unit {value['unit']!r}; allowed: {UNITS[key]!r}")
-        return value["value"]
-    if isinstance(value, dict):
-        return {k: _plain(k, v) for k, v in value.items()}
-    return value
+def _table(name: str, values):
+    """A table reduced to its numbers; [[fault]] is a list of tables."""
+    if name not in UNITS_OF:
+        return of_kind(name, values, str, "text")
+    if name == "fault":
+        return [_entries(name, table) for table in of_kind(name, values, list, "tables [[fault]]")]
+    return _entries(name, values)
+
+
+def _entries(name: str, values) -> dict:
+    of_kind(name, values, dict, f"a table [{name}]")
+    return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
+
+
+def _unread(path: Path, words: str) -> ValueError:
+    return ValueError(f"source: the file {short(str(path))} {words}; allowed: a TOML file")
+
+
+def _plain(key: str, value, unit: str | None):
+    """The number of {value, unit, source}; keys without a unit of ours are left to who reads the table."""
+    if not isinstance(value, dict):
+        return value
+    for part in value:
+        known(f"entry of {key}", part, ["value", "unit", "source"])
+    if "value" not in value:
+        raise ValueError(f"{key} = {short(value)} lacks its value; needed: value, allowed beside it: unit, source")
+    if unit is not None and value.get("unit", unit) != unit:
+        raise ValueError(f"{key} has the unit {short(value['unit'])}; allowed: {unit!r}")
+    return value["value"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .arguments import real_array
+from .arguments import one_of, real_array
 from .datafiles import data_path
 from .values import Array, Value
 
@@ -130,7 +130,5 @@ def mystery_run(name: str) -> Log:
     >>> mystery_run("offset_a")
     Log('offset_a', 901 records, 9 s, 3 drives)
     """
-    known = ("offset_a", "offset_b", "offset_c", "gain")
-    if name not in known:
-        raise ValueError(f"name = {name!r}; allowed: {', '.join(known)}")
+    one_of("name", name, ("offset_a", "offset_b", "offset_c", "gain"))
     return read_log(data_path(f"mystery_runs/{name}.csv"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sized
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, exact_array, positive_number, real_array
+from .arguments import bounded, exact_array, joint_indices, of_kind, positive_number, real_array
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
@@ -72,6 +73,8 @@ class Manipulator(Value):
         inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
         given["inertias"] = bounded("inertias", inertias, 0.0, strict=False)
         given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
+        if np.any((given["centers"] < 0.0) | (given["centers"] > lengths)):
+            raise ValueError(f"centers = {given['centers'].tolist()} m; allowed: on the link, 0 to {lengths.tolist()}")
         for key in ("rotor_inertia", "friction"):
             given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=False)
         for key in ("resistance", "torque_constant"):
@@ -171,15 +174,15 @@ class Manipulator(Value):
         >>> load().with_arms((0, 2))
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
-        arms = list(arms) if np.iterable(arms) else [arms]
-        if len(arms) < 2 or len(set(arms)) < len(arms) or not set(arms) <= set(range(self.n_arms)):
-            raise ValueError(f"arms = {arms}; allowed: two or more different arms from 0 to {self.n_arms - 1}")
+        count = max(len(arms), 2) if isinstance(arms, Sized) else 2
+        arms = list(joint_indices("arms", arms, self.n_arms, min(count, self.n_arms), "arm"))
         values = self._fields()
         values |= {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
         return Manipulator(**values)
 
     def same_kinematics(self, other: Manipulator) -> bool:
         """True when both machines have the same joint motion for the same end-effector motion."""
+        manipulator(other, "other")
         return all(np.array_equal(getattr(self, k), getattr(other, k)) for k in ("base", "lengths", "mode"))
 
     def __repr__(self):
@@ -224,6 +227,11 @@ def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
     return bool(np.any(np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)))
 
 
+def manipulator(value: Any, name: str = "robot") -> Manipulator:
+    """Return `value` when it is a machine, and no class of machines."""
+    return of_kind(name, value, Manipulator, "a Manipulator, such as load() returns")
+
+
 def load(source: str | Path = "testbed") -> Manipulator:
     """Read a machine from ``data/<source>.toml`` or from a path that ends in ``.toml``.
 
@@ -237,11 +245,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
     Manipulator('testbed': 3 arms, links 0.2 m, working mode +++)
     """
     tables = read_toml(source)
-    for key in tables:
-        known("TOML table", key, ["name", "about", "manipulator", "control", "path", "sensor", "fault"])
     values = tables.get("manipulator", {})
-    if not isinstance(values, dict):
-        raise ValueError(f"manipulator = {values!r} in {str(source)!r}; allowed: a table [manipulator]")
     for key in values:
         known("TOML key", key, list(UNITS))
     for key in ("base", "lengths", "masses"):

@@ -17,6 +17,7 @@ class Tree:
     edge : (N,) |a x d| in m^2 below which an arm counts as stretched or folded.
     absolute : (2N, 2N) angles of the links against the x axis from joint angles.  spread_arms : (N, 4N),
     spread_links : (2N, 4N), a number per arm, per link, to its entries of v.
+    gaps : (4N, r) and gap : (r,) m, h = v gaps + gap.
     turn : (4N, 4N) the quarter turn of all links.  tips : (4N, 4N) d tip_i / d joint, (2, 2N), the column of every
     joint.  jacobian, jacobian_dot : (4N, 2N r) tables of J and, from v times the rates of the links, of dJ/dt.
     complement : (4N, 4N) table of F from v over the levers.
@@ -34,13 +35,13 @@ class Tree:
         self.lengths, self.longest = np.tile(robot.lengths.T.ravel(), 2), robot.lengths.max()
         self.edge = 1e-12 * robot.lengths.prod(axis=1)
         self.elbow = np.concatenate([elbow, elbow])
-        self._linear(arm, base, elbow)
+        self._linear(arm, base, elbow, robot.base)
         self._dynamic(robot, base, elbow)
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
 
-    def _linear(self, arm, base, elbow):
+    def _linear(self, arm, base, elbow, points):
         """The tables of kinematics, each from its formula for the 4N unit vectors in place of v."""
         n = self.n
         self.absolute = np.eye(n)
@@ -50,6 +51,9 @@ class Tree:
         turned = unit[:, ::-1] * np.array([[-1.0], [1.0]])
         tips = self._gathered(turned)
         signs = (np.delete(arm, 1, axis=0) - arm[1])[:, None, :]
+        # A tip is the base point and both links of its arm.
+        self.gaps = np.einsum("kij,cj->kci", unit, signs[:, 0]).reshape(2 * n, -1)
+        self.gap = (np.delete(points, 1, axis=0) - points[1]).ravel()
         over = np.concatenate([unit[..., elbow], -unit[..., base] - unit[..., elbow]], axis=-1)
         flat = lambda table: np.ascontiguousarray(table.reshape(2 * n, -1)) + 0.0  # noqa: E731
         self.turn, self.tips = flat(turned), flat(tips)

@@ -25,6 +25,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
+from .arguments import short
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -105,9 +107,20 @@ class Value:
 
     def __post_init__(self):
         for name, value in self._fields().items():
+            self._check_kind(name, value)
             kept = _frozen(value)
             if kept is not value:
                 object.__setattr__(self, name, kept)
+
+    def _check_kind(self, name: str, value) -> None:
+        """Refuse what is not of the kind that the field is declared with, for the kinds below."""
+        kind = self.__dataclass_fields__[name].type
+        if kind == "np.ndarray":
+            array = np.ma.filled(value, 0) if isinstance(value, np.ma.MaskedArray) else value
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf" or not np.all(np.isfinite(array)):
+                raise ValueError(f"{name} = {short(value)}; allowed: an array of finite numbers")
+        elif kind in _KINDS and kind not in (c.__name__ for c in type(value).__mro__):
+            raise ValueError(f"{name} = {short(value)}; allowed: a {kind}")
 
     def _set(self, **fields) -> None:
         """Set fields while the value is made, as ``__post_init__`` needs it."""
@@ -147,6 +160,9 @@ class Value:
                 parts.append(f"{field.name}={_typed(value)}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
+
+_KINDS = ("Manipulator", "Trajectory", "Sensors", "PD", "str")
+"""Kinds of fields that every value is held to, by the name of the class: some stand in rooms above."""
 
 _known_names: dict[type, tuple[str, ...]] = {}
 

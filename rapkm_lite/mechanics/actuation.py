@@ -16,9 +16,10 @@ from ..machine.arguments import (
     positive_definite,
     positive_number,
     real_array,
+    small_number,
     tall_matrix,
 )
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
 from .kinematics import cross
@@ -62,7 +63,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
     >>> int(rk.degree_of_actuation(robot, q))
     2
     """
-    tolerance = positive_number("tolerance", tolerance)
+    tolerance = small_number("tolerance", tolerance)
     sigma = np.linalg.svd(at(robot, q).A_tilde, compute_uv=False)
     return np.sum(sigma > tolerance, axis=-1)
 
@@ -79,7 +80,7 @@ def actuation_type(robot: Manipulator, q):
     >>> rk.actuation_type(robot, q)
     'redundantly actuated'
     """
-    full = "redundantly actuated" if robot.n_arms > 2 else "fully actuated"
+    full = "redundantly actuated" if manipulator(robot).n_arms > 2 else "fully actuated"
     kind = np.where(degree_of_actuation(robot, q) < 2, "underactuated", full)
     return kind if kind.ndim else str(kind)
 
@@ -105,7 +106,7 @@ def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
     >>> rk.drive_pairs(rk.load())
     [(0, 1), (0, 2), (1, 2)]
     """
-    return list(itertools.combinations(range(robot.n_arms), 2))
+    return list(itertools.combinations(range(manipulator(robot).n_arms), 2))
 
 
 def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
@@ -205,7 +206,7 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 
 def _driven(robot: Manipulator, q, qd, qdd):
     """The pose, and the wrench of a motion."""
-    q, qd, qdd = joint_vectors(robot.n_joints, q=q, qd=qd, qdd=qdd)
+    q, qd, qdd = joint_vectors(manipulator(robot).n_joints, q=q, qd=qd, qdd=qdd)
     pose = at(robot, q, qd)
     return pose, matvec(pose.F.mT, matvec(pose.G, qdd) + matvec(pose.C, qd) + pose.Q)
 
@@ -217,7 +218,10 @@ def force_polygon(A, torque: float) -> np.ndarray:
     >>> rk.force_polygon(rk.control_matrix(robot, q), torque=0.1).shape
     (6, 2)
     """
-    edges = 2 * torque * real_array("A", A)
+    A = tall_matrix("A", A)
+    if A.ndim != 2 or A.shape[-1] != 2:
+        raise ValueError(f"A has shape {A.shape}; allowed: (m, 2), one pose")
+    edges = 2 * positive_number("torque", torque) * A
     edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
     edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]
     half = -edges.sum(axis=0) / 2 + np.cumsum(np.vstack([np.zeros(2), edges[:-1]]), axis=0)

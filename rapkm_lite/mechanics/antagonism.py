@@ -16,7 +16,7 @@ from ..machine.arguments import (
     real_array,
     tall_matrix,
 )
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .actuation import control_matrix
 from .at import at
@@ -114,9 +114,10 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
 
 def null_direction(robot: Manipulator, q) -> np.ndarray:
     """The numerators (a_i x d_i) (d_j x d_k) of `null_vector`, (..., 3) in m, d of unit length; zero where it fails."""
-    if robot.n_arms != 3:
+    if manipulator(robot).n_arms != 3:
         raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (null_basis takes any number)")
     pose = at(robot, q)
+    _ = pose._closed
     d = pose.d / robot.lengths[:, 1:]
     return cross(pose.a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
 
@@ -190,7 +191,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)
     True
     """
-    N = robot.n_arms
+    N = manipulator(robot).n_arms
     desired = exact_array("q", q, robot.n_joints)[:N]
     offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
     friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 
 from ..machine.arguments import check_leading, joint_indices, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from . import cores
 
@@ -69,6 +69,9 @@ class At(Value):
     q: np.ndarray
     qd: np.ndarray | Any = None  # None where it was not given
     independent: tuple[int, ...] | None = None
+
+    def __post_init__(self):
+        self.__dict__.update(at(self.robot, self.q, self.qd).using(self.independent).__dict__)
 
     def using(self, independent) -> At:
         """The same pose with two 0-based joint indices (or None: the end-effector) as independent coordinates q2."""
@@ -137,10 +140,15 @@ class At(Value):
         """dJ/dt (..., r, 2N), m/(rad s)."""
         return cores.constraint_jacobian_dot(self.robot.tree, self._v, self._rates)
 
+    @quantity
+    def _closed(self):
+        """The vectors of the links, where they close the loops; rates and torques have no meaning elsewhere."""
+        return cores.closed(self.robot.tree, self._v)
+
     # Minimal coordinates.
     @quantity
     def _levers(self):
-        return cores.inner_levers(self.robot.tree, self._v)
+        return cores.inner_levers(self.robot.tree, self._closed)
 
     @quantity
     def _over(self):
@@ -150,6 +158,7 @@ class At(Value):
     def F(self) -> np.ndarray:
         """Orthogonal complement (5), qd = F q2d, J F = 0, (..., 2N, 2)."""
         if self.independent is not None:
+            _ = self._closed
             return cores.joint_complement(self.J, self.independent)
         return cores.complement(self.robot.tree, self._over)
 
@@ -197,6 +206,7 @@ class At(Value):
     # Redundant coordinates.
     @quantity
     def _row_space(self):
+        _ = self._closed
         return cores.row_space(self.J, self.robot.tree.longest)
 
     @quantity
@@ -243,7 +253,7 @@ def at(robot: Manipulator, q, qd=None) -> At:
     >>> bool(abs(pose.J @ pose.F).max() < 1e-15), pose.A_tilde.shape
     (True, (3, 6))
     """
-    n = robot.n_joints
+    n = manipulator(robot).n_joints
     q = _copy("q", q, n)
     if qd is not None:
         qd = _copy("qd", qd, n)

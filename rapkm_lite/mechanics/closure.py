@@ -8,12 +8,12 @@ from ..machine.arguments import (
     ConvergenceError,
     check_leading,
     matvec,
-    positive_number,
     real_array,
+    small_number,
     solve,
     whole_number,
 )
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
 from .cores import wrap
@@ -34,9 +34,9 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     >>> bool(abs(rk.loop_constraints(robot, rk.close_loops(robot, q + 0.01))).max() < 1e-13)
     True
     """
-    q0 = real_array("q", q, robot.n_joints)
+    q0 = real_array("q", q, manipulator(robot).n_joints)
     q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
-    scale, tolerance = robot.lengths.max(), positive_number("tolerance", tolerance)
+    scale, tolerance = robot.lengths.max(), small_number("tolerance", tolerance)
     for _ in range(whole_number("iterations", iterations, 1)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
         Q, R = np.linalg.qr(J.mT, mode="complete")
@@ -92,10 +92,10 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     >>> rk.forward_kinematics(robot, rk.estimate_pose(robot, q[:3], guess=[0.0, 0.0])).round(12)
     array([0.02, 0.05])
     """
-    q_a, guess = real_array("q_a", q_a, robot.n_arms), real_array("guess", guess, 2)
+    q_a, guess = real_array("q_a", q_a, manipulator(robot).n_arms), real_array("guess", guess, 2)
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
-    step, limit = np.full(x.shape, np.inf), positive_number("tolerance", tolerance) * robot.lengths.max()
+    step, limit = np.full(x.shape, np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
     for _ in range(whole_number("iterations", iterations, 1)):
         q, cosine = cores.joint_angles(robot, x, robot.mode)
         if np.abs(cosine).max(initial=0.0) > 1.0:

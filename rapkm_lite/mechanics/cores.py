@@ -14,6 +14,7 @@ from ..machine.arguments import matvec
 from ..machine.tree import Tree
 from .linalg import linear, orthogonal, pivots, product, solve
 
+OPEN = 1e-4  # closure error over the longest link up to which a rounded q counts as closed
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -65,6 +66,16 @@ def constraint_jacobian(tree: Tree, v: np.ndarray) -> np.ndarray:
 def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """dJ/dt, (..., r, 2N): a link vector that turns at the rate w changes by w E v, and E E = -1."""
     return _matrix(linear(v * rates, tree.jacobian_dot), tree.r, tree.n)
+
+
+def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
+    """v, after a check that the tips meet, |h| <= `OPEN` times the longest link."""
+    if (gap := np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0)) > OPEN * tree.longest:
+        raise ValueError(
+            f"q leaves the loops open by {gap:.3g} m; allowed: {OPEN * tree.longest:.3g} m ({OPEN:g} of the longest "
+            "link), where rates or torques are asked for: close_loops(robot, q) gives the nearest q on V"
+        )
+    return v
 
 
 def levers(tree: Tree, v: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import check_leading, matvec, positive_number, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import check_leading, matvec, real_array, small_number
+from ..machine.manipulator import Manipulator, manipulator
 from .at import at, given
 
 
@@ -97,7 +97,7 @@ def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarra
     >>> int(rk.constraint_rank(robot, q))
     4
     """
-    limit = positive_number("tolerance", tolerance) * robot.lengths.max()
+    limit = small_number("tolerance", tolerance) * manipulator(robot).lengths.max()
     return np.sum(np.linalg.svd(at(robot, q).J, compute_uv=False) > limit, axis=-1)
 
 
@@ -111,7 +111,7 @@ def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndar
     >>> int(rk.degree_of_freedom(robot, q))
     2
     """
-    return robot.n_joints - constraint_rank(robot, q, tolerance)
+    return manipulator(robot).n_joints - constraint_rank(robot, q, tolerance)
 
 
 def nullspace_projector(robot: Manipulator, q) -> np.ndarray:

@@ -11,8 +11,8 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..machine.arguments import check_leading, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import check_leading, real_array, short
+from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at, given
 from .cores import wrap as wrap
@@ -119,6 +119,7 @@ def reachable(robot: Manipulator, x) -> np.ndarray:
     >>> rk.reachable(rk.load(), [[0.0, 0.0], [0.5, 0.0]])
     array([ True, False])
     """
+    manipulator(robot)
     x = real_array("x", x, 2)
     reach = np.linalg.norm(x[..., None, :] - robot.base, axis=-1)
     l1, l2 = robot.lengths.T
@@ -135,7 +136,7 @@ def working_modes(robot: Manipulator) -> np.ndarray:
            [-1,  1],
            [-1, -1]])
     """
-    return np.array(list(itertools.product([1, -1], repeat=robot.n_arms)))
+    return np.array(list(itertools.product([1, -1], repeat=manipulator(robot).n_arms)))
 
 
 def working_mode(robot: Manipulator, q) -> np.ndarray:
@@ -145,7 +146,7 @@ def working_mode(robot: Manipulator, q) -> np.ndarray:
     >>> rk.working_mode(robot, q)
     array([1, 1, 1])
     """
-    q = real_array("q", q, robot.n_joints)
+    q = real_array("q", q, manipulator(robot).n_joints)
     sine = np.sin(q[..., robot.n_arms :])
     return np.where(np.abs(sine) < 1e-12, 0, np.sign(sine)).astype(int)
 
@@ -160,10 +161,11 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
     >>> inverse_kinematics(load(), [0.0, 0.0]).round(4)
     array([-0.4317,  1.6627, -2.5261,  1.9106,  1.9106,  1.9106])
     """
+    manipulator(robot)
     x = real_array("x", x, 2)
     mode = robot.mode if mode is None else real_array("mode", mode, robot.n_arms)
     if not np.all(np.abs(mode) == 1.0):
-        raise ValueError(f"mode = {mode}; allowed: +1 or -1 for each of the {robot.n_arms} arms")
+        raise ValueError(f"mode = {short(mode)}; allowed: +1 or -1 for each of the {robot.n_arms} arms")
     check_leading(x=x.shape[:-1], mode=mode.shape[:-1])
     q, cosine = cores.joint_angles(robot, x, mode)
     outside = np.abs(cosine) > 1.0 + 1e-12

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from .actuation import distal_cross_products, drive_pairs
 from .cores import prestress_shares, singular_values
 from .kinematics import ee_complement, inverse_kinematics
@@ -22,7 +22,7 @@ def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:
     >>> np.round(rk.sampling_box(rk.load()), 3)
     array([-0.2  ,  0.2  , -0.169,  0.285])
     """
-    outer = robot.lengths.sum(axis=1)[:, None]
+    outer = manipulator(robot).lengths.sum(axis=1)[:, None]
     low, high = (robot.base - outer).max(axis=0), (robot.base + outer).min(axis=0)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
@@ -38,6 +38,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     >>> x.shape, y.shape, inside.shape
     ((20,), (20,), (20, 20))
     """
+    manipulator(robot)
     n = whole_number("n", n, 2)
     left, right, low, high = sampling_box(robot) if box is None else exact_array("box", box, 4)
     if not (left < right and low < high):
@@ -70,7 +71,8 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
     (8, 20, 20)
     """
     one_of("measure", measure, _MEASURES)
-    drives = list(range(robot.n_arms)) if pair is None else list(joint_indices("pair", pair, robot.n_arms))
+    N = manipulator(robot).n_arms
+    drives = list(range(N) if pair is None else joint_indices("pair", pair, N, 2, "drive"))
     x, y, inside = workspace_grid(robot, n, box)
     values = _MEASURES[measure](robot, _poses(robot, x, y, inside, mode), drives)
     return x, y, _on_grid(values, inside, limit=1e12)

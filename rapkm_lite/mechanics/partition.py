@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from ..machine.arguments import joint_indices, one_of, whole_number, wide_matrix
+from ..machine.arguments import joint_indices, one_of, real_array, whole_number, wide_matrix
 from . import cores
 from .linalg import product
 
@@ -31,7 +31,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A_tilde = wide_matrix("A_tilde", A_tilde)
     first, others, back = _partition(rows, A_tilde)
     A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
-    A1T_pinv = cores.right_inverse("A~_1 of this partition", A1.mT).mT
+    A1T_pinv = cores.right_inverse("A_tilde with A~_1 of this partition", A1.mT).mT
     B = product(A1T_pinv, A2.mT)
     bottom = _solve_small(B, product(B.mT, A1T_pinv))
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
@@ -54,9 +54,10 @@ def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
 def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Row indices of A~_1, (delta,) or (..., delta), of A~_2, and where each row of A~ stands in these."""
     m = A_tilde.shape[-2]
-    if np.ndim(rows) < 2:
-        rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
-        count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
+    if not isinstance(rows, np.ndarray) or rows.ndim < 2:
+        count = (
+            len(rows) if isinstance(rows, list | tuple | np.ndarray) and np.ndim(rows) == 1 and len(rows) <= m else 2
+        )
         return _fixed_partition(joint_indices("rows", rows, m, count), m)
     rows = _row_choice(rows, A_tilde)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
@@ -72,7 +73,7 @@ def _fixed_partition(first: tuple[int, ...], m: int) -> tuple[np.ndarray, np.nda
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
-    rows = np.asarray(rows)
+    rows = real_array("rows", rows).astype(np.asarray(rows).dtype)
     if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
         raise ValueError(
             f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,) or {(*lead, 'delta')}"

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..machine.arguments import exact_array, matvec, positive_number, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import check_leading, exact_array, matvec, positive_number, real_array, short, whole_number
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
 from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
 
@@ -33,7 +33,9 @@ class Desired(Value):
     qdd: np.ndarray
 
     def __post_init__(self):
-        self._set(**{name: np.asarray(getattr(self, name), dtype=float) for name in _MOTION})
+        sizes = [2, 2, 2, *[2 * whole_number("n_arms", self.n_arms, 2)] * 3]
+        self._set(**{k: real_array(k, getattr(self, k), size) for k, size in zip(_MOTION, sizes, strict=True)})
+        check_leading(**{name: getattr(self, name).shape[:-1] for name in _MOTION})
         super().__post_init__()
 
     @cached_property
@@ -52,6 +54,8 @@ class Desired(Value):
         return frozen(self.qdd[..., : self.n_arms])
 
 
+MOST = 10_000_000  # samples: nearly three hours at 1 kHz
+
 _MOTION = ("x", "xd", "xdd", "q", "qd", "qdd")
 
 
@@ -69,6 +73,16 @@ class Trajectory(Desired):
 
     t: np.ndarray
     robot: Manipulator
+
+    def __post_init__(self):
+        self._set(t=_times(self.t))
+        super().__post_init__()
+        self._set(t=_times(self.t))
+        super().__post_init__()
+        if manipulator(self.robot).n_arms != self.n_arms:
+            raise ValueError(f"n_arms = {self.n_arms}, the robot has {self.robot.n_arms}; allowed: the same number")
+        for name in _MOTION:
+            exact_array(name, getattr(self, name), len(self.t), 2 * (self.n_arms if name.startswith("q") else 1))
 
     @property
     def dt(self) -> float:
@@ -99,7 +113,9 @@ class Trajectory(Desired):
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles)."""
-        return self if robot.same_kinematics(self.robot) else follow(robot, self.t, self.x, self.xd, self.xdd)
+        if manipulator(robot).same_kinematics(self.robot):
+            return self
+        return _follow(robot, self.t, self.x, self.xd, self.xdd, {"robot": robot})
 
     def with_set_points(self, q_a, qd_a=None) -> Trajectory:
         """The same path with other set-points for the drives, which need not close the loops (fig. 3).
@@ -135,13 +151,19 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     >>> rk.follow(rk.load(), t, np.stack([0.05 * t, 0 * t], -1), [[0.05, 0.0]] * 101, np.zeros((101, 2)))
     Trajectory(101 samples, 1 s, 'testbed')
     """
-    t = real_array("t", t)
-    if t.ndim != 1 or len(t) < 2:
-        raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
-    if t[0] != 0.0 or t[-1] <= 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6, atol=0.0):
-        raise ValueError(f"t = {t[0]:g}, {t[1]:g}, ..., {t[-1]:g}; allowed: rising, equidistant times that start at 0")
+    manipulator(robot)
+    t = _times(t)
     x, xd, xdd = (exact_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
-    q = inverse_kinematics(robot, x)
+    _check_rates(t, x, xd)
+    return _follow(robot, t, x, xd, xdd, {"samples": len(t)})
+
+
+def _follow(robot: Manipulator, t, x, xd, xdd, given: dict) -> Trajectory:
+    """`follow` without its checks; `given` is what the caller was asked for."""
+    try:
+        q = inverse_kinematics(robot, x)
+    except ValueError as error:
+        raise ValueError(f"{error} (a path with {', '.join(f'{k} = {short(v)}' for k, v in given.items())})") from None
     q[:, : robot.n_arms] = np.unwrap(q[:, : robot.n_arms], axis=0)
     F = ee_complement(robot, q)
     qd = matvec(F, xd)
@@ -159,9 +181,14 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     >>> rk.polygon(rk.load(), [[-0.05, 0.01], [0.05, 0.01], [0.0, 0.05]], duration=3.0).x[1000].round(3)
     array([0.05, 0.01])
     """
+    manipulator(robot)
     corners = real_array("corners", corners, 2)
     if corners.ndim != 2 or len(corners) < 2:
         raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
+    return _polygon(robot, corners, duration, dt, rest, {"corners": corners.tolist()})
+
+
+def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
     t = _samples(duration, dt)
     rest = float(exact_array("rest", rest))
     if not 0.0 <= 2 * rest < duration:
@@ -175,7 +202,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
     step = (ends - corners)[edge]
     x = corners[edge] + way[:, None] * step
-    return follow(robot, t, x, rate[:, None] * step / edge_time, rate_dot[:, None] * step / edge_time**2)
+    return _follow(robot, t, x, rate[:, None] * step / edge_time, rate_dot[:, None] * step / edge_time**2, given)
 
 
 def triangle(
@@ -195,10 +222,11 @@ def triangle(
     >>> triangle(load())
     Trajectory(5001 samples, 5 s, 'testbed')
     """
+    manipulator(robot)
     side = positive_number("side", side)
     turned = exact_array("angle", angle) + np.deg2rad([210.0, 330.0, 90.0])
     corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
-    return polygon(robot, corners, duration, dt, rest)
+    return _polygon(robot, corners, duration, dt, rest, {"side": side, "centre": centre, "angle": angle})
 
 
 def circle(
@@ -210,6 +238,7 @@ def circle(
     >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]
     array([0.05, 0.  ])
     """
+    manipulator(robot)
     radius = positive_number("radius", radius)
     t = _samples(duration, dt)
     s = t / duration
@@ -221,7 +250,7 @@ def circle(
     v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
     x = exact_array("centre", centre, 2) + radius * u
     xdd = radius * (rate_dot[:, None] * v - rate[:, None] ** 2 * u)
-    return follow(robot, t, x, radius * rate[:, None] * v, xdd)
+    return _follow(robot, t, x, radius * rate[:, None] * v, xdd, {"radius": radius, "centre": centre})
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
@@ -231,14 +260,41 @@ def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Traj
     >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)
     Trajectory(501 samples, 0.5 s, 'testbed')
     """
+    manipulator(robot)
     t = _samples(duration, dt)
     still = np.zeros((len(t), 2))
-    return follow(robot, t, still + exact_array("x", x, 2), still, still)
+    return _follow(robot, t, still + exact_array("x", x, 2), still, still, {"x": x})
 
 
 def _samples(duration: float, dt: float) -> np.ndarray:
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
-    steps = round(duration / dt)
+    steps = round(min(duration / dt, 1e9))
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
         raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
+    if steps > MOST:
+        raise ValueError(f"duration = {duration:g} s has {steps} samples of dt = {dt:g} s; allowed: up to {MOST}")
     return np.arange(steps + 1) * (duration / steps)
+
+
+def _times(t) -> np.ndarray:
+    t = real_array("t", t)
+    if t.ndim != 1 or len(t) < 2:
+        raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
+    if t[0] != 0.0 or t[-1] <= 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6, atol=0.0):
+        raise ValueError(f"t = {t[0]:g}, {t[1]:g}, ..., {t[-1]:g}; allowed: rising, equidistant times that start at 0")
+    return t
+
+
+def _check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
+    """Refuse rates that are no derivative of the positions; a few jumps are set-points, and allowed."""
+    moved, meant = np.diff(x, axis=0), t[1] * (xd[1:] + xd[:-1]) / 2
+    off = np.linalg.norm(moved - meant, axis=-1)
+    size = max(np.abs(moved).max(), np.abs(meant).max())
+    wrong = off > 0.1 * size + 1e-12
+    if np.count_nonzero(wrong) > 2 + 0.05 * len(t):
+        k = int(np.argmax(off))
+        raise ValueError(
+            f"xd[{k}] = {xd[k].round(6).tolist()} m/s does not fit x: from t = {t[k]:g} s to {t[k + 1]:g} s "
+            f"x moves by {moved[k].round(9).tolist()} m, xd means {meant[k].round(9).tolist()} m; "
+            "allowed: the time derivative of x"
+        )

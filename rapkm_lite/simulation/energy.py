@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import matvec, positive_number, real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import having, matvec, of_kind, positive_number, real_array
+from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, prestress_projector
 from ..mechanics.antagonism import steady_state_torque
 from ..mechanics.trajectory import Trajectory
@@ -21,7 +21,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
     >>> rk.copper_loss(rk.load(), np.full((1000, 3), 0.0259), dt=1e-3).round(3)
     array([0.611, 0.611, 0.611])
     """
-    c = real_array("c", c, robot.n_arms)
+    c = real_array("c", c, manipulator(robot).n_arms)
     if c.ndim < 2:
         raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
     return positive_number("dt", dt) * np.sum(robot.resistance * (c / robot.torque_constant) ** 2, axis=-2)
@@ -37,6 +37,7 @@ def mechanical_work(run) -> np.ndarray:
     >>> np.allclose(run.energy, rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
     True
     """
+    _run(run)
     return np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=0)
 
 
@@ -58,6 +59,7 @@ def antagonistic_torque(run) -> np.ndarray:
     >>> np.allclose(rk.antagonistic_torque(run)[-1], run.c[-1], atol=1e-3)
     True
     """
+    _run(run)
     return matvec(prestress_projector(control_matrix(run.robot, run.q)), run.c)
 
 
@@ -69,6 +71,7 @@ def antagonistic_energy(run) -> float:
     >>> round(rk.antagonistic_energy(run), 2)
     3.49
     """
+    _run(run)
     return float(copper_loss(run.robot, antagonistic_torque(run)[:-1], run.dt).sum())
 
 
@@ -83,7 +86,12 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     >>> float(np.round([4e-3, -2e-3, 5e-3] @ S @ [4e-3, -2e-3, 5e-3], 2))
     3.58
     """
-    A = control_matrix(robot, trajectory.q)
+    trajectory = of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
+    A = control_matrix(manipulator(robot), trajectory.q)
     K_0 = -np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
     weight = robot.resistance / robot.torque_constant**2
     return np.einsum("kij,i,kil->jl", K_0[:-1], weight, K_0[:-1]) * trajectory.dt
+
+
+def _run(run) -> None:
+    having("run", run, "a Run, such as simulate returns", "robot", "q", "q_a", "c", "dt")

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.laws import PD, AntagonismFilter
-from ..machine.datafiles import data_path, known, read_toml
+from ..machine.datafiles import UNITS_OF, data_path, known, read_toml
 from ..machine.manipulator import Manipulator, load
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory, triangle
-from .faults import Fault, read_fault
+from .faults import Fault, check_faults, read_fault
 from .runs import Run, simulate
 from .sensors import Sensors
 
@@ -31,6 +31,10 @@ class Experiment(Value):
     trajectory: Trajectory
     sensors: Sensors
     faults: tuple[Fault, ...] = ()
+
+    def __post_init__(self):
+        self._set(faults=check_faults(self.faults))
+        super().__post_init__()
 
     @property
     def offset(self) -> np.ndarray:
@@ -61,16 +65,14 @@ def experiment(source="testbed") -> Experiment:
     (3,)
     """
     robot, tables = load(source), read_toml(source)
-    allowed = {
-        "control": ["K_P", "K_D", "dt"],
-        "path": ["side", "duration", "centre", "angle", "rest"],
-        "sensor": ["offset", "encoder", "velocity_filter"],
-    }
-    for table, keys in allowed.items():
+    for table, needed in (("control", ("K_P", "K_D")), ("path", ()), ("sensor", ())):
         for key in tables.get(table, {}):
-            known(f"TOML key in [{table}]", key, keys)
+            known(f"TOML key in [{table}]", key, list(UNITS_OF[table]))
         if table != "sensor" and table not in tables:
-            raise ValueError(f"the file {str(source)!r} lacks the table [{table}], which an experiment needs")
+            raise ValueError(f"the file {str(source)!r} lacks the table [{table}]; needed: [control] and [path]")
+        for key in needed:
+            if key not in tables[table]:
+                raise ValueError(f"the table [{table}] of {str(source)!r} lacks {key!r}; needed: {', '.join(needed)}")
     control = tables["control"]
     path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])
     sensors = Sensors(**tables.get("sensor", {})).of_drives(robot.n_arms)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.laws import torque_limit
-from ..machine.arguments import bounded, exact_array, whole_number
+from ..machine.arguments import bounded, exact_array, short, whole_number
 from ..machine.datafiles import known
 from ..machine.values import Array, Value
 
@@ -172,10 +172,12 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
 
 def check_faults(faults) -> tuple[Fault, ...]:
     """The faults as a tuple; raises ValueError for what is no fault."""
+    if isinstance(faults, str | bytes | dict | set):
+        raise ValueError(f"faults = {short(faults)}; allowed: a list of {', '.join(kinds())}")
     faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
     for fault in faults:
         if not isinstance(fault, Fault):
-            raise ValueError(f"faults holds {fault!r}; allowed: {', '.join(kinds())}")
+            raise ValueError(f"faults holds {short(fault)}; allowed: {', '.join(kinds())}")
     return faults
 
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..control.grammar import LawLike
-from ..machine.arguments import matvec
+from ..control.grammar import LawLike, as_law
+from ..machine.arguments import exact_array, matvec
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -82,6 +82,15 @@ class Run(Value):
     qd_a: np.ndarray
     c: np.ndarray
     pairs: np.ndarray
+
+    def __post_init__(self):
+        self._set(faults=check_faults(self.faults))
+        super().__post_init__()
+        as_law(self.law)
+        for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
+            exact_array(
+                name, getattr(self, name), len(self.t), self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
+            )
 
     @cached_property
     def q(self) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, positive_number, real_array
+from ..machine.arguments import bounded, exact_array, real_array, whole_number
 from ..machine.values import Array, Value, default
 
 
@@ -25,14 +25,15 @@ class Sensors(Value):
     """
 
     offset: Array = default(0.0)
-    encoder: float | None = None
+    encoder: int | None = None
     velocity_filter: float | None = None
 
     def __post_init__(self):
         self._set(offset=real_array("offset", self.offset))
+        if self.offset.ndim > 1 or self.offset.size == 0:
+            raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or (N,), one per drive")
         if self.encoder is not None:
-            count = positive_number("encoder", self.encoder)
-            self._set(encoder=int(count) if count.is_integer() else count)
+            self._set(encoder=whole_number("encoder", self.encoder, 1))
         if self.velocity_filter is not None:
             tau = bounded("velocity_filter", exact_array("velocity_filter", self.velocity_filter), 0.0, strict=False)
             self._set(velocity_filter=float(tau))
@@ -45,6 +46,7 @@ class Sensors(Value):
 
     def of_drives(self, N: int) -> Sensors:
         """The same for N drives, with one offset each."""
+        N = whole_number("N", N, 1)
         if self.offset.shape not in ((), (N,)):
             raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or ({N},), one per drive")
         return self.with_offset(np.broadcast_to(self.offset, (N,)))

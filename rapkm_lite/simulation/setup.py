@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import of_kind
+from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .faults import FaultTable, fault_table
@@ -55,15 +56,10 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
 
     Raises ValueError for what does not fit together, and where the machine does not reach the start of the path.
     """
-    model = robot if model is None else model
-    for name, value, kind in (
-        ("robot", robot, Manipulator),
-        ("model", model, Manipulator),
-        ("trajectory", trajectory, Trajectory),
-        ("sensors", sensors, Sensors),
-    ):
-        if not isinstance(value, kind):
-            raise ValueError(f"{name} = {value!r}; allowed: a {kind.__name__}")
+    manipulator(robot)
+    model = robot if model is None else manipulator(model, "model")
+    of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
+    of_kind("sensors", sensors, Sensors, "Sensors")
     if model.n_arms != robot.n_arms:
         raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
     trajectory = trajectory.for_robot(model)

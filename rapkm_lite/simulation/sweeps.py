@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import real_array
-from ..machine.manipulator import Manipulator
+from ..machine.arguments import having, one_of, real_array, switch, whole_number
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory
 from .chunks import NOT_RUN, Columns, run_chunk
@@ -105,7 +105,8 @@ def sweep(
     >>> rk.sweep(rk.load(), [rk.PD(k, 0.2) for k in (3.0, 7.0)], path, [4e-3, 0.0, 0.0]).energies.shape
     (2, 3)
     """
-    _check_options(failed, chunk, executor)
+    manipulator(robot)
+    chunk = _check_options(failed, chunk, executor, progress)
     laws, offsets = _rows(law, offsets, robot.n_arms)
     faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
@@ -136,13 +137,12 @@ def sweep(
     return result
 
 
-def _check_options(failed, chunk, executor) -> None:
-    if failed not in ("raise", "mask"):
-        raise ValueError(f"failed = {failed!r}; allowed: 'raise' or 'mask'")
-    if not isinstance(chunk, (int, np.integer)) or chunk < 1:
-        raise ValueError(f"chunk = {chunk!r}; allowed: a whole number >= 1")
-    if executor is not None and not hasattr(executor, "submit"):
-        raise ValueError(f"executor = {executor!r}; allowed: an executor of concurrent.futures")
+def _check_options(failed, chunk, executor, progress) -> int:
+    one_of("failed", failed, ("raise", "mask"))
+    if executor is not None:
+        having("executor", executor, "an executor of concurrent.futures", "submit")
+    switch("progress", progress)
+    return whole_number("chunk", chunk, 1)
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
