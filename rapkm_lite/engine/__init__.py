@@ -8,7 +8,35 @@ imported, and code compiled, at the first run.
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import os
+import warnings
 
-COMPILED = os.environ.get("RAPKM_LITE_NUMBA", "1") != "0" and importlib.util.find_spec("numba") is not None
+_WANTED = os.environ.get("RAPKM_LITE_NUMBA", "1").strip().lower() not in ("0", "false", "no", "off")
+COMPILED = _WANTED and importlib.util.find_spec("numba") is not None
+"""Is Numba wanted and installed?  Whether it works, `compiled` says."""
+
+
+@functools.cache
+def compiled() -> bool:
+    """Do kernels run compiled?  The first question imports Numba; one that does not import is named once."""
+    if COMPILED:
+        try:
+            import numba
+        except Exception as error:
+            warnings.warn(
+                f"Numba is installed but does not import ({type(error).__name__}: {error}): runs go through plain "
+                "Python, slower, with the same numbers; RAPKM_LITE_NUMBA=0 leaves it alone",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+            return False
+    return COMPILED
+
+
+def without_compiler() -> None:
+    """Plain Python from now on, for a process whose few runs end sooner so; to be called before the first run."""
+    global COMPILED
+    COMPILED = False
+    compiled.cache_clear()

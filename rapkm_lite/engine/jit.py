@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from . import COMPILED
+from . import compiled
 
+COMPILED = compiled()
 if COMPILED:
     from numba import njit
 
@@ -31,7 +32,28 @@ def kernel(function) -> Callable[..., Any]:
         return function
     # Numba's cache looks at the file of the kernel only, but its parts live in all files of this folder.
     function.__qualname__ += "_" + _sources()
-    return njit(cache=True, nogil=True, **_OPTIONS)(function)
+    try:
+        return _forgiving(njit(cache=True, nogil=True, **_OPTIONS)(function))
+    except RuntimeError:  # no folder for a cache that this user may write to
+        return njit(nogil=True, **_OPTIONS)(function)
+
+
+def _forgiving(dispatcher):
+    """A cache that cannot be read or written (damaged, a full disk, rights that went) costs time, and no run."""
+
+    def quiet(access):
+        @functools.wraps(access)
+        def tried(*arguments):
+            try:
+                return access(*arguments)
+            except Exception:
+                return None
+
+        return tried
+
+    cache = dispatcher._cache
+    cache.load_overload, cache.save_overload = quiet(cache.load_overload), quiet(cache.save_overload)
+    return dispatcher
 
 
 def leaf(function):

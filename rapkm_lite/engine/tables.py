@@ -6,7 +6,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from . import COMPILED
+from . import compiled
 
 # What a run ended with; laws; filters; pose sources.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
@@ -99,7 +99,7 @@ def extra(robot) -> tuple | None:
 
 def width(N: int, alone: bool) -> int:
     """Arms in a row of the work table: in a single compiled run filled up to vector registers of four."""
-    return -(-N // 4) * 4 if alone and COMPILED else N
+    return -(-N // 4) * 4 if alone and compiled() else N
 
 
 def aligned(size: int) -> np.ndarray:
@@ -111,7 +111,7 @@ def aligned(size: int) -> np.ndarray:
 
 def plain(array: np.ndarray):
     """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
-    return array if COMPILED else array.tolist()
+    return array if compiled() else array.tolist()
 
 
 def sensor(sensors, dt: float) -> Sensor:

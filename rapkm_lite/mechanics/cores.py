@@ -14,7 +14,6 @@ from ..machine.arguments import matvec
 from ..machine.tree import Tree
 from .linalg import linear, orthogonal, pivots, product, solve
 
-OPEN = 1e-4  # closure error over the longest link up to which a rounded q counts as closed
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -69,12 +68,11 @@ def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.
 
 
 def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """v, after a check that the tips meet, |h| <= `OPEN` times the longest link."""
-    if (gap := np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0)) > OPEN * tree.longest:
-        raise ValueError(
-            f"q leaves the loops open by {gap:.3g} m; allowed: {OPEN * tree.longest:.3g} m ({OPEN:g} of the longest "
-            "link), where rates or torques are asked for: close_loops(robot, q) gives the nearest q on V"
-        )
+    """v, after a check that the tips meet, |h| <= 1e-4 times the longest link."""
+    gap, limit = np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0), 1e-4 * tree.longest
+    if gap > limit:
+        words = f"allowed: {limit:.3g} m (1e-4 of the longest link) where rates or torques are asked for"
+        raise ValueError(f"q leaves the loops open by {gap:.3g} m; {words}; close_loops(robot, q) closes them")
     return v
 
 

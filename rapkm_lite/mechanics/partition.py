@@ -55,9 +55,8 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     """Row indices of A~_1, (delta,) or (..., delta), of A~_2, and where each row of A~ stands in these."""
     m = A_tilde.shape[-2]
     if not isinstance(rows, np.ndarray) or rows.ndim < 2:
-        count = (
-            len(rows) if isinstance(rows, list | tuple | np.ndarray) and np.ndim(rows) == 1 and len(rows) <= m else 2
-        )
+        rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+        count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
         return _fixed_partition(joint_indices("rows", rows, m, count), m)
     rows = _row_choice(rows, A_tilde)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)

@@ -7,31 +7,38 @@ from typing import Any
 
 import numpy as np
 
-from .. import engine
 from ..control.compiled_law import CompiledLaw
-from ..engine import COMPILED, tables
+from ..engine import COMPILED, compiled, tables, without_compiler
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
 from .codes import Code, code_of
 from .patience import patience
 from .setup import Outcome, Setup
 
-__all__ = ["DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "encode", "many", "single"]
+__all__ = [
+    *("COMPILED", "DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF"),
+    *("Plant", "compiled", "encode", "many", "single", "without_compiler"),
+]
+    "COMPILED",
+    "DONE",
+    "LEFT_WORKSPACE",
+    "NO_POSE",
+    "SINGULAR",
+    "TOO_STIFF",
+    "Plant",
+    "compiled",
+    "encode",
+    "many",
+    "single",
+    "without_compiler",
+]
 
-LANES = 16 if COMPILED else 1
 _made = weakref.WeakKeyDictionary()
-
-
-def without_compiler() -> None:
-    """Plain Python from now on, for a process whose few runs end sooner so; to be called before the first run."""
-    global COMPILED, LANES
-    COMPILED = engine.COMPILED = tables.COMPILED = False
-    LANES = 1
 
 
 def encode(law: Any, model) -> Code | None:
     """The engine's form of a law, or None where it has none: then the law runs through the textbook layer."""
     code = code_of(law, model)
-    return None if code is None or (code.user is not None and not COMPILED) else code
+    return None if code is None or (code.user is not None and not compiled()) else code
 
 
 def single(setup: Setup, code: Code) -> Outcome:
@@ -52,7 +59,7 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
     for i, code in enumerate(codes):
         kinds.setdefault(code.kind, []).append(i)
     for rows in kinds.values():
-        width = LANES if codes[rows[0]].user is None else 1
+        width = (16 if compiled() else 1) if codes[rows[0]].user is None else 1
         for first in range(0, len(rows), width):
             # The last runs fill up with copies of themselves: a lane does not feel its neighbours.
             lanes = [rows[min(i, len(rows) - 1)] for i in range(first, first + width)]
@@ -139,7 +146,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         except (ArithmeticError, ValueError):
             # Without a compiler a division by zero or an infinite angle ends the run here.
             w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
-    if not COMPILED:
+    if not compiled():
         work[:] = w
         if history is not None:
             history[:] = np.reshape(log, history.shape)

@@ -17,13 +17,17 @@ def patience(*kind, after: float = 0.7):
     In a terminal the line is overwritten; in a notebook it is a widget that is closed, which leaves no text behind;
     anywhere else nothing is shown.
     """
-    if kind in _known:
+    if kind in _known or not (_notebook() or _in_terminal()):
         yield
         return
     clear = []
     timer = threading.Timer(after, lambda: clear.append(_show()))
     timer.daemon = True
-    timer.start()
+    try:
+        timer.start()
+    except RuntimeError:  # no thread to be had: then without a word
+        yield
+        return
     try:
         yield
         _known.add(kind)
@@ -38,6 +42,10 @@ def _notebook() -> bool:
     """True under a Jupyter kernel."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return getattr(shell, "kernel", None) is not None
+
+
+def _in_terminal() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 def _display(widget) -> None:
@@ -62,7 +70,7 @@ def _show():
         label = Label(_TEXT)
         _display(label)
         return label.close
-    if sys.stderr is not None and sys.stderr.isatty():
+    if _in_terminal():
         _terminal(_TEXT)
         return lambda: _terminal(" " * len(_TEXT) + "\r")
     return lambda: None
@@ -72,7 +80,7 @@ def _show():
 def progress_bar(total: int):
     """A bar over `total` chunks (0: none) that goes away at its end; yields the function that advances it."""
     done = 0
-    notebook, terminal = total and _notebook(), total and sys.stderr is not None and sys.stderr.isatty()
+    notebook, terminal = total and _notebook(), total and _in_terminal()
     if notebook:
         from ipywidgets import IntProgress
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory
 from .chunks import NOT_RUN, Columns, run_chunk
-from .compiled import DONE, encode
+from .compiled import DONE, compiled, encode
 from .explain import REASONS
 from .faults import FaultsLike, check_faults
 from .loop import own_copy
@@ -114,7 +115,7 @@ def sweep(
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)
-    with _pool(executor, 1 if in_python else os.cpu_count() or 1) as pool:
+    with _pool(executor, 1 if in_python or not compiled() else os.cpu_count() or 1) as pool:
         try:
             errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
@@ -184,13 +185,45 @@ def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int)
 
 @contextmanager
 def _pool(executor: Executor | None, threads: int):
-    """The executor of the caller, or threads of our own, which end with the sweep."""
-    pool = executor or ThreadPoolExecutor(threads)
+    """The executor of the caller, or threads of our own, which end with the sweep; none where one is enough."""
+    pool = executor or (ThreadPoolExecutor(threads) if threads > 1 and _threads() else Serial())
     try:
         yield pool
     finally:
         if executor is None:
             pool.shutdown(cancel_futures=True)
+
+
+def _threads() -> bool:
+    """Can a thread be started here?"""
+    try:
+        thread = threading.Thread(target=int)
+        thread.start()
+        thread.join()
+        return True
+    except Exception:
+        return False
+
+
+class Serial(Executor):
+    """Does a job when its result is asked for, in the thread that asks."""
+
+    def submit(self, function, *arguments, **named):
+        return Job(function, arguments, named)
+
+
+class Job(Future):
+    """A job of `Serial`."""
+
+    def __init__(self, *job):
+        super().__init__()
+        self._job = job
+
+    def result(self, timeout=None):
+        if not self.done():
+            function, arguments, named = self._job
+            self.set_result(function(*arguments, **named))
+        return super().result(timeout)
 
 
 def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
