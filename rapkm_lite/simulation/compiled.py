@@ -15,22 +15,9 @@ from .patience import patience
 from .setup import Outcome, Setup
 
 __all__ = [
-    *("COMPILED", "DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF"),
-    *("Plant", "compiled", "encode", "many", "single", "without_compiler"),
-]
-    "COMPILED",
-    "DONE",
-    "LEFT_WORKSPACE",
-    "NO_POSE",
-    "SINGULAR",
-    "TOO_STIFF",
-    "Plant",
-    "compiled",
-    "encode",
-    "many",
-    "single",
-    "without_compiler",
-]
+    "COMPILED", "DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled", "encode", "many",
+    "single", "without_compiler",
+]  # fmt: skip
 
 _made = weakref.WeakKeyDictionary()
 
