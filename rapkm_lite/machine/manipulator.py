@@ -185,11 +185,15 @@ class Manipulator(Value):
         manipulator(other, "other")
         return all(np.array_equal(getattr(self, k), getattr(other, k)) for k in ("base", "lengths", "mode"))
 
+    @property
+    def signs(self) -> str:
+        """The working mode as it is printed, such as "++-"."""
+        return "".join("+" if s > 0 else "-" for s in self.mode)
+
     def __repr__(self):
-        mode = "".join("+" if s > 0 else "-" for s in self.mode)
         lo, hi = self.lengths.min(), self.lengths.max()
         links = f"{lo:g} m" if lo == hi else f"{lo:g} to {hi:g} m"
-        return f"Manipulator({self.name!r}: {self.n_arms} arms, links {links}, working mode {mode})"
+        return f"Manipulator({self.name!r}: {self.n_arms} arms, links {links}, working mode {self.signs})"
 
 
 def _per_link(name: str, value, N: int) -> np.ndarray:

@@ -115,7 +115,7 @@ class Trajectory(Desired):
         """The same end-effector motion for another machine (other joint angles)."""
         if manipulator(robot).same_kinematics(self.robot):
             return self
-        return _follow(robot, self.t, self.x, self.xd, self.xdd, {"robot": robot})
+        return _follow(robot, self.t, self.x, self.xd, self.xdd, {"machine": robot})
 
     def with_set_points(self, q_a, qd_a=None) -> Trajectory:
         """The same path with other set-points for the drives, which need not close the loops (fig. 3).

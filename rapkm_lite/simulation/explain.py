@@ -1,15 +1,30 @@
-"""Why a run was lost: what stopped it, and whether the sampled loop is unstable there or was led astray."""
+"""Why a run was lost: the first thing that went wrong, found by looking, and by repeating the run without one thing.
+
+A run is repeated only with laws of this package; a user's law is never asked about states that it did not meet.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import linecache
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 
+from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.grammar import BadAnswer, coordinates
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..control.sample import Controller
+from ..machine.arguments import short
+from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
-from .compiled import LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, Plant
+from ..mechanics.trajectory import Trajectory
+from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, Plant, encode, single
+from .faults import Fault, TorqueLimit, blank_table
+from .loop import closed_loop
 from .setup import Setup
 
 REASONS = {
@@ -18,26 +33,42 @@ REASONS = {
     SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
     TOO_STIFF: "friction is too stiff for the sampling time",
 }
+_FOREIGN = Path(__file__).parents[1], Path(linecache.__file__).parent
 
 
 def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None) -> str:
     """What went wrong at sample k."""
     if status not in REASONS:
-        words = f": {cause}" if str(cause) else ""
-        return str(cause) if isinstance(cause, BadAnswer) else f"the law raised {type(cause).__name__}{words}"
+        if isinstance(cause, BadAnswer):
+            return str(cause)
+        return f"the law raised {type(cause).__name__}{f': {cause}' if str(cause) else ''}{place(cause)}"
     if status == TOO_STIFF:
         return too_stiff(setup)
-    pair = coordinates(law, None) if _ours(law) else None
-    pairs = drive_pairs(setup.model)
-    if pair is not None and (min(pair), max(pair)) in pairs:
-        crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
-        measure = abs(crossed[pairs.index((min(pair), max(pair)))])
-        if measure < 0.3:
-            return (
-                f"{REASONS[status]} (near a parameterization singularity of its independent drives "
-                f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose)"
-            )
-    return f"{REASONS[status]} ({_stability(setup, law, k)})"
+    written = _written_by_user(law)
+    if status == SINGULAR and written is not None:
+        return f"the law {short(written)} returned torques that are not {setup.robot.n_arms} finite numbers"
+    words = next(_causes(setup, law, k, written is None), "look at gains, offsets and the path")
+    return f"{REASONS[status]} ({words})"
+
+
+def place(error: BaseException | None) -> str:
+    """The line of the user's code that raised, as far as the traceback knows it."""
+    found, trace = "", getattr(error, "__traceback__", None)
+    while trace is not None:
+        file, line = trace.tb_frame.f_code.co_filename, trace.tb_lineno
+        if not _library(file):
+            text = linecache.getline(file, line).strip()
+            found = f" (line {line} of {Path(file).name}{f': {text}' if text else ''})"
+        trace = trace.tb_next
+    return found
+
+
+def _library(file: str) -> bool:
+    """Does a file belong to this package, or to what Python came with or installed?"""
+    if file.startswith("<frozen"):
+        return True
+    path = Path(file)
+    return "site-packages" in path.parts or any(path.is_relative_to(folder) for folder in _FOREIGN)
 
 
 def too_stiff(setup: Setup) -> str:
@@ -51,28 +82,134 @@ def too_stiff(setup: Setup) -> str:
     )
 
 
-def _stability(setup: Setup, law, k: int) -> str:
-    factor = growth(setup, law, k) if _ours(law) else None
-    if factor is None:
-        return "look at gains, offsets and the path"
-    if factor > 1.05:
-        return (
+def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
+    """What may have been the cause, the surest first."""
+    t, wrong = float(setup.trajectory.t[k]), _difference(setup.model, setup.robot)
+    begun = sorted((fault for fault in setup.broken if _begin(fault) <= t), key=_begin)
+    if not ours:
+        yield from [f"the controller's model has {wrong}"] if "mode" in wrong else []
+        yield from map(_words, begun)
+        return
+    factor = growth(setup, law, k)
+    if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
+        yield f"the controller's model has {wrong}; with the machine's own it is not lost"
+    yield from _broken(setup, law, k, begun)
+    yield from _singular(setup, law, k)
+    if factor is not None and factor > 1.05:
+        yield (
             f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
             f"sample of {setup.trajectory.dt:g} s"
         )
-    if factor > 1.001:
-        return f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
-    return (
-        f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
-        "offsets, a weak gain, or a path too near the boundary"
-    )
+    yield from _sensors(setup, law, k)
+    if factor is not None and factor > 1.001:
+        yield f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
+    if factor is not None:
+        yield (
+            f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
+            "offsets, a weak gain, or a path too near the boundary"
+        )
 
 
-def _ours(law) -> bool:
-    """Is the law one of this package to the core?  A user's law is never asked about states that it did not meet."""
+def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
+    """Faults that have begun, the first one first, and a limit of the law's own."""
+    for fault in begun:
+        if _runs(_with(setup, [f for f in setup.broken if f is not fault]), law, k):
+            yield f"{_words(fault)}; without that it is not lost"
+    if len(begun) > 1 and _runs(_with(setup, []), law, k):
+        yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
+    if isinstance(law, PID) and np.isfinite(law.limit).any():
+        if _runs(setup, dataclasses.replace(law, limit=math.inf), k):
+            yield f"the law's own limit of {law.limit.min():g} N m; without it it is not lost"
+
+
+def _singular(setup: Setup, law, k: int) -> Iterator[str]:
+    """Independent drives whose angles are nearly no coordinates at the desired pose."""
+    pair, pairs = coordinates(law, None), drive_pairs(setup.model)
+    if pair is not None and (min(pair), max(pair)) in pairs:
+        crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
+        measure = abs(crossed[pairs.index((min(pair), max(pair)))])
+        if measure < 0.3:
+            yield (
+                f"near a parameterization singularity of its independent drives "
+                f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose"
+            )
+
+
+def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
+    """What the encoders add: the filter of the rates, counts, and offsets."""
+    sensors = setup.sensors
+
+    def without(**ideal) -> bool:
+        return _runs(setup._replace(sensors=dataclasses.replace(sensors, **ideal)), law, k)
+
+    if sensors.velocity_filter is not None and without(velocity_filter=None):
+        yield f"velocity_filter = {sensors.velocity_filter:g} s delays the rates; with the true ones it is not lost"
+    if sensors.encoder is not None and without(encoder=None):
+        yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
+    if sensors.offset.any() and without(offset=0.0 * sensors.offset):
+        given = f"offset = {short(sensors.offset.tolist())} rad"
+        yield f"{given}, up to {1e3 * np.abs(sensors.offset).max():.3g} mrad, is too large here; without it is not lost"
+
+
+def _difference(model: Manipulator, robot: Manipulator) -> str:
+    """In what a model differs from the machine; empty where it does not."""
+    parts = []
+    if np.any(model.mode != robot.mode):
+        parts.append(f"another working mode, {model.signs} instead of {robot.signs}")
+    for name in ("lengths", "base", "masses", "inertias", "centers", "rotor_inertia", "friction", "gravity", "load"):
+        own, true = np.asarray(getattr(model, name)), np.asarray(getattr(robot, name))
+        off, size = np.abs(own - true).max(), np.abs(true).max()
+        if off > 0.0:
+            parts.append(f"{name} that are off by {f'{100 * off / size:.3g} %' if size > 0.0 else f'{off:g}'}")
+    return " and ".join(parts)
+
+
+def _begin(fault: Fault) -> float:
+    return float(getattr(fault, "time", getattr(fault, "start", 0.0)))
+
+
+def _words(fault: Fault) -> str:
+    since = "" if isinstance(fault, TorqueLimit) else f" from t = {_begin(fault):g} s on"
+    return f"{fault!r} acts{since}"
+
+
+def _with(setup: Setup, faults: list[Fault]) -> Setup:
+    """The run with other faults; the table stays one, so that nothing is compiled anew."""
+    table = blank_table(setup.trajectory.t, setup.robot.n_arms)
+    for fault in faults:
+        fault.mark(table, setup.trajectory.t)
+    return setup._replace(faults=table)
+
+
+def _steadies(setup: Setup, law, k: int, factor: float | None) -> bool:
+    """Is a loop that grows with the model stable with the machine's own?"""
+    own = growth(setup._replace(model=setup.robot, trajectory=setup.trajectory.for_robot(setup.robot)), law, k)
+    return factor is not None and own is not None and factor > 1.001 >= own
+
+
+def _runs(setup: Setup, law, k: int) -> bool:
+    """Does this run go on well beyond sample k?"""
+    trajectory = setup.trajectory.for_robot(setup.model)
+    rows = slice(k + k // 2 + 100)
+    motion = (getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t"))
+    faults = setup.faults
+    if faults is not None:
+        faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
+    setup = setup._replace(trajectory=Trajectory(trajectory.n_arms, *motion, setup.model), faults=faults)
+    try:
+        code = encode(law, setup.model)
+        outcome = closed_loop(setup, law)[0] if code is None else single(setup, code)
+    except (ValueError, ArithmeticError):
+        return False
+    return outcome.status == DONE
+
+
+def _written_by_user(law):
+    """The part of a law that a user wrote; None where all of it is of this package."""
     if type(law) in (AntagonismFilter, CommandFilter):
-        return _ours(law.law)
-    return type(law) in (PD, PID, APD, CTC, SwitchedCTC, RedundantAPD, RedundantCTC)
+        return _written_by_user(law.law)
+    ours = type(law) in (PD, PID, APD, CTC, SwitchedCTC, RedundantAPD, RedundantCTC)
+    return None if ours else law.function if isinstance(law, CompiledLaw) else law
 
 
 def growth(setup: Setup, law, k: int) -> float | None:
@@ -81,7 +218,7 @@ def growth(setup: Setup, law, k: int) -> float | None:
     The spectral radius of the linearized map from one sample to the next, with ideal sensors, a healthy machine and a
     law that remembers nothing yet; None where there is none.
     """
-    robot, model, trajectory, _, _ = setup
+    robot, model, trajectory = setup[:3]
     plant, dt, desired = Plant(robot, trajectory), trajectory.dt, trajectory[k]
     centre = np.concatenate([trajectory.x[k], trajectory.xd[k]])
     step, columns = 1e-6, []

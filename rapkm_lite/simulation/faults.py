@@ -152,6 +152,12 @@ def _from(t: np.ndarray, time: float) -> np.ndarray:
     return t >= time - 1e-6 * t[-1] / (len(t) - 1)
 
 
+def blank_table(t: np.ndarray, N: int) -> FaultTable:
+    """The table of a healthy machine."""
+    shape = len(t), N
+    return FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
+
+
 def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     """The table of a run with the times t (k,) and N drives; None without faults.
 
@@ -160,8 +166,7 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     faults = check_faults(faults)
     if not faults:
         return None
-    shape = len(t), N
-    table = FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
+    table = blank_table(t, N)
     for fault in faults:
         drive = getattr(fault, "drive", 0)
         if drive >= N:

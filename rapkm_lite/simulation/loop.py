@@ -35,7 +35,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
 
     What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
     """
-    robot, model, trajectory, sensors, faults = setup
+    robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory), Encoders(sensors, faults, trajectory.dt)
     controller = Controller(law, model, trajectory.dt)
     states, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import exact_array, matvec
+from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -88,9 +88,11 @@ class Run(Value):
         super().__post_init__()
         as_law(self.law)
         for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
-            exact_array(
-                name, getattr(self, name), len(self.t), self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
-            )
+            shape = self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
+            if getattr(self, name).shape != shape:
+                raise ValueError(
+                    f"{name} has shape {getattr(self, name).shape}; allowed: {shape}, t has {self.t.shape}"
+                )
 
     @cached_property
     def q(self) -> np.ndarray:
@@ -174,11 +176,10 @@ def simulate(
     given = Sensors(offset, encoder, velocity_filter)
     if sensors is not None and given != Sensors():
         raise ValueError(f"sensors = {sensors!r} together with {given!r}; allowed: one of both")
-    faults = check_faults(faults)
-    return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law, faults)
+    return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law)
 
 
-def complete(setup: Setup, law, faults=()) -> Run:
+def complete(setup: Setup, law) -> Run:
     """The whole run; raises SimulationError with a part of it."""
     code, cause = encode(law, setup.model), None
     if code is not None:
@@ -186,21 +187,24 @@ def complete(setup: Setup, law, faults=()) -> Run:
     else:
         law = own_copy(law)
         outcome, cause = closed_loop(setup, law)
-    run = _run(setup, law, faults, outcome)
+    run = _run(setup, law, outcome)
     if cause is not None and not isinstance(cause, Exception):
         time = setup.trajectory.t[outcome.sample]
         hand_over(cause, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
         raise cause
     if outcome.status != DONE:
-        time, reason = setup.trajectory.t[outcome.sample], explain(setup, law, outcome.status, outcome.sample, cause)
-        raise SimulationError(time, reason, run) from cause
+        reason = explain(setup, law, outcome.status, outcome.sample, cause)
+        raise SimulationError(setup.trajectory.t[outcome.sample], reason, run) from cause
     return run
 
 
-def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
+def _run(setup: Setup, law, outcome: Outcome) -> Run:
     """The rows of an outcome that hold something."""
     status, sample, states, *columns = outcome
     rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
+    if status != DONE:
+        table = np.concatenate([states, *columns], axis=-1)[rows]
+        rows = slice(int(np.append(np.all(np.isfinite(table), axis=-1), False).argmin()))
     q_a, qd_a, c, pairs = (column[rows] for column in columns)
     states = states[rows]
     return Run(
@@ -208,7 +212,7 @@ def _run(setup: Setup, law, faults, outcome: Outcome) -> Run:
         law,
         setup.trajectory,
         setup.sensors,
-        faults,
+        setup.broken,
         setup.trajectory.t[rows],
         states[:, :2],
         states[:, 2:],

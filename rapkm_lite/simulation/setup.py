@@ -10,14 +10,14 @@ from ..machine.arguments import of_kind
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
-from .faults import FaultTable, fault_table
+from .faults import Fault, FaultTable, check_faults, fault_table
 from .sensors import Sensors
 
 
 class Setup(NamedTuple):
     """A checked run but for its law: `trajectory` is that of `model`, `sensors` have (N,) offsets; made by `prepare`.
 
-    faults : the table of all faults, or None for a healthy machine.
+    faults : the table of all faults, or None for a healthy machine.  broken : the faults themselves.
     """
 
     robot: Manipulator
@@ -25,6 +25,7 @@ class Setup(NamedTuple):
     trajectory: Trajectory
     sensors: Sensors
     faults: FaultTable | None
+    broken: tuple[Fault, ...] = ()
 
 
 class Outcome(NamedTuple):
@@ -62,7 +63,11 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
     of_kind("sensors", sensors, Sensors, "Sensors")
     if model.n_arms != robot.n_arms:
         raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
-    trajectory = trajectory.for_robot(model)
+    try:
+        trajectory = trajectory.for_robot(model)
+    except ValueError as error:
+        raise ValueError(f"model cannot follow the trajectory: {error}") from None
     inverse_kinematics(robot, trajectory.x[0])
     N = robot.n_arms
-    return Setup(robot, model, trajectory, sensors.of_drives(N), fault_table(faults, trajectory.t, N))
+    faults = check_faults(faults)
+    return Setup(robot, model, trajectory, sensors.of_drives(N), fault_table(faults, trajectory.t, N), faults)

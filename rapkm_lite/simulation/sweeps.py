@@ -20,7 +20,7 @@ from ..mechanics.trajectory import Trajectory
 from .chunks import NOT_RUN, Columns, run_chunk
 from .compiled import DONE, compiled, encode
 from .explain import REASONS
-from .faults import FaultsLike, check_faults
+from .faults import FaultsLike
 from .loop import own_copy
 from .patience import progress_bar
 from .runs import SimulationError, complete, hand_over
@@ -109,7 +109,6 @@ def sweep(
     manipulator(robot)
     chunk = _check_options(failed, chunk, executor, progress)
     laws, offsets = _rows(law, offsets, robot.n_arms)
-    faults = check_faults(faults)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
     in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup.model) is None]
     width = 1 if executor is None and in_python else chunk
@@ -134,7 +133,7 @@ def sweep(
     if failed == "raise" and broken:
         i = int(np.argmax(result.failed))
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
-        _raise(i, errors.get(i), own, laws[i], faults, result, int(table.status[i]))
+        _raise(i, errors.get(i), own, laws[i], result, int(table.status[i]))
     return result
 
 
@@ -167,11 +166,11 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
     return errors
 
 
-def _raise(i: int, error, setup: Setup, law, faults, result: Sweep, status: int):
+def _raise(i: int, error, setup: Setup, law, result: Sweep, status: int):
     """Raise what stopped run i; what the engine stopped runs once more, for its reason and its samples."""
     if error is None:
         try:
-            complete(setup, law, faults)
+            complete(setup, law)
             error = SimulationError(result.failure_time[i], REASONS[status])
         except SimulationError as found:
             error = found
