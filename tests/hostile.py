@@ -33,6 +33,8 @@ A = rk.control_matrix(ROBOT, Q)
 A_TILDE = rk.redundant_control_matrix(ROBOT, Q)
 SENSORS = rk.Sensors([4e-3, -2e-3, 5e-3])
 CONTROLLER = rk.Controller(rk.PD(7.0, 0.2), ROBOT)
+STUDY = rk.sweep(ROBOT, rk.PD(7.05, 0.225), PATH, 1e-3 * np.eye(3))
+LOG = rk.data_path("mystery_runs/gain.csv")
 X = np.linspace(-0.1, 0.1, 12)
 ALONG = np.linspace(0.1, 1.0, 12)
 SWITCHED = rk.simulate(ROBOT, rk.SwitchedCTC(400.0, 40.0), PATH)
@@ -84,6 +86,10 @@ GOOD: dict[str, Any] = {
     "gains": ALONG, "without": np.ones((12, 3)), "with_filter": np.ones((12, 3)), "antagonistic": ALONG,
     "centres": np.stack(np.meshgrid(X, X), -1), "samples": {"a": ALONG}, "reference": None, "low": [0.0] * 3,
     "high": [1.0] * 3, "readings": np.full((4, 3), 0.5), "names": ["a", "b", "c"], "marked": 0.015,
+    "J": rk.constraint_jacobian(ROBOT, Q), "J_dot": rk.constraint_jacobian_dot(ROBOT, Q, 0.1 * Q),
+    "G": rk.mass_matrix(ROBOT, Q), "C": rk.coriolis_matrix(ROBOT, Q, 0.1 * Q), "Q": np.zeros(6), "N": 3, "m": 3,
+    "F_dot": rk.orthogonal_complement_dot(ROBOT, Q, 0.1 * Q),
+    "N_dot": rk.nullspace_projector_dot(ROBOT, Q, 0.1 * Q),
 }  # fmt: skip
 
 # Where the same word has another shape.
@@ -92,6 +98,9 @@ OTHER: dict[tuple[str, str], Any] = {
     ("follow", "x"): PATH.x, ("follow", "xd"): PATH.xd, ("follow", "xdd"): PATH.xdd,
     ("command_filter", "K"): [7.0, 8.0, 9.0], ("data_path", "name"): "testbed.toml", ("mystery_run", "name"): "gain",
     ("SwitchedCTC.pairs", "q"): PATH.q, ("plot_pairs", "run"): SWITCHED, ("pair_measures", "q"): PATH.q,
+    ("projector_dot", "J_dot"): rk.constraint_jacobian_dot(ROBOT, Q, 0.1 * Q),
+    **{("redundant_terms", "N"): rk.nullspace_projector(ROBOT, Q), ("read_log", "source"): LOG},
+    **{("Sweep", n): getattr(STUDY, n) for n in STUDY._fields()},
     **{("Trajectory", n): getattr(PATH, n) for n in ("x", "xd", "xdd", "q", "qd", "qdd", "t")},
     **{("Desired", n): getattr(PATH[3], n) for n in ("x", "xd", "xdd", "q", "qd", "qdd")},
     **{("Run", n): getattr(RUN, n) for n in RUN._fields()},

@@ -114,7 +114,7 @@ def test_mirrored_machine():
     [
         ({"offset": [0.0, 0.0]}, r"offset has shape \(2,\); allowed: one number or \(3,\)"),
         ({"offset": np.nan}, "offset = nan; allowed: finite numbers"),
-        ({"encoder": 0}, "encoder = 0; allowed: > 0"),
+        ({"encoder": 0}, "encoder = 0; allowed: >= 1"),
         ({"velocity_filter": -1.0}, "velocity_filter = -1; allowed: >= 0"),
         ({"model": rk.load("five_bar")}, "model has 2 arms, the machine 3"),
         ({"law": "PD"}, "law = 'PD'; allowed: a law of this package or a function"),

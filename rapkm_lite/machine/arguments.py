@@ -161,16 +161,17 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     return array
 
 
-def joint_indices(name: str, value, n: int | None, count: int = 2, what: str = "joint") -> tuple[int, ...]:
+def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: str = "joint") -> tuple[int, ...]:
     """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
     numbers = value.tolist() if isinstance(value, np.ndarray) else value
     exact = isinstance(numbers, Sequence) and all(
         isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < (math.inf if n is None else n)
         for i in numbers
     )
-    if not exact or len(numbers) != count or len(set(numbers)) != count:
+    fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
+    if not fits:
         top = "from 0 on" if n is None else f"from 0 to {n - 1}"
-        raise ValueError(f"{name} = {short(value)}; allowed: {count} different {what} indices {top}")
+        raise ValueError(f"{name} = {short(value)}; allowed: {count or 'two or more'} different {what} indices {top}")
     return tuple(map(int, numbers))
 
 

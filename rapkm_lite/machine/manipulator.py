@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sized
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -174,8 +173,7 @@ class Manipulator(Value):
         >>> load().with_arms((0, 2))
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
-        count = max(len(arms), 2) if isinstance(arms, Sized) else 2
-        arms = list(joint_indices("arms", arms, self.n_arms, min(count, self.n_arms), "arm"))
+        arms = list(joint_indices("arms", arms, self.n_arms, None, "arm"))
         values = self._fields()
         values |= {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
         return Manipulator(**values)

@@ -1,0 +1,94 @@
+"""Hostile calls of every public name, made from the signatures: refused by a sentence, or answered with numbers."""
+
+from collections import Counter
+
+import hostile
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite import explore, plotting
+
+MODULES = {"rapkm_lite": (rk, 0.98), "plotting": (plotting, 0.9), "explore": (explore, 0.9)}
+
+
+@pytest.fixture(scope="module", params=MODULES)
+def judged(request):
+    """All calls of a module with their verdicts, and the share that has to be clear."""
+    module, share = MODULES[request.param]
+    return [(case, *hostile.judge(case)) for case in hostile.cases(module)], share
+
+
+def shown(judged, *verdicts):
+    return [
+        f"{case.name}({case.parameter}={str(case.value)[:40]!r}): {words[:150]}"
+        for case, verdict, words in judged[0]
+        if verdict in verdicts
+    ][:40]
+
+
+def test_no_call_hangs_or_answers_with_nan(judged):
+    assert not shown(judged, "hang", "nan")
+
+
+def test_refusals_are_sentences(judged):
+    cases, share = judged
+    count = Counter(verdict for _, verdict, _ in cases)
+    refused = count["clear"] + count["half"] + count["unclear"]
+    print(dict(count))
+    assert count["clear"] >= share * refused, "\n".join(shown(judged, "half", "unclear"))
+
+
+def test_there_are_thousands_of_cases(judged):
+    assert len(judged[0]) >= (3000 if judged[1] > 0.95 else 30)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_good_arguments_are_good(name):
+    """The hostile calls differ in one argument from calls that work; a function without such a call is not covered."""
+    missing = []
+    for function, thing in hostile.functions(MODULES[name][0]):
+        arguments = hostile.good_arguments(function, thing)
+        if arguments is None:
+            missing.append(function)
+        else:
+            thing(**arguments)
+            hostile.plt.close("all")
+    assert missing == [] or (len(missing) <= 5 and name != "rapkm_lite"), missing
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        rk.control_matrix,
+        rk.redundant_control_matrix,
+        rk.nullspace_projector,
+        lambda robot, q: rk.inverse_dynamics(robot, q, 0 * q, 0 * q),
+        lambda robot, q: rk.forward_dynamics(robot, q, 0 * q, np.zeros(3)),
+        lambda robot, q: rk.orthogonal_complement_dot(robot, q, 0 * q, (0, 1)),
+        lambda robot, q: rk.redundant_dynamics(robot, q, 0 * q),
+    ],
+)
+def test_rates_and_torques_need_a_closed_pose(function):
+    q = hostile.Q + np.array([0.01, 0, 0, 0, 0, 0])
+    with pytest.raises(
+        ValueError, match=r"q leaves the loops open by .* m; allowed: 2e-05 m .*close_loops\(robot, q\)"
+    ):
+        function(hostile.ROBOT, q)
+    function(hostile.ROBOT, rk.close_loops(hostile.ROBOT, q))
+    function(hostile.ROBOT, hostile.Q.round(5))  # as one types it from a print
+
+
+@pytest.mark.parametrize("factor", [0.0, 2.0, 57.3])
+def test_rates_fit_the_positions(factor):
+    path = hostile.PATH
+    with pytest.raises(ValueError, match=r"xd\[\d+\] = .* m/s does not fit x: .* allowed: the time derivative of x"):
+        rk.follow(path.robot, path.t, path.x, factor * path.xd, path.xdd)
+    slopes = np.gradient(path.x, path.t, axis=0)
+    assert len(rk.follow(path.robot, path.t, path.x, slopes, path.xdd)) == len(path)
+
+
+def test_a_jump_of_the_set_point_is_no_mistake():
+    t = np.linspace(0.0, 1.0, 101)
+    x = np.where(t[:, None] < 0.5, [0.0, 0.0], [0.02, 0.0])
+    rk.follow(hostile.ROBOT, t, x, 0 * x, 0 * x)
