@@ -71,7 +71,8 @@ def constant_factor(seen: Seen) -> str:
         sign = ", and the sign is opposite" * (k < 0)
         return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
-    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want)
+    somewhere_right = any(abs(r - 1.0) < 1e-9 for r in ratios)
+    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want) and not somewhere_right
     if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
         return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
     return ""
@@ -138,6 +139,6 @@ def shifted(seen: Seen) -> str:
     """The right answer plus a constant."""
     gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
     scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
-    if len(gaps) > 1 and np.ptp(gaps) <= seen.slack * max(scale, abs(gaps[0])):
+    if len(gaps) > 1 and np.ptp(gaps) <= min(seen.slack * max(scale, abs(gaps[0])), 0.1 * abs(gaps[0])):
         return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
     return ""

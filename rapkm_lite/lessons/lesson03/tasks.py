@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ...machine.logs import mystery_run
@@ -129,6 +131,7 @@ def asked(offsets):
     return np.asarray(offsets(robot, x), dtype=float), control_matrix(robot, q), null_vector(robot, q)
 
 
+@functools.cache
 def rests(name: str):
     """Null vectors (k, 3), mean errors and mean torques of the second half of each rest of a log."""
     robot, log = load(), mystery_run(name)
