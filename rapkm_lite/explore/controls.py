@@ -59,6 +59,11 @@ def check(name: str, widget, value) -> None:
             raise ValueError(f"{name} = {value!r}; allowed: {low:g} to {high:g}")
 
 
+def tidied(value):
+    """A number without the noise of its last digits; anything else as it is."""
+    return float(f"{value:.12g}") if isinstance(value, float) else value
+
+
 def snap(widget, value):
     """The nearest value that a slider has a step for; a control without steps takes the value as it is."""
     if not hasattr(widget, "min"):
@@ -68,9 +73,9 @@ def snap(widget, value):
     value = min(max(value, low), high)
     at = math.log(value, widget.base) if log else value
     at = widget.min + widget.step * round((at - widget.min) / widget.step)
-    if log:
-        return float(widget.base**at)
-    return int(at) if isinstance(widget, widgets.IntSlider) else round(min(max(at, low), high), 12)
+    if isinstance(widget, widgets.IntSlider):
+        return int(at)
+    return tidied(widget.base**at if log else min(max(at, low), high))
 
 
 def moved(widget, steps: int):

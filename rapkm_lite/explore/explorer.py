@@ -16,7 +16,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import check, moved, snap
+from .controls import check, moved, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -92,7 +92,7 @@ class Explorer:
         self.about = about or (inspect.getdoc(draw) or "").split("\n")[0]
         # The draw function of a ready-made explorer is local to the function that bears its name.
         self.name = draw.__qualname__.split(".")[0]
-        self._defaults = {name: widget.value for name, widget in controls.items()}
+        self._defaults = self.values
         self._held, self._watched, self._slow = False, False, 0
         self._told: dict = {}
         labels = {name: widget.description for name, widget in controls.items()}
@@ -124,7 +124,7 @@ class Explorer:
     @property
     def values(self) -> dict:
         """The setting of every control."""
-        return {name: widget.value for name, widget in self.controls.items()}
+        return {name: tidied(widget.value) for name, widget in self.controls.items()}
 
     @property
     def code(self) -> str:
@@ -158,6 +158,19 @@ class Explorer:
                 self.controls[name].value = value
         self.update()
         self._send()
+        return self
+
+    def screen(self, question: str, answer: str) -> Explorer:
+        """Show it as one screen of a projector: a question, the controls beside the picture, the answer on demand."""
+        bar, canvas = self.widget.children
+        bar.layout.grid_template_columns = "1fr"
+        show = widgets.ToggleButton(description="Show the answer", layout={"width": "auto"})
+        said = widgets.HTML(f"<p>{answer}</p>", layout={"display": "none"})
+        show.observe(lambda change: setattr(said.layout, "display", "block" if change["new"] else "none"), "value")
+        beside = widgets.VBox([bar, show, said], layout={"flex": "0 0 300px"})
+        body = widgets.HBox([beside, canvas])
+        self.widget.children = [widgets.HTML(f"<h2>{question}</h2>"), body]
+        self.widget.add_class("rapkm-screen")
         return self
 
     def reset(self) -> None:
@@ -196,11 +209,12 @@ class Explorer:
             self._held = False
 
     def _changed(self, change) -> None:
-        if self._held:
+        said, value = "", tidied(change["new"])
+        # A browser lays its own steps and sends a value back that differs in the last digit.
+        if self._held or value == tidied(change["old"]):
             return
-        said, value = "", change["new"]
         near = snap(change["owner"], value)
-        if not isinstance(value, str) and near != value and abs(near - value) > 1e-9 * abs(value):
+        if near != value:
             said = f"{value:g} was rounded to {near:g}"
             with self._quiet():
                 change["owner"].value = near

@@ -36,6 +36,9 @@ SETTINGS = {
 SCRIPT = """
 const panel = () => [...jupyterapp.shell.widgets('main')].find(w => w.content?.model?.cells && w.sessionContext);
 window.lab = {
+  save: () => panel().context.save(),
+  shutDown: async () => { await panel().sessionContext.shutdown(); },
+  theme: name => jupyterapp.commands.execute('apputils:change-theme', {theme: name}),
   ready: () => !!window.jupyterapp?.shell && !!panel()?.context.isReady && !!panel().sessionContext.session?.kernel,
   idle: () => panel().sessionContext.session?.kernel?.status === 'idle',
   runAll: () => jupyterapp.commands.execute('notebook:run-all-cells'),
@@ -55,10 +58,10 @@ window.lab = {
   at: i => lab.handles()[i].getAttribute('aria-valuetext'),
   full: i => { const h = lab.handles()[i];
                return Number(h.getAttribute('aria-valuenow')) >= Number(h.getAttribute('aria-valuemax')); },
-  pictures: i => [...lab.handles()[i].closest('.jp-Cell').querySelectorAll('.jp-OutputArea img')],
-  // The pictures beside slider i as short fingerprints of their bytes.
+  pictures: i => [...lab.handles()[i].closest('.jp-Cell').querySelectorAll('.jp-OutputArea canvas')],
+  // The pictures beside slider i as short fingerprints of their pixels.
   fingerprint: async i => (await Promise.all(lab.pictures(i).map(async e => {
-    const bytes = await (await fetch(e.currentSrc || e.src)).arrayBuffer();
+    const bytes = new TextEncoder().encode(e.toDataURL());
     return [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join('.');
   }))).join(' '),
 };
@@ -135,9 +138,13 @@ class Notebook:
     """One notebook, open on a page."""
 
     def __init__(self, page, url: str, token: str, path: str):
-        self.page = page
+        self.page, self.address = page, f"{url}/lab/tree/{path}?reset&token={token}"
         page.add_init_script(SCRIPT)
-        page.goto(f"{url}/lab/tree/{path}?reset&token={token}")
+        self.open()
+
+    def open(self) -> None:
+        """Load the page, for the first time or anew."""
+        self.page.goto(self.address)
         self.wait("() => window.lab.ready()", 60)
 
     def wait(self, condition: str, seconds: float) -> None:

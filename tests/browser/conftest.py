@@ -1,0 +1,32 @@
+"""A headless Chromium for the browser tests.
+
+They are skipped where playwright or a Chromium is missing, unless the environment variable RAPKM_LITE_BROWSER is 1.
+"""
+
+import os
+
+import pytest
+from lab import ARGUMENTS, find_browser
+
+DEMANDED = os.environ.get("RAPKM_LITE_BROWSER") == "1"
+
+
+def missing(what: str):
+    """Skip with the reason, or fail where the browser tests are demanded."""
+    (pytest.fail if DEMANDED else pytest.skip)(f"{what}; the browser tests need playwright and a Chromium")
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A headless Chromium."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("playwright is not installed (python -m pip install playwright)")
+    path = find_browser()
+    if path is None:
+        missing("no chromium, chromium-browser or google-chrome on the path (apt-get install chromium)")
+    with sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield browser
+        browser.close()

@@ -1,0 +1,279 @@
+"""The explorers in a real JupyterLab: every control by key and mouse, handles, themes, kernels that go."""
+
+import inspect
+import json
+
+import nbformat
+import pytest
+from lab import Notebook, server
+
+from rapkm_lite import explore
+
+NAMES = sorted(
+    name
+    for name, made in vars(explore).items()
+    if inspect.isfunction(made) and list(inspect.signature(made).parameters) == ["robot"]
+)
+KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+FAILING = """from rapkm_lite import explore
+def shy(picture, slope):
+    picture.handle("a", 0.5, slope, slope=(0, 1))
+    if slope > 2:
+        raise RuntimeError("nobody expected this")
+    picture.line("a", [0, 1], [0, slope])
+slopes = {"slope": explore.slider("slope in m", 0.0, 4.0, 0.1, 1.0)}
+explore.explorer(shy, slopes, {"a": {"ylim": (0, 4), "ylabel": "y in m"}})"""
+NOTEBOOKS = {name: [f"from rapkm_lite import explore\nexplore.{name}()"] for name in NAMES}
+NOTEBOOKS |= {
+    "shy": [FAILING],
+    "twice": ["from rapkm_lite import explore\ne = explore.machine()\ndisplay(e)", "display(e)"],
+}
+
+SCRIPT = """
+window.stage = {
+  box: (k = 0) => document.querySelectorAll('.rapkm-explorer')[k],
+  root: (k = 0) => document.querySelectorAll('.rapkm')[k],
+  drawn: (k = 0) => Number(stage.root(k)?.dataset.drawn ?? 0),
+  places: (k = 0) => JSON.parse(stage.root(k).dataset.places),
+  controls: () => [...stage.box().querySelectorAll('.rapkm-control')].map(c => ({
+    label: c.querySelector('.widget-label')?.textContent || c.textContent.trim(),
+    kind: c.querySelector('.noUi-handle') ? 'slider' : c.querySelector('select') ? 'choice' : 'switch',
+    track: c.querySelector('.noUi-target')?.getBoundingClientRect().width ?? null,
+    names: [...c.querySelectorAll('.noUi-handle, .widget-readout, select, input')].map(e => e.ariaLabel) })),
+  part: (i, what) => stage.box().querySelectorAll('.rapkm-control')[i].querySelector(what),
+  middle: e => { e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect();
+                 return [b.left + b.width / 2, b.top + b.height / 2, b.width]; },
+  knob: (k = 0, n = 0) => stage.middle([...stage.root(k).querySelectorAll('.rapkm-knob:not([hidden])')][n]),
+  // How many different colours the canvases show: a blank one has a single one.
+  colours: () => [...stage.root().querySelectorAll('canvas')].map(c => c.width ? new Set(
+    new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer)).size : 0),
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def site(browser, tmp_path_factory):
+    """JupyterLab on one notebook for each explorer."""
+    folder = tmp_path_factory.mktemp("stage")
+    (folder / "root").mkdir()
+    for name, sources in NOTEBOOKS.items():
+        cells = [nbformat.v4.new_code_cell(source) for source in sources]
+        nbformat.write(nbformat.v4.new_notebook(cells=cells, metadata=KERNEL), folder / "root" / f"{name}.ipynb")
+    with server(folder / "root", folder) as address:
+        yield address
+
+
+@pytest.fixture
+def shown(browser, site):
+    """A function that opens an explorer's notebook, runs it, and waits for the picture."""
+    pages = []
+
+    def opened(name: str, width: int = 1400, scale: float = 1) -> Notebook:
+        pages.append(browser.new_page(viewport={"width": width, "height": 1000}, device_scale_factor=scale))
+        pages[-1].add_init_script(SCRIPT)
+        notebook = Notebook(pages[-1], *site, f"{name}.ipynb")
+        notebook.ask("() => jupyterapp.shell.collapseLeft()")
+        notebook.run_all()
+        notebook.wait("() => stage.drawn() > 0", 30)
+        # Names for readers of the screen come when the picture rests.
+        notebook.wait("() => stage.controls().every(c => c.names.length && c.names.every(Boolean))", 10)
+        return notebook
+
+    yield opened
+    for page in pages:
+        page.close()
+
+
+def changed(notebook, act, seconds=20):
+    """The setting after an act that must bring a new picture."""
+    drawn, before = notebook.ask("() => stage.drawn()"), notebook.ask("() => stage.places()")
+    act()
+    notebook.wait(f"() => stage.drawn() > {drawn} && JSON.stringify(stage.places()) !== '{dumped(before)}'", seconds)
+    return notebook.ask("() => stage.places()")
+
+
+def dumped(value):
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+
+
+def still(notebook):
+    """The setting once nothing is on its way."""
+    notebook.settle()
+    notebook.page.wait_for_timeout(150)
+    notebook.settle()
+    return notebook.ask("() => stage.places()")
+
+
+def drag(notebook, start, way, steps=12):
+    """Press at a pixel, move along (dx, dy) and let go."""
+    mouse = notebook.page.mouse
+    mouse.move(*start[:2])
+    mouse.down()
+    for k in range(1, steps + 1):
+        mouse.move(start[0] + way[0] * k / steps, start[1] + way[1] * k / steps)
+        notebook.page.wait_for_timeout(12)
+    mouse.up()
+
+
+def use(notebook, i, kind):
+    """Move control i by key and by mouse; each brings another picture."""
+    page, control = notebook.page, notebook.page.locator(".rapkm-control").nth(i)
+    if kind == "slider":
+        notebook.ask("i => stage.part(i, '.noUi-handle').focus()", i)
+        changed(notebook, lambda: page.keyboard.press("ArrowRight"))
+        still(notebook)
+        at = notebook.ask("i => stage.middle(stage.part(i, '.noUi-handle'))", i)
+        left, _, wide = notebook.ask("i => stage.middle(stage.part(i, '.noUi-target'))", i)
+        changed(notebook, lambda: drag(notebook, at, (-0.3 * wide if at[0] > left else 0.3 * wide, 0)))
+    elif kind == "choice":
+        first = notebook.ask("i => stage.part(i, 'select').selectedIndex", i)
+        notebook.ask("i => stage.part(i, 'select').focus()", i)
+        changed(notebook, lambda: page.keyboard.press("ArrowUp" if first else "ArrowDown"))
+        changed(notebook, lambda: control.locator("select").select_option(index=first))
+    else:
+        changed(notebook, lambda: control.locator("input").press("Space"))
+        changed(notebook, lambda: control.locator("input").click())
+    still(notebook)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_control_obeys_key_and_mouse_at_every_width(name, shown):
+    notebook = shown(name)
+    for width in (1400, 1024, 390):
+        notebook.page.set_viewport_size({"width": width, "height": 1000})
+        notebook.page.wait_for_timeout(300)
+        for i, control in enumerate(notebook.ask("() => stage.controls()")):
+            assert control["label"] and all(n == control["label"] for n in control["names"]), control
+            assert control["kind"] != "slider" or control["track"] >= (160 if width == 1400 else 120), control
+            use(notebook, i, control["kind"])
+        wide, room = notebook.ask("() => [stage.root().scrollWidth, stage.root().clientWidth]")
+        assert wide <= room
+    notebook.check()
+
+
+@pytest.mark.parametrize("name", ["machine", "steady_state", "actuation", "landscape", "animation", "three_opinions"])
+def test_handle_slider_and_kernel_agree(name, shown):
+    notebook = shown(name)
+    before = notebook.ask("() => stage.places()")
+    drag(notebook, notebook.ask("() => stage.knob()"), (70, -25))
+    places = still(notebook)
+    moved = {k for k in places if places[k] != before[k]}
+    assert moved
+    # A knob tells the setting it stands for, sliders read the same numbers.
+    text = notebook.ask("() => stage.root().querySelector('.rapkm-knob').ariaValueText")
+    read = notebook.ask(
+        "() => [...stage.box().querySelectorAll('.widget-readout')].map(e => e.textContent.replace('−', '-'))"
+    )
+    for control in moved:
+        assert f": {places[control]}" in text
+        assert any(abs(float(r.replace("−", "-")) - places[control]) < 1e-6 for r in read), (control, places, read)
+    # Keys on the knob, while the notebook is in command mode.
+    again = changed(notebook, lambda: notebook.page.keyboard.press("ArrowLeft"))
+    assert {k for k in again if again[k] != places[k]} <= set(moved)
+    notebook.check()
+
+
+def test_last_place_of_a_fast_hand_wins_and_is_clamped(shown):
+    notebook = shown("machine")
+    spot = """() => { const k = stage.root().querySelector('.rapkm-knob').getBoundingClientRect();
+        const r = stage.root().getBoundingClientRect(); return [k.left - r.left, k.top - r.top]; }"""
+    start = notebook.ask(spot)
+    drag(notebook, notebook.ask("() => stage.knob()"), (900, 0), steps=40)
+    places = still(notebook)
+    out = notebook.ask(spot)
+    # Stopped on the way from the middle of the drives, a little lower than the hand.
+    assert 100 < places["x"] < 200 and out[0] > start[0] + 50 and abs(out[1] - start[1]) < 40
+    assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+    drag(notebook, notebook.ask("() => stage.knob()"), (start[0] - out[0], start[1] - out[1]), steps=40)
+    places = still(notebook)
+    assert abs(places["x"] - 20) <= 4 and abs(places["y"] - 30) <= 4
+
+
+def test_theme_leaves_no_canvas_blank_and_scale_two_is_sharp(shown):
+    notebook = shown("machine", scale=2)
+    assert all(
+        notebook.ask("() => [...document.querySelectorAll('.rapkm canvas')].map(c => c.width === 2 * c.clientWidth)")
+    )
+    for theme in ("JupyterLab Dark", "JupyterLab Light"):
+        notebook.ask("name => lab.theme(name)", theme)
+        notebook.page.wait_for_timeout(2500)
+        assert min(notebook.ask("() => stage.colours()")) > 10
+        ink = notebook.ask("() => getComputedStyle(stage.root().querySelector('.rapkm-numbers')).color")
+        assert (int(ink.split("(")[1].split(",")[0]) > 128) == ("Dark" in theme)
+
+
+def test_saved_shut_down_and_reopened_shows_the_picture(shown):
+    notebook = shown("landscape")
+    stored = "() => document.querySelector('img.rapkm-stored')?.getBoundingClientRect().height ?? 0"
+    assert notebook.ask(stored) == 0
+    notebook.ask("() => lab.save()")
+    notebook.ask("() => lab.shutDown()")
+    notebook.open()
+    notebook.wait(f"() => ({stored})() > 150", 20)
+    assert "energy" in notebook.ask("() => document.querySelector('img.rapkm-stored').alt")
+    assert "Error displaying" not in notebook.ask("() => document.querySelector('.jp-OutputArea').innerText")
+
+
+def test_failure_in_the_kernel_blocks_nobody(shown):
+    notebook = shown("shy")
+    drag(notebook, notebook.ask("() => stage.knob()"), (0, -120))
+    assert still(notebook)["slope"] > 2
+    assert "nobody expected this" in notebook.ask("() => stage.root().querySelector('.rapkm-problem').textContent")
+    drag(notebook, notebook.ask("() => stage.knob()"), (0, 130))
+    assert still(notebook)["slope"] < 2
+    assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+
+
+def test_reloaded_page_goes_on_with_the_kernel(shown):
+    notebook = shown("machine")
+    changed(notebook, lambda: drag(notebook, notebook.ask("() => stage.knob()"), (-60, 40)))
+    places = still(notebook)
+    notebook.ask("() => lab.save()")
+    notebook.open()
+    notebook.wait("() => stage.drawn() > 0", 30)
+    assert notebook.ask("() => stage.places()") == places
+    changed(notebook, lambda: drag(notebook, notebook.ask("() => stage.knob()"), (40, -40)))
+
+
+def test_two_views_stay_in_step(shown):
+    notebook = shown("twice")
+    notebook.wait("() => stage.drawn(1) > 0", 20)
+    for k in (0, 1):
+        drag(notebook, notebook.ask("k => stage.knob(k)", k), (50, -20 + 60 * k))
+        still(notebook)
+        assert notebook.ask("() => stage.places(0)") == notebook.ask("() => stage.places(1)")
+    assert notebook.ask("() => stage.drawn(0) - stage.drawn(1)") <= 2
+
+
+def test_restarted_kernel_leaves_the_picture_and_says_so(shown):
+    notebook = shown("prestress")
+    notebook.ask("() => jupyterapp.shell.currentWidget.sessionContext.restartKernel()")
+    notebook.wait("() => /run the cell again/.test(stage.root().querySelector('.rapkm-note').textContent)", 20)
+    assert min(notebook.ask("() => stage.colours()")) > 10
+
+
+def test_setting_is_copied_as_code_and_a_rounded_number_says_so(shown):
+    notebook = shown("machine")
+    note = "() => stage.root().querySelector('.rapkm-note').textContent"
+    readout = notebook.page.locator(".widget-readout").first
+    readout.click()
+    notebook.page.keyboard.press("Control+A")
+    notebook.page.keyboard.type("31")
+    changed(notebook, lambda: notebook.page.keyboard.press("Enter"))
+    assert "31 was rounded to " in notebook.ask(note)
+    x = still(notebook)["x"]
+    notebook.page.get_by_role("button", name="copy this setting").click()
+    assert f"explore.machine().set(x={x})" in notebook.ask(note)
+    notebook.page.wait_for_timeout(900)
+    assert f"({x}, 30) mm" in notebook.ask("() => stage.root().querySelector('[aria-live]').textContent")
+
+
+def test_wrong_setting_is_a_sentence_and_reset_goes_back(shown):
+    notebook = shown("computed_torque")
+    notebook.ask("() => stage.part(1, '.noUi-handle').focus()")
+    changed(notebook, lambda: notebook.page.keyboard.press("End"))
+    still(notebook)
+    assert "left the workspace" in notebook.ask("() => stage.root().querySelector('.rapkm-problem').textContent")
+    notebook.page.get_by_role("button", name="Reset").press("Enter")
+    still(notebook)
+    assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
