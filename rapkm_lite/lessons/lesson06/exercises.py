@@ -51,7 +51,7 @@ def expected_cost(S, sigma_dq) -> float:
 def _forms(rng) -> list[tuple]:
     """Forms of paths of three and of four drives, and a number in rad."""
     out = []
-    for k in range(6):
+    for k in range(8):
         size = 3 + k // 4
         M = rng.normal(size=(size, size))
         out.append(Case(f"{size} drives", 1e4 * (M @ M.T + np.eye(size)), rng.uniform(1e-3, 6e-3)))
@@ -129,7 +129,7 @@ EXERCISES = {
             "Along the eigenvectors of S, where the energy is the eigenvalue times the norm squared.",
             "size**2 * np.linalg.eigvalsh(S)[0]; eigvalsh sorts, np.linalg.eig does not.",
         ),
-        close=0.1,
+        close=0.03,
         improve="a search ends where it was told to; the smallest eigenvalue of S is exact",
         mistakes=mistakes.MINIMA,
     ),
@@ -143,7 +143,7 @@ EXERCISES = {
             "7.05) @ offset for p in spots])]",
         ),
         judge=places.judge,
-        close=0.1,
+        close=0.02,
         improve="a finer search around the place that you found",
         mistakes=places.MISTAKES,
         points=10.0,
