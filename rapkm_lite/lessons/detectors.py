@@ -28,6 +28,7 @@ FACTORS = {
     1 / np.pi: "the answer is pi times too small: a factor of pi is missing",
     4.0: "the answer is 4 times too large: a factor of 4, perhaps a 2 that was squared",
     0.25: "the answer is 4 times too small: a factor of 4 is missing, perhaps a 2 that was squared",
+    4 * np.pi**2: "the answer is 4 pi^2 times too large: a factor of (2 pi)^2, turns against radians, Hz against rad/s",
     60.0: "the answer is 60 times too large: units, minutes against seconds",
     1 / 60: "the answer is 60 times too small: units, minutes against seconds",
 }
@@ -118,6 +119,8 @@ def another_frame(seen: Seen) -> str:
     if np.linalg.det(turn) < 0:
         return "the vectors are mirrored: x and y are exchanged, or one axis points the other way (another frame)"
     angle = np.degrees(np.arctan2(turn[0, 1], turn[0, 0]))
+    if abs(angle) < 1.0 + np.degrees(2 * seen.slack):
+        return ""
     return f"the vectors are all turned by {angle:.0f} degrees: they are given in another frame"
 
 

@@ -9,15 +9,19 @@ from dataclasses import dataclass, field
 class Case(tuple):
     """Arguments of one case with words for it that a verdict can say: Case("a nearly singular pose", A, c).
 
+    beyond : True for a case that goes further than it takes to have the idea, like a fourth drive; an answer that is
+    wrong there only is "close".
+
     >>> Case("a nearly singular pose", 1.0, 2.0).label
     'a nearly singular pose'
     """
 
     label: str
+    beyond: bool
 
-    def __new__(cls, label: str, *arguments):
+    def __new__(cls, label: str, *arguments, beyond: bool = False):
         case = super().__new__(cls, arguments)
-        case.label = label
+        case.label, case.beyond = label, beyond
         return case
 
 

@@ -29,7 +29,7 @@ def arms(rng) -> list[tuple]:
     cases = [_pose(robot, p, s) for p, s in zip(x, working_modes(robot), strict=True)]
     uneven, four = load("asymmetric"), load("four_arms")
     cases += [Case("three different arms", *_pose(uneven, p)) for p in rng.uniform(-0.05, 0.05, (2, 2))]
-    cases += [Case("four arms", *_pose(four, p)) for p in rng.uniform(-0.08, 0.08, (2, 2))]
+    cases += [Case("four arms", *_pose(four, p), beyond=True) for p in rng.uniform(-0.08, 0.08, (2, 2))]
     return [*cases, Case("a pose with an almost stretched arm", *_pose(robot, [0.0, -0.166]))]
 
 
@@ -56,8 +56,8 @@ def control_matrices(rng) -> list[tuple]:
     middle = robot.base[:2].mean(axis=0)
     return [
         *cases,
-        Case("four drives", _matrix(four, [0.03, -0.05]), 0.12),
-        Case("four drives", _matrix(four, [-0.06, 0.02]), 0.07),
+        Case("four drives", _matrix(four, [0.03, -0.05]), 0.12, beyond=True),
+        Case("four drives", _matrix(four, [-0.06, 0.02]), 0.07, beyond=True),
         Case("three different arms", _matrix(uneven, [0.02, -0.03]), 0.15),
         Case("a pose close to an input singularity", _matrix(robot, middle + [0.004, 0.003], (1, 1, -1)), 0.1),
     ]

@@ -34,12 +34,11 @@ def rest_cases(rng) -> list[tuple]:
 
     cases = [(_matrix(robot, x), gains(3), rng.uniform(-8e-3, 8e-3, 3)) for x in rng.uniform(-0.08, 0.08, (5, 2))]
     for x in rng.uniform(-0.08, 0.08, (2, 2)):
-        cases.append(Case("four drives", _matrix(four, x), gains(4), rng.uniform(-8e-3, 8e-3, 4)))
+        cases.append(Case("four drives", _matrix(four, x), gains(4), rng.uniform(-8e-3, 8e-3, 4), beyond=True))
     mixed = 0.8 * rng.standard_normal((3, 3))
     coupled = gains(3) + mixed @ mixed.T
-    cases.append(
-        Case("gains that couple the drives", _matrix(robot, [0.03, 0.05]), coupled, np.array([4e-3, -2e-3, 5e-3]))
-    )
+    offset, label = np.array([4e-3, -2e-3, 5e-3]), "gains that couple the drives"
+    cases.append(Case(label, _matrix(robot, [0.03, 0.05]), coupled, offset, beyond=True))
     near = robot.base[:2].mean(axis=0) + [0.006, 0.004]
     A = _matrix(robot, near, (1, 1, -1))
     return [*cases, Case("a pose close to an input singularity", A, gains(3), np.array([1e-3, -2e-3, 1e-3]))]
@@ -65,7 +64,7 @@ def fight_cases(rng) -> list[tuple]:
     return [
         *cases,
         Case("a pose where drive 1 has no share", idle, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)),
-        Case("four drives", four, rng.uniform(2.0, 20.0, 4), rng.uniform(-8e-3, 8e-3, 4)),
+        Case("four drives", four, rng.uniform(2.0, 20.0, 4), rng.uniform(-8e-3, 8e-3, 4), beyond=True),
     ]
 
 

@@ -54,7 +54,8 @@ def _forms(rng) -> list[tuple]:
     for k in range(8):
         size = 3 + k // 4
         M = rng.normal(size=(size, size))
-        out.append(Case(f"{size} drives", 1e4 * (M @ M.T + np.eye(size)), rng.uniform(1e-3, 6e-3)))
+        S = 1e4 * (M @ M.T + np.eye(size))
+        out.append(Case(f"{size} drives", S, rng.uniform(1e-3, 6e-3), beyond=size > 3))
     return out
 
 
