@@ -5,6 +5,7 @@
     python notebooks/build.py overview       # the picture of the README
     python notebooks/build.py figures        # nothing but the list of all figures
     python notebooks/build.py nbgrader FOLDER 04   # lessons for nbgrader: FOLDER/source/..., from the solutions
+    python notebooks/build.py teaching       # nothing but the teachers' pages that follow from the lessons
     python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
@@ -26,7 +27,7 @@ import nbformat
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-from workshop import nbgrader  # noqa: E402
+from workshop import nbgrader, teaching  # noqa: E402
 from workshop.layout import PACKAGE, SOLUTIONS, figure_list, new  # noqa: E402
 from workshop.storing import COVER, blank, student, tidy  # noqa: E402, F401
 
@@ -88,6 +89,8 @@ def main(wanted: list[str]) -> None:
         execute(path, strict=False)
     if not wanted or "overview" in wanted:
         overview()
+    if not wanted or "teaching" in wanted:
+        teaching.write()
 
 
 if __name__ == "__main__":

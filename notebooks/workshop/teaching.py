@@ -1,0 +1,143 @@
+"""Pages for teachers that follow from the lessons: minutes, objectives, questions with answers, named mistakes."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import nbformat
+
+from .layout import NOTEBOOKS
+
+TEACHING = NOTEBOOKS.parent / "docs" / "teaching"
+_HEADING = re.compile(r"^(##+) +(.*?)(?: *\((\d+) min\))? *$", re.M)
+_CHECK = re.compile(r"\bcheck\(\s*[\"']([\w.]+)[\"']")
+_QUESTION = re.compile(r"^\*\*(?:Predict|Before you)[^*]*\*\*")
+_DETAILS = re.compile(r"<details>\s*<summary>.*?</summary>(.*?)</details>", re.S)
+WRITTEN = "<!-- Written by python notebooks/build.py teaching. -->\n"
+
+
+def lessons() -> dict[str, nbformat.NotebookNode]:
+    """The students' notebooks by their number."""
+    found = sorted(NOTEBOOKS.glob("[0-9][0-9]_*.ipynb"))
+    return {path.stem[:2]: nbformat.read(path, as_version=4) for path in found}
+
+
+def course() -> dict:
+    """What `course.toml` says."""
+    return tomllib.loads((TEACHING / "course.toml").read_text(encoding="utf-8"))
+
+
+def title(notebook) -> str:
+    return notebook.cells[0].source.splitlines()[0].removeprefix("# ")
+
+
+def headings(notebook) -> list[tuple[str, str, str]]:
+    """(marks, heading, minutes) of the sections and of the folded parts."""
+    text = "\n".join(c.source for c in notebook.cells if c.cell_type == "markdown")
+    text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    return [m.groups("–") for m in _HEADING.finditer(text) if m[1] == "##" or m[2].startswith("Dig deeper")]
+
+
+def sections_of_exercises(notebook) -> dict[str, str]:
+    """Exercise -> the heading it stands under, of a section or a folded part."""
+    here, found = "", {}
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            for name in _CHECK.findall(cell.source):
+                found.setdefault(name, here)
+            continue
+        for level, heading, _ in _HEADING.findall(cell.source):
+            here = heading if level == "##" or heading.startswith("Dig deeper") else here
+    return found
+
+
+def minutes_page() -> str:
+    """Minutes per section as the headings state them."""
+    text = [WRITTEN, "# Minutes per section\n"]
+    for notebook in lessons().values():
+        core = re.search(r"\*\*Minutes:?\*\*:? *(\d+)", notebook.cells[0].source)
+        text += [
+            f"## {title(notebook)}\n",
+            f"Core: {core[1] if core else '–'} minutes.\n",
+            "| section | minutes |",
+            "|---|--:|",
+        ]
+        text += [f"| {'*' * (m != '##')}{heading}{'*' * (m != '##')} | {n} |" for m, heading, n in headings(notebook)]
+        text.append("")
+    return "\n".join(text)
+
+
+def map_page() -> str:
+    """Objective, section, exercise and exam item, side by side."""
+    text = [
+        WRITTEN,
+        "# Objectives, sections, exercises, exam items\n",
+        "| lesson | objective | section | exercise | exam |",
+        "|---|---|---|---|---|",
+    ]
+    read = lessons()
+    for row in course()["objective"]:
+        notebook, names = read[row["lesson"]], row.get("exercises", [])
+        places = [sections_of_exercises(notebook).get(name, "–") for name in names]
+        wanted = row.get("section", "").lower()
+        places += [heading for _, heading, _ in headings(notebook) if wanted and wanted in heading.lower()][:1]
+        exam = ", ".join(map(str, row["exam"]))
+        shown = "; ".join(dict.fromkeys(places))
+        text.append(f"| {row['lesson']} | {row['what']} | {shown} | {', '.join(f'`{n}`' for n in names)} | {exam} |")
+    return "\n".join([*text, ""])
+
+
+def mistakes_page() -> str:
+    """The mistakes that the checks call by their name."""
+    from rapkm_lite.checks import exercises
+
+    kinds = course()["kinds"]
+    text = [
+        WRITTEN,
+        "# What students get wrong\n",
+        "For each exercise the mistakes that its check calls by their name. Besides these every check knows the",
+        "opposite sign, transposed answers, wrong units (factors 1000 and 180/π), rows or entries in another order, a",
+        "forgotten factor, another frame, and the complement of the right answer. Which of them a class makes most",
+        "often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says.\n",
+    ]
+    for name, exercise in sorted(exercises().items()):
+        points = f"{exercise.points:g} points"
+        text += [f"## {name}\n", f"Kind: {kinds.get(name, 'derive')}, {points}.\n"]
+        text += [f"- {sentence}" for sentence in exercise.mistakes] or [
+            "Its check compares with limits, or with the log."
+        ]
+        text.append("")
+    return "\n".join(text)
+
+
+def predictions_page() -> str:
+    """Every question of the lessons with the answer that stands folded behind it."""
+    text = [WRITTEN, "# Questions inside the lessons, with their answers\n"]
+    for notebook in lessons().values():
+        text.append(f"## {title(notebook)}\n")
+        cells = notebook.cells
+        for k, cell in enumerate(cells):
+            blocks = re.split(r"\n\s*\n", cell.source) if cell.cell_type == "markdown" else []
+            asked = [block for block in blocks if _QUESTION.match(block)]
+            if not asked:
+                continue
+            behind = [c.source for c in cells[k : k + 5] if c.cell_type == "markdown"]
+            found = _DETAILS.search("\n".join(behind))
+            answer = found[1].strip() if found else "The cell that follows prints or draws the answer."
+            text += [*asked, "", "> " + answer.replace("\n", "\n> "), ""]
+    return re.sub(r"\]\((?![a-z]+:|#)", "](../../notebooks/", "\n".join(text))
+
+
+PAGES = {"minutes": minutes_page, "map": map_page, "mistakes": mistakes_page, "predictions": predictions_page}
+
+
+def write() -> list[Path]:
+    """Write the pages that follow from the lessons."""
+    written = []
+    for name, page in PAGES.items():
+        path = TEACHING / f"{name}.md"
+        path.write_text(page().rstrip() + "\n", encoding="utf-8")
+        written.append(path)
+    return written

@@ -1,0 +1,209 @@
+"""The teachers' pages against the lessons: what is generated is up to date, numbers are right, nothing is left out."""
+
+import itertools
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite.checks import exercises
+
+ROOT = Path(__file__).parents[1]
+TEACHING = ROOT / "docs" / "teaching"
+sys.path.insert(0, str(ROOT / "notebooks"))
+
+from workshop import teaching  # noqa: E402
+
+EXAM = (TEACHING / "exam.md").read_text(encoding="utf-8")
+ITEMS = {int(number): body for number, body in re.findall(r"^### (\d+) ·(.*?)(?=^### |\Z)", EXAM, re.M | re.S)}
+
+
+@pytest.mark.parametrize("name", teaching.PAGES)
+def test_generated_pages_are_up_to_date(name):
+    kept = (TEACHING / f"{name}.md").read_text(encoding="utf-8")
+    assert kept == teaching.PAGES[name]().rstrip() + "\n", "run: python notebooks/build.py teaching"
+
+
+def test_exam_has_24_items_with_answers_and_marks():
+    assert list(ITEMS) == list(range(1, 25))
+    marks = [int(re.search(r"\((\d+) marks\)", body)[1]) for body in ITEMS.values()]
+    assert f"24 items, {sum(marks)} marks" in EXAM
+    assert all("**Answer.**" in body for body in ITEMS.values())
+
+
+def test_map_names_every_item_exercise_and_lesson():
+    course = teaching.course()
+    rows = course["objective"]
+    assert {item for row in rows for item in row["exam"]} == set(ITEMS)
+    named = [name for row in rows for name in row.get("exercises", [])]
+    read = teaching.lessons()
+    known = {name for name in exercises() if name[:2] in {row["lesson"] for row in rows}}
+    assert set(named) == known and len(named) == len(known)
+    for row in rows:
+        places = teaching.sections_of_exercises(read[row["lesson"]])
+        assert all(name in places for name in row.get("exercises", [])), row["what"]
+        if "section" in row:
+            assert any(row["section"] in heading.lower() for _, heading, _ in teaching.headings(read[row["lesson"]]))
+
+
+def test_at_most_a_third_of_the_exercises_ask_for_a_formula():
+    kinds, known = teaching.course()["kinds"], exercises()
+    assert set(kinds.values()) <= {"formula", "derive", "data", "design"}
+    assert {name for name in known if name[:2] <= "06"} == set(kinds)
+    assert sum(kind == "formula" for kind in kinds.values()) <= len(kinds) / 3
+    assert {name for name, kind in kinds.items() if kind == "design"} == {n for n in kinds if known[n].judge}
+
+
+def said(item: int, *numbers: str):
+    for number in numbers:
+        assert number in ITEMS[item], f"item {item} lacks {number}"
+
+
+def test_numbers_of_the_exam():
+    robot = rk.load()
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+    offset = np.array([4e-3, -2e-3, 5e-3])
+    np.testing.assert_allclose(rk.steady_state_torque(A, 7.05, offset), -16.45e-3, atol=1e-8)
+    np.testing.assert_allclose(1e3 * rk.steady_state_error(A, 7.05, offset), [-1.67, 4.33, -2.67], atol=0.005)
+    said(12, "−16.45 mN m", "(−1.67, 4.33, −2.67)")
+    assert abs(2e3 * np.pi / 2000 - 3.14) < 0.005
+    said(14, "3.14 mrad")
+    one, W = np.ones((3, 1)), np.diag([1.0, 1.0, 4.0])
+    c = rk.weighted_pseudoinverse(one, W) @ [6.0]
+    np.testing.assert_allclose(c, [8 / 3, 8 / 3, 2 / 3])
+    assert c @ W @ c == pytest.approx(16) and 2 * one[:, 0] @ W @ (2 * one[:, 0]) == pytest.approx(24)
+    said(9, "(2.67, 2.67, 0.67)", "16", "24")
+    c = np.array([6.0, -3.0, 3.0])
+    kept = rk.antagonism_filter(one) @ c
+    np.testing.assert_allclose(kept, 2.0)
+    assert 1 - kept @ kept / (c @ c) == pytest.approx(0.78, abs=0.005)
+    said(17, "(2, 2, 2)", "78 %")
+    without, with_filter = rk.table1().measured.sum(axis=1)
+    assert without == pytest.approx(4.5605) and with_filter == pytest.approx(2.2385)
+    assert 1 - with_filter / without == pytest.approx(0.51, abs=0.005)
+    said(20, "4.5605", "2.2385", "51 %")
+    assert (2e-3) ** 2 * (30e3 + 20e3 + 4e3) == pytest.approx(0.22, abs=0.005)
+    said(24, "0.22 J", "7.5")
+
+
+def test_the_arm_of_item_six():
+    """An arm with base (0, 0), elbow (0, 0.2) and tip (0.2, 0.2), and its row of A."""
+    robot = rk.Manipulator(base=[[0.0, 0.0], [0.4, 0.0], [0.2, 0.4]], lengths=[[0.2, 0.2]] * 3, masses=0.1)
+    q = rk.inverse_kinematics(robot, [0.2, 0.2], mode=[-1, 1, 1])
+    row = rk.control_matrix(robot, q)[0]
+    np.testing.assert_allclose(row, [-5.0, 0.0], atol=1e-9)
+    assert row @ [0.1, 0.0] == pytest.approx(-0.5)
+    np.testing.assert_allclose(0.04 * row, [-0.2, 0.0], atol=1e-9)
+    said(6, "(−5, 0) 1/m", "−0.5 rad/s", "(−0.2, 0) N")
+
+
+def test_answers_before_the_slider():
+    """Questions 03 and 04: what stops a fight at the centroid, and what doubling the gain does."""
+    robot = rk.load().replace(friction=0.0)
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+    for others in ((-2.5e-3, -2.5e-3), (-5e-3, 0.0)):
+        np.testing.assert_allclose(rk.steady_state_torque(A, 7.05, [5e-3, *others]), 0.0, atol=1e-12)
+    path = rk.triangle(robot)
+
+    def waste(offsets, K_P=7.05):
+        return rk.antagonistic_energy(rk.simulate(robot, rk.PD(K_P, 0.225), path, offsets))
+
+    alike = waste([5e-3, 5e-3, 5e-3])
+    assert alike > 5 * waste([5e-3, -5e-3, 0.0])
+    assert waste([5e-3, 5e-3, 5e-3], 14.1) / alike == pytest.approx(4, rel=0.05)
+
+
+def test_concept_test_has_ten_items_with_one_answer_each():
+    text = (TEACHING / "concept_test.md").read_text(encoding="utf-8")
+    items = re.findall(r"^\d+\. (.*?)(?=^\d+\. |\Z)", text, re.M | re.S)
+    assert len(items) == 10
+    for item in items:
+        assert {"(a)", "(b)", "(c)"} <= set(re.findall(r"\([abc]\)", item.partition("**[")[0]))
+        assert re.search(r"\*\*\[[abc]\]\*\*", item)
+
+
+def test_plans_fit_into_their_time():
+    text = (TEACHING / "plans.md").read_text(encoding="utf-8")
+    spans = [(int(a), int(b)) for a, b in re.findall(r"^\| (\d+)–(\d+) \|", text, re.M)]
+    assert spans[0][0] == 0 and spans[-1][1] == 90
+    assert all(before[1] == after[0] for before, after in itertools.pairwise(spans))
+    for row in re.findall(r"^\d\. .*$", text, re.M):
+        assert sum(map(int, re.findall(r"\((\d+)\)", row))) <= 75, row
+
+
+def test_every_link_of_the_teachers_pages_leads_somewhere():
+    for page in [*TEACHING.glob("*.md"), ROOT / "notebooks" / "README.md"]:
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_formula_sheet_is_one_page_without_overflow(tmp_path):
+    target = tmp_path / "sheet.pdf"
+    subprocess.run([sys.executable, TEACHING / "formula_sheet.py", target], check=True, capture_output=True)
+    pdf = target.read_bytes()
+    assert pdf.startswith(b"%PDF") and len(re.findall(rb"/Type\s*/Page\b", pdf)) == 1
+    sys.path.insert(0, str(TEACHING))
+    import formula_sheet
+
+    fig = formula_sheet.sheet()
+    page = fig.bbox
+    boxes = [text.get_window_extent() for text in fig.texts]
+    assert all(0 < b.x0 and b.x1 < page.x1 and 0 < b.y0 and b.y1 < page.y1 for b in boxes)
+    assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)], "text over text"
+
+
+def lesson_with(*cells):
+    return nbformat.v4.new_notebook(cells=list(cells))
+
+
+def test_slides_hold_questions_pictures_and_formulas_and_ask_for_nothing():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    picture = nbformat.v4.new_output("display_data", {"text/html": '<img alt="A red square." src="data:,">'})
+    hidden = nbformat.v4.new_output(
+        "stream", name="stdout", text="The answer is here; open it when you have your own.\n42"
+    )
+    notebook = lesson_with(
+        nbformat.v4.new_markdown_cell("# 42 · Why?\n\nA story with [a link](x.ipynb).\n\n1. *say* why"),
+        nbformat.v4.new_markdown_cell(
+            "## First (3 min)\n\nA formula\n\n$$a = \\bar b_1 \\tag{7}$$\n\n**Predict.** How many?"
+        ),
+        nbformat.v4.new_code_cell("print(42)", outputs=[hidden], metadata={"tags": ["hide-output"]}),
+        nbformat.v4.new_markdown_cell("<details><summary>Why</summary>\n\nBecause $x$.\n\n</details>"),
+        nbformat.v4.new_code_cell("plot()", outputs=[picture]),
+        nbformat.v4.new_markdown_cell("### Dig deeper: more (2 min)"),
+        nbformat.v4.new_markdown_cell("Nobody sees this."),
+        nbformat.v4.new_markdown_cell("## Summary (1 min)\n\n- done"),
+    )
+    kinds = [slide.kind for slide in deck.slides(notebook)]
+    assert kinds == ["title", "section", "question", "picture", "section"]
+    page = deck.page(notebook)
+    assert "<math" in page and "$" not in re.sub(r"<script>.*</script>", "", page, flags=re.S)
+    assert "A red square." in page and "Nobody sees this" not in page and "(7)" in page
+    question = page[page.index('class="question"') : page.index('class="picture"')]
+    assert question.index("<details") < question.index("42") and "How many?" in question and "<details open" not in page
+    assert not re.search(r"(?:src|href)=[\"'](?!data:)|url\(|@import|fetch\(", page), "a request to somewhere else"
+
+
+@pytest.mark.parametrize("number", sorted(teaching.lessons()))
+def test_every_lesson_makes_slides(number, tmp_path):
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    target = tmp_path / "slides.html"
+    script = ROOT / "notebooks" / "slides.py"
+    done = subprocess.run([sys.executable, script, number, target], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    page = target.read_text(encoding="utf-8")
+    assert page.count("<section") >= 6 and "\\frac" not in page
+    assert not re.search(r"(?:src|href)=[\"'](?!data:)", page)
+
+
+def test_slides_of_a_lesson_that_is_not_there():
+    script = ROOT / "notebooks" / "slides.py"
+    done = subprocess.run([sys.executable, script, "77"], capture_output=True, text=True)
+    assert done.returncode == 2 and "allowed: 00, 01" in done.stderr
