@@ -2,7 +2,6 @@
 
     python notebooks/build.py                # everything
     python notebooks/build.py 03 04          # the notebooks whose names begin so
-    python notebooks/build.py overview       # the picture of the README
     python notebooks/build.py figures        # nothing but the list of all figures
     python notebooks/build.py nbgrader FOLDER 04   # lessons for nbgrader: FOLDER/source/..., from the solutions
     python notebooks/build.py teaching       # nothing but the teachers' pages that follow from the lessons
@@ -46,32 +45,6 @@ def execute(path: Path, strict: bool) -> None:
     nbformat.write(notebook, path)
 
 
-def overview() -> None:
-    """The picture of the README."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    import rapkm_lite as rk
-    from rapkm_lite import plotting
-
-    plotting.use_style()
-    robot = rk.load().replace(friction=0.0)
-    path, law = rk.triangle(robot), rk.PD(7.05, 0.225)
-    offset = [4e-3, -2e-3, 5e-3]
-    fight = rk.simulate(robot, law, path, offset)
-    calm = rk.simulate(robot, rk.AntagonismFilter(law), path, offset)
-    fig, axes = plt.subplots(1, 3, figsize=(12, 3.7), width_ratios=[1, 1.25, 1.25])
-    plotting.plot_workspace(robot, axes[0])
-    plotting.plot_path(path, axes[0])
-    plotting.plot_machine(robot, path.q[3300], axes[0])
-    for ax, run, title in ((axes[1], fight, "three drives, milliradian offsets"), (axes[2], calm, "with the filter")):
-        plotting.plot_torques(run, ax, f"{title}: {run.energy.sum():.2f} J")
-        ax.set_ylim(-55, 55)
-    fig.savefig(HERE / "overview.png")
-
-
 def main(wanted: list[str]) -> None:
     """Build the notebooks whose names begin with one of `wanted`, or all."""
 
@@ -87,8 +60,6 @@ def main(wanted: list[str]) -> None:
     for path in sorted(filter(chosen, HERE.glob("*.ipynb"))):
         print(path.name, "" if path.name in solved else "(no exercises)", flush=True)
         execute(path, strict=False)
-    if not wanted or "overview" in wanted:
-        overview()
     if not wanted or "teaching" in wanted:
         teaching.write()
 
