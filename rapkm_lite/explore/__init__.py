@@ -22,4 +22,5 @@ from .landscape import landscape
 from .motion import animation
 from .rest import steady_state, three_opinions
 from .runs import decentralized_run
+from .synchronization import via_points
 from .torque import computed_torque
