@@ -180,6 +180,6 @@ def _behaviour(exercise: Exercise, answer: Any) -> Result:
 def _true(made: Callable, answer: Any) -> bool:
     """Whether a design shows a known mistake; what cannot be asked does not show it."""
     try:
-        return bool(made(answer))
-    except Exception:
+        return bool(guarded(made, answer))
+    except Ended:
         return False

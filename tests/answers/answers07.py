@@ -55,12 +55,21 @@ def scaled(factor):
     return lambda A, xd, delay, K_P: factor * tasks.delay_torque(A, xd, delay, K_P)
 
 
-def with_the_root_of(function):
-    s = np.linspace(0, 1, 4001)
-    robot, _ = tasks.edge()
-    way = np.cumsum(function(tasks.demand(robot, tasks.START, tasks.END, s)))
-    return np.interp(np.linspace(way[0], way[-1], 11)[1:-1], way, s)
+def fixed(shares):
+    return lambda part, demand: shares
 
+
+def by_the_integral(part, demand):
+    reach = np.concatenate([[0], np.cumsum((demand[1:] ** 0.5 + demand[:-1] ** 0.5) / 2)])
+    return [float(np.interp(k * reach[-1] / 10, reach, part)) for k in range(1, 10)]
+
+
+def as_the_demand(part, demand):
+    reach = np.cumsum(demand)
+    return np.interp(np.linspace(reach[0], reach[-1], 11)[1:-1], reach, part)
+
+
+EXAMPLE = tasks.via_points(*tasks.edge_demand())
 
 ANSWERS = {
     "07.contradiction": [
@@ -108,16 +117,18 @@ ANSWERS = {
         ("wrong", "transposed", lambda A, xd, d, K: -K * (A.T @ A @ xd), ""),
     ],
     "07.via_points": [
-        ("right", "equal steps of the root of the demand", tasks.example()),
-        ("right", "the same as a list", tasks.example().tolist()),
-        ("right", "by hand", [0.05, 0.105, 0.165, 0.23, 0.3, 0.39, 0.49, 0.62, 0.85]),
-        ("wrong", "equal distances", np.linspace(0, 1, 11)[1:-1], "equal"),
-        ("wrong", "as the demand itself", with_the_root_of(lambda d: d), "square root"),
-        ("wrong", "the wrong end", np.sort(1 - tasks.example()), "torque"),
-        ("wrong", "too many", np.linspace(0, 1, 33)[1:-1], ""),
-        ("wrong", "ends included", np.linspace(0, 1, 9), ""),
-        ("wrong", "in millimetres", 240 * tasks.example(), ""),
-        ("wrong", "too few", tasks.example()[::2], "shape"),
-        ("wrong", "none", [], ""),
+        ("right", "equal steps of the root of the demand", tasks.via_points),
+        ("right", "trapezoids, a list", by_the_integral),
+        ("right", "by hand", fixed([0.05, 0.105, 0.165, 0.23, 0.3, 0.39, 0.49, 0.62, 0.85])),
+        ("right", "in another order", fixed(EXAMPLE[::-1])),
+        ("wrong", "equal distances", fixed(np.linspace(0, 1, 11)[1:-1]), "equal"),
+        ("wrong", "as the demand itself", as_the_demand, "square root"),
+        ("wrong", "the wrong end", fixed(1 - EXAMPLE), "torque"),
+        ("wrong", "too many", fixed(np.linspace(0, 1, 33)[1:-1]), "equal"),
+        ("wrong", "too many, well placed", fixed(np.sort([*EXAMPLE, *(EXAMPLE + 0.02)])), "via points"),
+        ("wrong", "ends included", fixed(np.linspace(0, 1, 9)), "between 0 and 1"),
+        ("wrong", "in millimetres", fixed(240 * EXAMPLE), "between 0 and 1"),
+        ("wrong", "too few", fixed(EXAMPLE[::2]), "torque"),
+        ("wrong", "none", fixed([]), "equal"),
     ],
 }

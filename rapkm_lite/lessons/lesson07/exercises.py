@@ -90,7 +90,7 @@ EXERCISES = {
         },
     ),
     "07.via_points": Exercise(
-        tasks.example(),
+        tasks.via_points,
         hints=(
             "Does every part of the edge need via points as badly as every other? The figure above says.",
             "A leg of length h contradicts by about h^2/8 |eta^T q_a''|. Choose the legs so that this is the same for "
@@ -104,19 +104,11 @@ EXERCISES = {
         points=10.0,
         mistakes={
             "these are equal distances, which waste points where the edge is quiet": (
-                lambda shares: np.ptp(np.diff(np.sort(np.concatenate([[0], np.ravel(shares), [1]])))) < 1e-3
+                lambda answer: np.ptp(np.diff([0, *tasks.chosen(answer), 1])) < 1e-3
             ),
             "the density should grow with the square root of the demand, not with the demand itself": (
-                lambda shares: _as_dense_as_the_demand(np.ravel(shares))
+                lambda answer: tasks.as_dense_as_the_demand(tasks.chosen(answer))
             ),
         },
     ),
 }
-
-
-def _as_dense_as_the_demand(shares) -> bool:
-    s = np.linspace(0, 1, 2001)
-    robot, _ = tasks.edge()
-    way = np.cumsum(tasks.demand(robot, tasks.START, tasks.END, s))
-    plain = np.interp(np.linspace(way[0], way[-1], len(shares) + 2)[1:-1], way, s)
-    return bool(np.abs(np.sort(shares) - plain).max() < 0.01)

@@ -16,6 +16,7 @@ from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import polygon
 from ...simulation.energy import antagonistic_torque
 from ...simulation.runs import simulate
+from ..answers import given, numbers
 from ..checker import Case, Measured
 
 START, END = np.array([-0.12, -0.12 / np.sqrt(3)]), np.array([0.12, -0.12 / np.sqrt(3)])
@@ -93,23 +94,39 @@ def peak(shares) -> float:
     return float(np.abs(antagonistic_torque(run)).max())
 
 
-def quarrel(answer) -> list[Measured]:
-    shares = np.asarray(answer() if callable(answer) else answer, dtype=float)
+@functools.cache
+def edge_demand() -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the way and the demand there, both (997,)."""
+    part = np.linspace(0, 1, 1001)
+    return part[2:-2], demand(edge()[0], START, END, part)[2:-2]
+
+
+def chosen(answer) -> np.ndarray:
+    """The via points that a student's function chooses."""
+    shares = numbers(given(answer, edge_demand()))
     if shares.ndim != 1 or not np.all((shares > 0) & (shares < 1)):
         raise ValueError("the via points are shares of the way, numbers between 0 and 1, in one row")
+    return np.unique(shares)
+
+
+def quarrel(answer) -> list[Measured]:
+    shares = chosen(answer)
     return [
-        Measured("via points", len(shares), "", MOST),
-        Measured("largest antagonistic torque", 1e3 * peak(np.unique(shares)), "mN m", 1e3 * LIMIT),
+        Measured("via points", len(shares), "in all", MOST),
+        Measured("largest antagonistic torque", 1e3 * peak(shares), "mN m", 1e3 * LIMIT),
     ]
 
 
-def example() -> np.ndarray:
-    """Nine via points whose legs all contradict equally: equal steps of the integral of sqrt(|eta^T q_a''|)."""
-    robot, _ = edge()
-    s = np.linspace(0, 1, 2001)
-    density = np.sqrt(demand(robot, START, END, s))
-    way = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
-    return np.interp(np.linspace(0, way[-1], MOST + 2)[1:-1], way, s)
+def via_points(part, demand) -> np.ndarray:
+    """Nine via points whose legs contradict equally: equal steps of the integral of the root of the demand."""
+    reach = np.cumsum(np.sqrt(demand))
+    return np.interp(np.linspace(reach[0], reach[-1], MOST + 2)[1:-1], reach, part)
+
+
+def as_dense_as_the_demand(shares: np.ndarray) -> bool:
+    part, needed = edge_demand()
+    plain = via_points(part, needed**2)
+    return len(shares) == MOST and bool(np.abs(shares - plain).max() < 0.01)
 
 
 def demand(robot, start, end, s) -> np.ndarray:
