@@ -362,7 +362,7 @@ PLACES = [
     ("wrong", "x and y exchanged", lambda robot, offset: grid(robot, offset)[::-1], "exchanged"),
     ("wrong", "opposite", lambda robot, offset: -grid(robot, offset), "opposite sign"),
     ("wrong", "corner", lambda robot, offset: grid(robot, offset) + CORNERS[1], "corner"),
-    ("wrong", "signs lost", on_grid(0.02, cost=lambda robot, p, offset: predicted(robot, p, np.abs(offset))), "signs"),
+    ("wrong", "signs lost", on_grid(0.02, cost=lambda robot, p, offset: predicted(robot, p, np.abs(offset))), ""),
     ("wrong", "offsets backwards", on_grid(cost=lambda robot, p, offset: predicted(robot, p, offset[::-1])), "order"),
     (
         "wrong",
