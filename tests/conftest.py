@@ -13,6 +13,7 @@ import pytest
 
 GROUPS = {
     "slow": [
+        "test_colours",
         "test_compiled_law",
         "test_docs",
         "test_engine",
@@ -27,6 +28,7 @@ GROUPS = {
         "test_nbgrader",
         "test_skeleton",
         "test_sweep",
+        "test_teaching",
         "test_types",
     ],
     "oracle": ["test_oracles", "test_symbolic"],
