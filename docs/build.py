@@ -30,7 +30,7 @@ other as soon as their encoders disagree by a few milliradians. These lessons sh
 away, and control the robot where minimal coordinates fail.
 
 <a href="index.html">Take the machine in your hands</a> first: the start page needs no installation.
-
+{hosted}
 ```{{toctree}}
 :caption: Lessons
 :maxdepth: 1
@@ -75,7 +75,7 @@ def write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def prepare(notebooks: Path) -> None:
+def prepare(notebooks: Path, repository: str) -> None:
     """All sources of the site, in docs/_work."""
     shutil.rmtree(WORK, ignore_errors=True)
     index = (notebooks / "equations.md").read_text(encoding="utf-8")
@@ -96,7 +96,22 @@ def prepare(notebooks: Path) -> None:
     teaching = pages(HERE / "teaching", "teaching") if (HERE / "teaching").is_dir() else []
     plan = "\n```{toctree}\n:caption: Teach\n:maxdepth: 1\n\n" + "\n".join(teaching) + "\n```\n" if teaching else ""
     listed = "\n".join(f"lessons/{name}" for name in names)
-    write(WORK / "contents.md", PLAN.format(lessons=listed, teaching=plan, develop="\n".join(develop)))
+    write(
+        WORK / "contents.md",
+        PLAN.format(hosted=hosted(repository), lessons=listed, teaching=plan, develop="\n".join(develop)),
+    )
+
+
+def hosted(repository: str) -> str:
+    """Links to sessions on other people's machines, where the repository is known."""
+    if not repository:
+        return ""
+    places = {
+        "Binder": f"https://mybinder.org/v2/gh/{repository}/HEAD?urlpath=lab/tree/notebooks/00_start_here.ipynb",
+        "Colab": f"https://colab.research.google.com/github/{repository}/blob/main/docs/hosted/colab.ipynb",
+        "Codespaces": f"https://codespaces.new/{repository}",
+    }
+    return "\nRun the lessons on " + ", ".join(f"[{name}]({link})" for name, link in places.items()) + ".\n"
 
 
 def pages(folder: Path, name: str) -> list[str]:
@@ -118,9 +133,10 @@ def mathjax() -> Path:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--lessons", type=Path, default=ROOT / "notebooks", help="folder of the notebooks")
+    parser.add_argument("--repository", default="", help="owner/name on GitHub, for links to hosted sessions")
     parser.add_argument("--strict", action="store_true", help="fail on a warning")
     options = parser.parse_args()
-    prepare(options.lessons.resolve())
+    prepare(options.lessons.resolve(), options.repository)
     shutil.rmtree(SITE, ignore_errors=True)
     with tempfile.TemporaryDirectory() as doctrees:
         strict = ["-W", "--keep-going"] if options.strict else []

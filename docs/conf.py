@@ -26,7 +26,7 @@ myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
 # The stored Python version of a lesson is not that of the reader.
-suppress_warnings = ["mystnb.unknown_mime_type"]
+suppress_warnings = ["mystnb.unknown_mime_type", "myst.header"]
 mathjax_path = "tex-svg.js"
 mathjax3_config = {"tex": {"tags": "none"}, "svg": {"fontCache": "local"}}
 html_theme = "furo"
