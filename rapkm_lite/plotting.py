@@ -3,6 +3,7 @@
 Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.
 """
 
+from .figures.arguments import guarded
 from .figures.film import (
     LARGEST,
     film,
@@ -218,3 +219,5 @@ __all__ = [
     "table",
     "use_style",
 ]
+
+globals().update(guarded(globals()))

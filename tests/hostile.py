@@ -7,7 +7,7 @@ half      refused by a sentence that lacks one of these
 unclear   refused by an exception of the machinery below (AttributeError, LinAlgError, IndexError ...)
 accepted  answered, with finite numbers
 nan       answered with NaN or infinity
-hang      no answer within ten seconds
+hang      no answer within half a minute
 """
 
 from __future__ import annotations
@@ -105,6 +105,8 @@ OTHER: dict[tuple[str, str], Any] = {
     **{("Desired", n): getattr(PATH[3], n) for n in ("x", "xd", "xdd", "q", "qd", "qdd")},
     **{("Run", n): getattr(RUN, n) for n in RUN._fields()},
     **{("Log", n): RUN.q_a for n in ("q_a", "q_a_desired", "c")},
+    ("plot_torque_norms", "log"): False, ("plot_spacing", "marked"): [0.015, 0.1], ("on_grid", "values"): np.ones(144),
+    ("plot_parameterization_singularities", "x"): [0.0, 0.0],
     ("Experiment", "sensors"): SENSORS, ("Sample", "t"): 0.0, ("SimulationError", "run"): None,
     ("Controller", "t"): 0.0, ("CommandFilter", "law"): rk.PD(7.0, 0.2), ("load", "source"): "testbed",
     ("plot_map", "x"): X, ("plot_map", "y"): X, ("plot_mode_maps", "x"): X, ("plot_mode_maps", "y"): X,
@@ -114,7 +116,7 @@ OTHER: dict[tuple[str, str], Any] = {
     ("plot_placement", "values"): np.ones((12, 12)), ("lines_per_drive", "values"): RUN.c,
     ("plot_landscape", "values"): X,
     ("plot_effective_gain", "K"): 400.0, ("switching_map", "rule"): "cross",
-    ("plot_pair_curves", "pairs"): [(0, 1)], ("plot_parameterization_singularities", "x"): [[0.0, 0.0]],
+    ("plot_pair_curves", "pairs"): [(0, 1)],
 }  # fmt: skip
 
 
@@ -209,7 +211,7 @@ def _alarm(*_):
     raise Hang
 
 
-def judge(case: Case, seconds: int = 10) -> tuple[str, str]:
+def judge(case: Case, seconds: int = 30) -> tuple[str, str]:
     """How a call ended, and its words."""
     before = signal.signal(signal.SIGALRM, _alarm)
     signal.alarm(seconds)

@@ -29,7 +29,8 @@ def defined(path: Path) -> list[str]:
 
 def figure_list() -> str:
     """The text of ``rapkm_lite/plotting.py``: every figure of the shared room and of every lesson, by name."""
-    rooms = sorted(PACKAGE.glob("figures/[!_]*.py")) + sorted(PACKAGE.glob("lessons/lesson*/figures.py"))
+    shared = set(PACKAGE.glob("figures/[!_]*.py")) - {PACKAGE / "figures/arguments.py"}
+    rooms = sorted(shared) + sorted(PACKAGE.glob("lessons/lesson*/figures.py"))
     owner, text = (
         {},
         [
@@ -49,7 +50,10 @@ def figure_list() -> str:
             owner[name] = module
         if names:
             text += [f"from {module} import (", *(f"    {name}," for name in names), ")"]
-    return "\n".join([*text, "", "__all__ = [", *(f'    "{name}",' for name in sorted(owner)), "]", ""])
+    text[5:5] = ["from .figures.arguments import guarded"]
+    text += ["", "__all__ = ["]
+    text += [*(f'    "{name}",' for name in sorted(owner)), "]", "", "globals().update(guarded(globals()))", ""]
+    return "\n".join(text)
 
 
 def cells(text: str) -> list[nbformat.NotebookNode]:

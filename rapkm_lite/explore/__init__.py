@@ -5,6 +5,7 @@
 '0 mN m'
 """
 
+from ..figures.arguments import guarded
 from ..figures.machine import plane_limits
 from ..figures.marks import (
     Palette,
@@ -24,3 +25,5 @@ from .rest import steady_state, three_opinions
 from .runs import decentralized_run
 from .synchronization import via_points
 from .torque import computed_torque
+
+globals().update(guarded(globals()))

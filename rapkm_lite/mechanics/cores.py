@@ -116,7 +116,7 @@ def joint_complement(J: np.ndarray, independent) -> np.ndarray:
     dependent, delta = _others(J.shape[-1], independent), len(independent)
     J1 = J[..., dependent]
     measure = np.linalg.svd(J1, compute_uv=False)[..., -1] / np.linalg.svd(J, compute_uv=False)[..., 0]
-    if np.any(measure < 1e-12):
+    if not np.all(measure >= 1e-12):  # also where J is zero
         raise ValueError(
             f"independent = {tuple(independent)} is singular here: its measure sigma_min(J1)/sigma_max(J) is "
             f"{np.min(measure):.3g}, needed: >= 1e-12; choose other joints, or None for the end-effector position"

@@ -181,6 +181,7 @@ def simulate(
 
 def complete(setup: Setup, law) -> Run:
     """The whole run; raises SimulationError with a part of it."""
+    as_law(law)
     code, cause = encode(law, setup.model), None
     if code is not None:
         outcome = single(setup, code)

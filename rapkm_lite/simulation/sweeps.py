@@ -55,6 +55,11 @@ class Sweep(Value):
     failed: np.ndarray
     failure_time: np.ndarray
 
+    def __post_init__(self):
+        for law in self.law if isinstance(self.law, list | tuple) else [self.law]:
+            as_law(law)
+        super().__post_init__()
+
     @property
     def energy(self) -> np.ndarray:
         """The same as `energies`."""
