@@ -1,0 +1,114 @@
+"""Put the lessons into the browser: python docs/lite.py --pyodide FOLDER, after docs/build.py.
+
+FOLDER is an unpacked distribution of Pyodide with NumPy, SciPy and Matplotlib.  The result, docs/_site/lite, asks for
+nothing from elsewhere: our wheel and what it needs stand in the distribution's lock file, so that `import rapkm_lite`
+installs them, and the notebooks stay as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from email.parser import HeaderParser
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path.insert(0, str(HERE.parent))
+
+from rapkm_lite.lessons.copies import shipped, student_text  # noqa: E402
+
+# Pure Python, and not always in a distribution.
+NEEDED = (
+    "ipywidgets", "comm", "widgetsnbextension", "jupyterlab-widgets", "anywidget", "psygnal", "typing-extensions",
+    "sympy", "mpmath",
+)  # fmt: skip
+SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
+
+
+def run(*command: object) -> None:
+    subprocess.run([str(part) for part in command], check=True)
+
+
+def entry(wheel: Path) -> dict:
+    """The entry of a pure Python wheel in the lock file of Pyodide."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        metadata = next(name for name in names if name.endswith(".dist-info/METADATA"))
+        head = HeaderParser().parsestr(archive.read(metadata).decode("utf-8"))
+    required = [r for r in head.get_all("Requires-Dist", []) if "extra ==" not in r and "python_version" not in r]
+    tops = {
+        name.split("/")[0] for name in names if name.count("/") and ".dist-info" not in name and ".data" not in name
+    }
+    return {
+        "name": canonical(head["Name"]),
+        "version": head["Version"],
+        "file_name": wheel.name,
+        "install_dir": "site",
+        "sha256": hashlib.sha256(wheel.read_bytes()).hexdigest(),
+        "package_type": "package",
+        "imports": sorted(tops),
+        "depends": sorted({canonical(re.match(r"[\w.-]+", r)[0]) for r in required}),
+        "unvendored_tests": False,
+    }
+
+
+def canonical(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def distribution(source: Path, target: Path) -> None:
+    """A copy of a Pyodide distribution whose lock file knows our wheel and what it needs."""
+    shutil.copytree(source, target)
+    lock = json.loads((target / "pyodide-lock.json").read_text(encoding="utf-8"))
+    packages = lock["packages"]
+    with tempfile.TemporaryDirectory() as folder:
+        run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT)
+        missing = [name for name in NEEDED if name not in packages]
+        if missing:
+            run(sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", folder, *missing)
+        added = {}
+        for wheel in sorted(Path(folder).glob("*.whl")):
+            shutil.copy(wheel, target)
+            row = entry(wheel)
+            added[row["name"]] = row
+    packages.update(added)
+    for row in added.values():
+        # The kernel brings IPython and the rest itself.
+        row["depends"] = [name for name in row["depends"] if name in packages]
+    # Explorers are made by a door of the package, so the widgets come with it; symbolic cells ask for SymPy themselves.
+    text = json.dumps(lock, indent=None, separators=(",", ":"))
+    (target / "pyodide-lock.json").write_text(text, encoding="utf-8")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--pyodide", type=Path, required=True, help="folder with pyodide.js and pyodide-lock.json")
+    parser.add_argument("--output", type=Path, default=HERE / "_site/lite")
+    options = parser.parse_args()
+    if not (options.pyodide / "pyodide-lock.json").exists():
+        parser.error(f"--pyodide {options.pyodide}: no pyodide-lock.json there; allowed: an unpacked distribution")
+    shutil.rmtree(options.output, ignore_errors=True)
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        (work / "files").mkdir()
+        for path in shipped(ROOT / "notebooks"):
+            (work / "files" / path.name).write_text(student_text(path), encoding="utf-8")
+        (work / "overrides.json").write_text(json.dumps(SETTINGS), encoding="utf-8")
+        distribution(options.pyodide, work / "pyodide")
+        lite = [sys.executable, "-m", "jupyterlite_core.app", "build", "--lite-dir", work, "--contents", work / "files"]
+        run(*lite, "--pyodide", work / "pyodide", "--output-dir", options.output.resolve())
+    size = sum(path.stat().st_size for path in options.output.rglob("*") if path.is_file())
+    print(f"{options.output}: {size / 1e6:.0f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""All lessons of a built JupyterLite site, top to bottom in headless Chromium: python -m tests.lite docs/_site/lite
+
+Fails on a traceback, on a request to elsewhere, and on a slider that changes no picture.  --only 03 takes one lesson.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import http.server
+import shutil
+import sys
+import threading
+import time
+from pathlib import Path
+
+TYPES = {".wasm": "application/wasm", ".mjs": "text/javascript", ".whl": "application/octet-stream"}
+WAITING = "[...document.querySelectorAll('.jp-CodeCell .jp-InputPrompt')].filter(e => e.innerText.includes('*')).length"
+ERRORS = """[...document.querySelectorAll('.jp-OutputArea-output')].map(e => e.innerText)
+    .filter(t => /Traceback \\(most|Error displaying widget|Failed to load model/.test(t)).map(t => t.slice(-400))"""
+# What each explorer has painted so far, and the pictures of widgets.
+SEEN = """[...document.querySelectorAll('.rapkm')].map(e => e.dataset.drawn).join()
+    + [...document.querySelectorAll('.jupyter-widgets img')].map(e => e.src.length).join()"""
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    extensions_map = http.server.SimpleHTTPRequestHandler.extensions_map | TYPES
+
+    def log_message(self, *args):
+        pass
+
+
+def drive(context, address: str, notebook: str, limit: float) -> list[str]:
+    """What is wrong with a lesson; empty when all is well."""
+    wrong: list[str] = []
+    page = context.new_page()
+    page.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else wrong.append(r.url))
+    page.goto(f"{address}/lab/index.html?path={notebook}")
+    page.wait_for_selector(".jp-Notebook .jp-Cell", timeout=120_000)
+    page.wait_for_timeout(1500)
+    if page.locator(".jp-Dialog .jp-mod-accept").count():
+        page.click(".jp-Dialog .jp-mod-accept")
+    page.click(".jp-Notebook .jp-Cell >> nth=0")
+    page.click('text="Run" >> nth=0')
+    page.click('.lm-Menu-item:has-text("Run All Cells") >> nth=0')
+    started = time.monotonic()
+    page.wait_for_function(f"{WAITING} > 0", timeout=60_000)
+    while page.evaluate(WAITING):
+        if time.monotonic() - started > limit:
+            return [*wrong, f"{page.evaluate(WAITING)} cells still wait after {limit:.0f} s"]
+        page.wait_for_timeout(500)
+    took = time.monotonic() - started
+    wrong += page.evaluate(ERRORS)
+    handles = page.locator(".jupyter-widgets .noUi-handle")
+    for k in range(min(handles.count(), 6)):
+        handle, before = handles.nth(k), page.evaluate(SEEN)
+        handle.scroll_into_view_if_needed()
+        handle.press("PageUp")
+        handle.press("ArrowLeft")
+        try:
+            page.wait_for_function(f"(before) => {SEEN} !== before", arg=before, timeout=30_000)
+        except Exception:
+            wrong.append(f"slider {k} changes no picture")
+    print(f"{notebook}: run all {took:.0f} s, {handles.count()} sliders, {'; '.join(wrong) or 'well'}", flush=True)
+    page.close()
+    return wrong
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("site", type=Path)
+    parser.add_argument("--only", default="", help="beginning of a lesson's name")
+    parser.add_argument("--limit", type=float, default=600.0, help="seconds for a lesson")
+    options = parser.parse_args()
+    from playwright.sync_api import sync_playwright
+
+    handler = functools.partial(Quiet, directory=str(options.site))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_address[1]}"
+    names = sorted(p.name for p in (options.site / "files").glob("*.ipynb") if p.name.startswith(options.only))
+    with sync_playwright() as p:
+        path = shutil.which("chromium") or shutil.which("chromium-browser")
+        browser = p.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-dev-shm-usage"])
+        bad = [
+            n
+            for n in names
+            if drive(browser.new_context(viewport={"width": 1400, "height": 1000}), address, n, options.limit)
+        ]
+        browser.close()
+    print(f"{len(names) - len(bad)} of {len(names)} lessons run well")
+    return 1 if bad or not names else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
