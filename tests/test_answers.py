@@ -1,7 +1,6 @@
 """What people answer: right, close and wrong, with the name of the mistake; and what nobody should answer."""
 
 import importlib
-import os
 import warnings
 from pathlib import Path
 
@@ -129,12 +128,10 @@ def test_odd_answers_crash_nothing(name, capsys, monkeypatch):
     for what, answer in ODD.items():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            verdict, sentence = examine(name, answer)
-            assert verdict == "wrong", f"{what}: {sentence}"
-            assert len(sentence) < 600
             check(name, answer)
-        assert capsys.readouterr().out.startswith(f"NOT YET RIGHT {name}: ")
-    assert os.getcwd()
+        said = capsys.readouterr().out
+        assert said.startswith(f"NOT YET RIGHT {name}: "), f"{what}: {said}"
+        assert len(said) < 700
 
 
 @pytest.mark.parametrize("name", sorted(n for n, e in exercises().items() if not e.judge))

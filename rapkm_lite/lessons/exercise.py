@@ -80,7 +80,7 @@ class Exercise:
     """
 
     reference: Callable | object
-    hints: tuple[str, ...] | str = ()
+    hints: tuple[str, ...] = ()
     unit: str = ""
     cases: Callable = lambda rng: [()]
     invariant: Callable | None = None
@@ -94,11 +94,6 @@ class Exercise:
     secret: bool = False
     points: float = 5.0
     called: str = ""
-    hint: str = ""
-
-    def __post_init__(self):
-        if isinstance(self.hints, str) or self.hint:
-            object.__setattr__(self, "hints", (self.hint or self.hints,) * 3)
 
     def is_value(self, cases: list[tuple]) -> bool:
         """True when the answer is a value, not a function."""

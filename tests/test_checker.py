@@ -1,0 +1,167 @@
+"""What `check`, `hint` and `draw_own` promise, on exercises made up for it and on those of the lessons."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from rapkm_lite.checks import Case, Exercise, Measured, check, draw_own, examine, exercises, hint
+from rapkm_lite.lessons import checker
+from rapkm_lite.lessons.judging import judged
+
+
+def scaled(K_P, v, limit):
+    return K_P * v / limit
+
+
+def cases(rng):
+    return [(rng.uniform(2, 9, 3), rng.normal(size=3), float(rng.uniform(1, 5))) for _ in range(5)]
+
+
+def plane(v):
+    return np.array([[2.0, 1.0], [0.5, 3.0]]) * v
+
+
+VECTOR = Exercise(scaled, ("a", "b", "c"), "N m", cases, close=0.02, improve="more steps")
+MATRIX = Exercise(plane, ("a", "b", "c"), "m", lambda rng: [(v,) for v in rng.uniform(1, 2, 4)])
+FRAME = Exercise(lambda v: 2.0 * v[::-1], ("a", "b", "c"), "m", lambda rng: [(v,) for v in rng.normal(size=(5, 2))])
+NAMED = [
+    (VECTOR, lambda K, v, m: -K * v / m, "opposite sign"),
+    (VECTOR, lambda K, v, m: np.abs(K * v / m), "lost its signs"),
+    (VECTOR, lambda K, v, m: 1e3 * K * v / m, "1000"),
+    (VECTOR, lambda K, v, m: np.degrees(K * v / m), "180/pi"),
+    (VECTOR, lambda K, v, m: np.radians(-K * v / m), "the sign is opposite"),
+    (VECTOR, lambda K, v, m: 2 * K * v / m, "twice"),
+    (VECTOR, lambda K, v, m: 1.1 * K * v / m, "1.1 times"),
+    (VECTOR, lambda K, v, m: K * v, "the factor limit is one too many"),
+    (VECTOR, lambda K, v, m: K * v / m**2, "the factor limit is missing"),
+    (VECTOR, lambda K, v, m: v / m, "K_P missing"),
+    (VECTOR, lambda K, v, m: (K * v / m)[::-1], "another order"),
+    (VECTOR, lambda K, v, m: K, "itself, unchanged"),
+    (VECTOR, lambda K, v, m: v - K * v / m, "complement"),
+    (VECTOR, lambda K, v, m: 2 * v - K * v / m, "2 times v"),
+    (VECTOR, lambda K, v, m: K * v / m + 0.25, "off by a constant, 0.25"),
+    (VECTOR, lambda K, v, m: (K * v / m) * [1, 1, 3], "entry 2"),
+    (VECTOR, lambda K, v, m: (K * v / m) * [1, -1, 1], "sign of entry 1"),
+    (VECTOR, lambda K, v, m: (K * v / m) ** 2, "square"),
+    (VECTOR, lambda K, v, m: 0 * v, "zero"),
+    (VECTOR, lambda K, v, m: np.ones(3), "same for every case"),
+    (VECTOR, lambda K, v, m: K * v / m / np.linalg.norm(v), "norm of v is missing"),
+    (MATRIX, lambda v: plane(v).T, "transposed"),
+    (MATRIX, lambda v: plane(v)[::-1], "rows stand in another order"),
+    (MATRIX, lambda v: plane(v)[:, ::-1], "columns stand in another order"),
+    (MATRIX, lambda v: np.linalg.inv(plane(v)), "inverse"),
+    (FRAME, lambda v: 2.0 * np.array([v[0], -v[1]]), "turned by"),
+    (FRAME, lambda v: np.array([-2.0, 2.0]) * v[::-1], "sign"),
+]
+
+
+@pytest.mark.parametrize(("exercise", "answer", "words"), NAMED, ids=[row[2] for row in NAMED])
+def test_generic_mistakes_are_named(exercise, answer, words):
+    result = judged(exercise, answer)
+    assert result.word == "wrong" and words in result.sentence, result.sentence
+    assert result.mistake
+
+
+def test_close_answers_say_how_far_and_what_would_improve_them():
+    result = judged(VECTOR, lambda K, v, m: 1.01 * K * v / m)
+    assert result.word == "close" and "more steps" in result.sentence and "1 %" in result.sentence
+    assert judged(VECTOR, lambda K, v, m: 1.03 * K * v / m).word == "wrong"
+
+
+def test_a_mistake_with_a_name_is_not_close():
+    known = Exercise(
+        scaled, ("a", "b", "c"), "N m", cases, close=0.02, mistakes={"too long": lambda *c: 1.001 * scaled(*c)}
+    )
+    assert judged(known, lambda *c: 1.001 * scaled(*c)).sentence.startswith("too long")
+    assert judged(known, lambda *c: -1.001 * scaled(*c)).sentence.startswith("too long, and the sign is opposite")
+    assert judged(known, lambda *c: 1.002 * scaled(*c)).word == "close"
+
+
+def test_what_fails_beyond_the_idea_is_close_and_the_label_is_said():
+    def more(rng):
+        return [*cases(rng), Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)]
+
+    result = judged(Exercise(scaled, ("a", "b", "c"), "N m", more), lambda K, v, m: (K * v)[:3] / m)
+    assert result.word == "close" and "four entries" in result.sentence
+    assert judged(Exercise(scaled, ("a", "b", "c"), "N m", more), scaled).word == "ok"
+
+
+def test_a_design_is_judged_by_its_numbers_beside_their_limits():
+    def judge(gain):
+        return [Measured("error", 2.0 / gain, "mm", 1.0), Measured("margin", 10.0 - gain, "dB", 5.0, at_most=False)]
+
+    design = Exercise(3.0, ("a", "b", "c"), judge=judge, close=0.05, mistakes={"a gain below zero": lambda g: g < 0})
+    assert judged(design, 3.0).word == "ok"
+    assert "error 2 mm (at most 1 mm: missed)" in judged(design, 1.0).sentence
+    assert judged(design, 1.95).word == "close"
+    assert judged(design, -1.0).sentence == "a gain below zero"
+    assert judged(design, [1.0, 2.0]).word == "wrong" and judged(design, ...).word == "todo"
+
+
+def test_hints_come_in_three_steps(capsys):
+    name = "04.filtered_torques"
+    checker._steps.clear()
+    for step in (1, 2, 3, 3):
+        hint(name)
+        assert capsys.readouterr().out == f"Hint {step} of 3 for {name}: {exercises()[name].hints[step - 1]}\n"
+    hint(name, 1)
+    assert "Hint 1" in capsys.readouterr().out
+    for step in (0, 4, True, "1"):
+        with pytest.raises(ValueError, match="allowed: a whole number from 1 to 3"):
+            hint(name, step)
+    with pytest.raises(ValueError, match=r"allowed: 01\."):
+        hint("04.nothing")
+
+
+@pytest.mark.parametrize("name", sorted(exercises()))
+def test_every_exercise_has_three_different_hints_and_known_mistakes(name):
+    exercise = exercises()[name]
+    assert len(set(exercise.hints)) == 3 and all(exercise.hints)
+    assert exercise.mistakes or exercise.judge
+
+
+def test_a_wrong_answer_that_is_checked_again_stays_wrong(capsys):
+    name = "04.filtered_torques"
+    going_on = check(name, lambda A, c: -c)
+    assert capsys.readouterr().out.startswith("NOT YET RIGHT")
+    assert examine(name, going_on)[0] == "wrong", "the package's answer is not the student's"
+    assert examine(name, check(name, ...))[0] == "todo"
+
+
+def test_secrets_are_not_handed_out(capsys):
+    secrets = [name for name, exercise in exercises().items() if exercise.secret]
+    assert secrets
+    for name in secrets:
+        assert np.all(np.isnan(check(name, ...)))
+        own = np.full(np.shape(check(name, ...)), 0.123)
+        np.testing.assert_array_equal(check(name, own), own)
+
+
+def test_strict_mode_raises_unless_solved(monkeypatch, capsys):
+    monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
+    with pytest.raises(AssertionError, match="opposite sign"):
+        check("03.counts", lambda K_P, friction: -np.pi * K_P / friction)
+    assert check("03.counts", lambda K_P, friction: np.pi * K_P / friction)(7.05, 4.2e-3) > 5000
+
+
+def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):
+    name = "04.filtered_torques"
+    A, c = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.array([1.0, 2.0, 0.0])
+    for answer, lines in (
+        (lambda A, c: c, 3),
+        (exercises()[name].reference, 0),
+        (..., 0),
+        (lambda A, c: c[:, None], 3),
+    ):
+        check(name, answer)
+        capsys.readouterr()
+        _, ax = plt.subplots()
+        draw_own(name, lambda f: ([0, 1], [np.ravel(f(A, c)), np.ravel(f(A, 2 * c))]), ax, per_arm=True)
+        assert len(ax.lines) == lines
+        said = capsys.readouterr().out
+        assert ("Dashed: your own" in said and "lesson goes on" in said) == bool(lines)
+    check(name, lambda A, c: 1 / 0)
+    capsys.readouterr()
+    draw_own(name, lambda f: ([0], f(A, c)), plt.subplots()[1])
+    assert "cannot be drawn here (ZeroDivisionError)" in capsys.readouterr().out
+    plt.close("all")
