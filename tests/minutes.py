@@ -88,7 +88,7 @@ def parts(notebook, number: str) -> list[Part]:
                     found.append(part)
             prose = _FENCE.sub(" ", _DETAILS.sub(" ", block))
             part.formulas += len(_FORMULA.findall(prose))
-            part.words += len(_FORMULA.sub(" ", prose).split())
+            part.words += sum(any(map(str.isalnum, token)) for token in _FORMULA.sub(" ", prose).split())
     seen: set = set()
     for one in found:
         one.exercises = len(one.names - seen)

@@ -85,9 +85,8 @@ def test_compared_cells_have_outputs(path):
 
 @pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_prose_and_code_are_balanced(path):
-    cells = nbformat.read(path, as_version=4).cells
-    words = sum(len(c.source.split()) for c in cells if c.cell_type == "markdown")
-    lines = sum(1 for c in cells if c.cell_type == "code" for line in c.source.splitlines() if line.strip())
+    found = shape.minutes.read(path)
+    words, lines = (sum(getattr(part, what) for part in found) for what in ("words", "lines"))
     assert 7 <= words / lines <= 20, f"{words} words for {lines} lines of code: {words / lines:.1f} per line"
 
 

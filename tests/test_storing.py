@@ -245,7 +245,7 @@ def test_minutes_count_core_and_folded_parts_apart():
     ]
     opening, a, b, c = shape.minutes.parts(lesson(*cells).notebook, "42")
     assert (a.formulas, a.figures, a.exercises, a.lines) == (1, 1, 1, 18)
-    assert a.minutes == pytest.approx((130 + 4) / 130 + 18 / 8 + 0.7 + 1.5 + 10)
+    assert a.minutes == pytest.approx((130 + 3) / 130 + 18 / 8 + 0.7 + 1.5 + 10)
     assert b.folded and b.minutes == pytest.approx(262 / 130, abs=0.05) and c.exercises == 0
     assert shape.minutes.core([opening, a, b, c]) == pytest.approx(opening.minutes + a.minutes + c.minutes)
 
