@@ -1,0 +1,121 @@
+// Ticks, words, layout, handles and decoding of the stage; run by tests/test_stage_js.py with a message that Python wrote.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import test from "node:test";
+import { pathToFileURL } from "node:url";
+
+const [stage, golden] = [process.env.RAPKM_STAGE, process.env.RAPKM_MESSAGE];
+const { decode, layout, minus, pieces, steps, ticks, wish, wrap } = await import(pathToFileURL(stage));
+const width = (words, size) => 0.6 * size * String(words).length;
+
+test("ticks are round, inside the limits, in equal steps, and few", () => {
+  const ranges = [[0, 1], [-1, 1], [0, 5], [-20, 20], [0.1, 0.13], [-3e-4, 2e-4], [99, 101], [0, 1e6], [-0.4, 0.41], [1e-9, 3e-9]];
+  for (const [low, high] of ranges)
+    for (const most of [2, 3, 5, 8]) {
+      const list = ticks(low, high, most);
+      const slack = 1e-6 * (high - low);
+      assert.ok(list.length >= 1 && list.length <= most + 1, `${low} ${high} ${most}: ${list.length}`);
+      assert.ok(list.every(({ at }) => at >= low - slack && at <= high + slack));
+      const gaps = list.slice(1).map(({ at }, k) => at - list[k].at);
+      assert.ok(gaps.every((gap) => Math.abs(gap - gaps[0]) < 1e-9 * (high - low) + 1e-15));
+      if (gaps.length) {
+        const lead = Number((gaps[0] / 10 ** Math.floor(Math.log10(gaps[0] * 1.0000001))).toFixed(6));
+        assert.ok([1, 2, 2.5, 5].includes(lead), `${low} ${high} ${most}: ${lead}`);
+      }
+      // What is written is what is meant.
+      for (const { at, words } of list) assert.ok(Math.abs(Number(words.replace("−", "-")) - at) < slack + 1e-12, words);
+      assert.equal(new Set(list.map(({ words }) => words)).size, list.length);
+    }
+});
+
+test("a logarithmic axis has decades, and limits without meaning have no ticks", () => {
+  assert.deepEqual(ticks(1e-3, 1e2, 6, true).map(({ words }) => words), ["10^−3", "10^−2", "10^−1", "10^0", "10^1", "10^2"]);
+  assert.deepEqual(ticks(1e-3, 1e2, 3, true).map(({ at }) => Math.round(Math.log10(at))), [-2, 0, 2]);
+  for (const [low, high, log] of [[0, 1, true], [-1, 1, true], [1, 1, false], [2, 1, false], [NaN, 1, false], [0, Infinity, false]])
+    assert.deepEqual(ticks(low, high, 5, log), []);
+});
+
+test("subscripts, powers and minus signs are found, hyphens are left", () => {
+  assert.deepEqual(pieces("K_P 1 in N"), [{ text: "K", shift: 0 }, { text: "P", shift: -1 }, { text: " 1 in N", shift: 0 }]);
+  assert.deepEqual(pieces("10^−3"), [{ text: "10", shift: 0 }, { text: "−3", shift: 1 }]);
+  assert.deepEqual(pieces("σ_min").map((p) => p.text), ["σ", "min"]);
+  assert.equal(minus("end-effector at (-60, -69) mm"), "end-effector at (−60, −69) mm");
+  assert.deepEqual(wrap("electric energy in J", 80, (w) => 8 * w.length), ["electric", "energy in", "J"]);
+});
+
+const covers = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
+/** The rectangle of words that layout has placed. */
+function rectangle({ words, x, y, size, ha, va, upright }) {
+  const wide = width(words, size);
+  const left = -wide * { left: 0, center: 0.5, right: 1 }[ha];
+  const foot = size * { baseline: 0, bottom: -0.25, center: 0.36, top: 0.85 }[va];
+  const [a, b, c, d] = [left, foot - 0.75 * size, left + wide, foot + 0.1 * size];
+  return upright ? [x + b, y - c, x + d, y - a] : [x + a, y + b, x + c, y + d];
+}
+
+test("no words of a panel lie on others or are cut, wide or narrow", () => {
+  const legend = ["drive 1", "2", "3", "4"].map((words) => [words, { width: 2, color: "#004488" }]);
+  const scale = [{ levels: [0, 0.5, 1.5, 2.5, 3.5] }, "σ_min in rad/m"];
+  const specs = [
+    { spec: { title: "Torque", xlabel: "time in s", ylabel: "torque in mN m" }, legend },
+    { spec: { title: "Machine and map", xlabel: "x in m", ylabel: "y in m", aspect: "equal" }, scale },
+    { spec: { xlabel: "principal direction, cheapest first", ylabel: "electric energy in J" }, legend: legend.slice(0, 2) },
+  ];
+  for (const panel of specs)
+    for (const size of [[520, 320], [300, 230], [274, 250], [220, 200]])
+      for (const frame of [[0, 5, -100, 100], [-0.4, 0.4, -0.3, 0.5], [0.4, 3.6, 0, 2.5]]) {
+        const plan = layout(panel, frame, size, 14, width);
+        const all = plan.texts.map((t) => [t.words, rectangle(t)]);
+        for (const [words, [a, b, c, d]] of all)
+          assert.ok(a >= -1 && b >= -1 && c <= size[0] + 1 && d <= size[1] + 1, `${words} is cut at ${size}: ${[a, b, c, d]}`);
+        all.forEach(([words, one], k) =>
+          all.slice(k + 1).forEach(([others, other]) => assert.ok(!covers(one, other), `${words} on ${others} at ${size}`)),
+        );
+        assert.ok(plan.box.width > 40 && plan.box.height > 40);
+      }
+});
+
+test("a handle wishes the values of its place, and stays on its curve", () => {
+  assert.deepEqual(wish({ set: { x: [1e3, 0, 0], y: [0, 1e3, 5] } }, 0.02, 0.03), { x: 20, y: 35 });
+  assert.deepEqual(wish({ set: { time: [1e3, 0, 0] }, at: [1, null] }, 0.5, NaN), { time: 500 });
+  const track = Float32Array.from([0, 0, 1, 0, 1, 1]);
+  const set = { place: Float32Array.from([0, 50, 100]) };
+  assert.deepEqual(wish({ track, set }, 0.5, -3), { place: 25 });
+  assert.deepEqual(wish({ track, set }, 9, 0.5), { place: 75 });
+  assert.deepEqual(wish({ track, set }, 9, 9), { place: 100 });
+});
+
+test("arrow keys are steps of the controls that a direction moves", () => {
+  const plane = { set: { x: [1e3, 0, 0], y: [0, 1e3, 0] }, at: [0, 0] };
+  assert.deepEqual(steps(plane, "ArrowLeft", false), { x: -1 });
+  assert.deepEqual(steps(plane, "ArrowUp", true), { y: 10 });
+  assert.equal(steps(plane, "Enter", false), null);
+  assert.deepEqual(steps({ set: { offset: [-4, 2, 0] }, at: [0, 0] }, "ArrowRight", false), { offset: -1 });
+  assert.deepEqual(steps({ set: { time: [1e3, 0, 0] }, at: [1, null] }, "ArrowDown", false), { time: -1 });
+});
+
+test("a message from Python is read back number by number", () => {
+  const { header, buffers, marks } = JSON.parse(readFileSync(golden, "utf8"));
+  const views = buffers.map((text) => {
+    // As ipywidgets hands them over: views into a larger buffer.
+    const bytes = Buffer.from(text, "base64");
+    const whole = new Uint8Array(bytes.length + 8);
+    whole.set(bytes, 8);
+    return new DataView(whole.buffer, 8, bytes.length);
+  });
+  const known = { styles: {}, images: {} };
+  const read = decode(header, views, known);
+  assert.equal(read.marks.length, marks.length);
+  read.marks.forEach((mark, k) => {
+    assert.equal(mark.kind, marks[k].kind);
+    assert.deepEqual(Array.from(mark.points, (v) => (Number.isFinite(v) ? v : null)), marks[k].points);
+  });
+  const image = read.marks.find((m) => m.kind === "image");
+  const { rows, columns, values } = image.images[image.words[0]];
+  assert.equal(values.length, rows * columns);
+  assert.ok(read.handles.length > 0 && read.handles.every((h) => Object.keys(h.set).length > 0));
+  // What was sent once is not needed again.
+  const later = decode({ ...header, styles: {}, images: {} }, views.slice(0, 1), known);
+  assert.equal(later.marks.find((m) => m.kind === "image").images[image.words[0]].values, values);
+});
