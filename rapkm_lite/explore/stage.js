@@ -102,7 +102,7 @@ export function layout({ spec, title, bold = true, legend = [], scale }, frame, 
   const xlabel = lines(spec.xlabel, wide), bottom = (spec.xticks?.length === 0 ? 0.2 : 1.3 + xlabel.length) * line;
   const tall = Math.max(high - top - bottom, 10), ylabel = lines(spec.ylabel, tall);
   const most = Math.min(Math.max(Math.floor(tall / (2.1 * font)), 2), 7);
-  const y = ticks(frame[2], frame[3], most, spec.yscale === "log");
+  const y = spec.yticks ? fixed(spec.yticks) : ticks(frame[2], frame[3], most, spec.yscale === "log");
   const left = Math.max(least.left ?? 0, ylabel.length * line + widest(y) + 0.5 * font);
   const levels = fixed(scale?.[0].levels), label = lines(scale?.[1], tall);
   const room = scale ? 2.3 * font + widest(levels) + label.length * line : 1.1 * font;
