@@ -28,6 +28,7 @@ from ...mechanics.actuation import (
     singular_values,
 )
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
+from ..own import draw_own
 
 
 def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
@@ -116,7 +117,7 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     for i in range(robot.n_arms) if drives else ():
         ax.plot(*np.outer([-torque, torque], A[i]).T, **arm_line(i), zorder=3, label=f"drive {i + 1}")
     if guaranteed is not None:
-        ax.add_patch(Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, ls="--", zorder=4))
+        ax.add_patch(Circle((0, 0), guaranteed, fill=False, color=ALARM, lw=1.6, zorder=4))
     room = 1.12 * np.abs(corners).max()
     ax.set(aspect="equal", xlabel="force in x in N", ylabel="force in y in N", xlim=(-room, room), ylim=(-room, room))
     return ax
@@ -159,6 +160,9 @@ def plot_guaranteed_force(robot, poses: dict, guaranteed, axes=None, torque: flo
     for ax, (title, q) in zip(axes, poses.items(), strict=False):
         radius = float(guaranteed(control_matrix(robot, q), torque))
         plot_available_forces(robot, q, ax, torque=torque, guaranteed=radius).set_title(title)
+        around, A = np.linspace(0.0, 2 * np.pi, 181), control_matrix(robot, q)
+        circle = np.stack([np.cos(around), np.sin(around)])
+        draw_own("02.guaranteed_force", lambda f, A=A, circle=circle: f(A, torque) * circle, ax)
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
     force = on_grid(inside, np.array([float(guaranteed(A_k, torque)) for A_k in A]))

@@ -37,7 +37,7 @@ EXERCISES = {
         cases=tasks.rest_cases,
         invariant=tasks.unbalanced,
         tolerance=1e-9,
-        close=0.02,
+        close=0.09,
         improve="the two equations are linear: solve them instead of minimizing or simulating",
         mistakes={
             "this is the printed (14) with A^T put in: right for equal gains only, it tears the loops": (
@@ -89,7 +89,7 @@ EXERCISES = {
         cases=tasks.fight_cases,
         invariant=tasks.open_chain,
         tolerance=1e-9,
-        close=0.02,
+        close=0.05,
         improve="the condition is linear in mu: solve it by hand",
         mistakes={
             "each drive multiplies its own part of the offset by its own gain: these torques are not along eta": (

@@ -26,7 +26,7 @@ def _matrix(robot, x, mode=None):
 
 
 def rest_cases(rng) -> list[tuple]:
-    """A, K_P and offsets: unequal gains, gains that couple the drives, four drives, and near an input singularity."""
+    """A, K_P and offsets: unequal gains, gains that couple the drives, four drives, another mode."""
     robot, four = load(), load("four_arms")
 
     def gains(m):
@@ -39,9 +39,9 @@ def rest_cases(rng) -> list[tuple]:
     coupled = gains(3) + mixed @ mixed.T
     offset, label = np.array([4e-3, -2e-3, 5e-3]), "gains that couple the drives"
     cases.append(Case(label, _matrix(robot, [0.03, 0.05]), coupled, offset, beyond=True))
-    near = robot.base[:2].mean(axis=0) + [0.006, 0.004]
-    A = _matrix(robot, near, (1, 1, -1))
-    return [*cases, Case("a pose close to an input singularity", A, gains(3), np.array([1e-3, -2e-3, 1e-3]))]
+    beside = robot.base[:2].mean(axis=0) + [0.05, 0.06]
+    A = _matrix(robot, beside, (1, 1, -1))
+    return [*cases, Case("another working mode", A, gains(3), np.array([1e-3, -2e-3, 1e-3]))]
 
 
 def unbalanced(e, A, K_P, offset):
