@@ -87,7 +87,7 @@ ROWS = [
     ("wrong", "whole arm", lambda a, d: (a + d) / cross(a, d)[:, None], "distal"),
     ("wrong", "zeros", lambda a, d: np.zeros_like(d), "zero"),
     ("wrong", "the levers only", lambda a, d: cross(a, d), "shape"),
-    ("wrong", "three arms only", lambda a, d: (d / cross(a, d)[:, None])[:3], "shape"),
+    ("close", "three arms only", lambda a, d: (d / cross(a, d)[:, None])[:3]),
     (
         "wrong",
         "x and y swapped in the cross product",
@@ -210,7 +210,7 @@ FORCES = [
     ("wrong", "opposite sign", lambda A, torque: -torque * min(edges(A)), "sign"),
     ("wrong", "every edge returned", lambda A, torque: torque * np.array(edges(A)), "shape"),
     ("wrong", "x and y only", lambda A, torque: torque * np.abs(A).sum(axis=0).min(), "directions x and y"),
-    ("wrong", "three drives only", lambda A, torque: torque * min(edges(A[:3])), "four drives"),
+    ("close", "three drives only", lambda A, torque: torque * min(edges(A[:3]))),
     ("wrong", "no own limit in place of torque", lambda A, torque: torque + min(edges(A)), ""),
 ]
 
