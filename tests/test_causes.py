@@ -1,0 +1,109 @@
+"""The reason of a lost run names what was broken on purpose, by hand, so that the truth is known."""
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+
+ROBOT = rk.load().replace(friction=0.0)
+HANGING = ROBOT.replace(gravity=[0.0, -9.81])
+FIVE_BAR = rk.load("five_bar").replace(friction=0.0)
+OFFSET = [4e-3, -2e-3, 5e-3]
+PD, CTC, TASK = rk.PD(7.05, 0.225), rk.CTC(900.0, 60.0), rk.CTC(900.0, 60.0, None)
+REDUNDANT, FILTER = rk.RedundantCTC(900.0, 60.0), rk.AntagonismFilter(PD)
+TRIANGLE = rk.triangle(ROBOT, duration=1.5)
+CIRCLE = rk.circle(ROBOT, 0.05, 0.5)
+HOLD = rk.hold(ROBOT, [0.0, 0.0], 0.5)
+
+
+def mine(t, q_a, qd_a, desired):
+    return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
+
+
+def silent(t, q_a, qd_a, desired):
+    return None if t > 0.1 else mine(t, q_a, qd_a, desired)
+
+
+def raising(t, q_a, qd_a, desired):
+    gains = {}
+    return gains["the gain table"] if t > 0.1 else mine(t, q_a, qd_a, desired)
+
+
+@rk.compiled
+def infinite(t, q_a, qd_a, d):
+    return (q_a - d.q_a + 1.0) / (t - t)
+
+
+def mode(*signs):
+    return {"model": ROBOT.replace(mode=signs)}
+
+
+def fault(*faults):
+    return {"faults": list(faults)}
+
+
+LONGER = ROBOT.replace(lengths=0.28)
+SETS = [
+    ("working mode", ROBOT, TASK, CIRCLE, mode(1, 1, -1)),
+    ("working mode", ROBOT, PD, CIRCLE, mode(1, -1, 1)),
+    ("working mode", ROBOT, PD, CIRCLE, mode(-1, -1, 1)),
+    ("working mode", ROBOT, FILTER, CIRCLE, mode(-1, -1, -1)),
+    ("working mode", ROBOT, REDUNDANT, CIRCLE, mode(1, 1, -1) | {"offset": OFFSET}),
+    ("working mode", ROBOT, mine, CIRCLE, mode(1, -1, 1)),
+    ("lengths that are off by 40 %", ROBOT, TASK, TRIANGLE, {"model": LONGER}),
+    ("lengths that are off by 40 %", ROBOT, FILTER, TRIANGLE, {"model": LONGER}),
+    ("lengths that are off by 40 %", ROBOT, CTC, CIRCLE, {"model": LONGER}),
+    ("offset = ", ROBOT, FILTER, HOLD, {"offset": [2.5, -2.5, 2.5]}),
+    ("offset = ", ROBOT, TASK, HOLD, {"offset": [2.5, -2.5, 2.5]}),
+    ("offset = ", ROBOT, REDUNDANT, TRIANGLE, {"offset": [0.5, -0.5, 0.5]}),
+    ("offset = ", ROBOT, TASK, rk.hold(ROBOT, [0.15, -0.05], 0.5), {"offset": [0.3, -0.3, 0.3]}),
+    ("offset = ", ROBOT, FILTER, TRIANGLE, {"offset": [1.0, -1.0, 1.0]}),
+    ("TorqueLimit", HANGING, TASK, HOLD, fault(rk.TorqueLimit(0.02))),
+    ("TorqueLimit", HANGING, REDUNDANT, HOLD, fault(rk.TorqueLimit(0.03))),
+    ("own limit of 0.05 N m", HANGING, rk.PID(20.0, 10.0, 0.4, 0.05), HOLD, {}),
+    ("DeadDrive\\(0, 0.2\\)", ROBOT, TASK, TRIANGLE, fault(rk.DeadDrive(0, 0.2), rk.DeadDrive(1, 0.25))),
+    ("DeadDrive\\(0, 0.2\\)", ROBOT, REDUNDANT, TRIANGLE, fault(*(rk.DeadDrive(i, 0.2) for i in range(3)))),
+    ("DeadDrive\\(0, 0.2\\)", FIVE_BAR, TASK, rk.experiment("five_bar").trajectory, fault(rk.DeadDrive(0, 0.2))),
+    ("EncoderDropout\\(0", ROBOT, TASK, TRIANGLE, fault(rk.EncoderDropout(0, 0.1, 1.5))),
+    ("EncoderDropout\\(1", ROBOT, REDUNDANT, TRIANGLE, fault(rk.EncoderDropout(1, 0.1, 1.5))),
+    ("EncoderDropout\\(2", ROBOT, TASK, TRIANGLE, fault(rk.TorqueLimit(5.0), rk.EncoderDropout(2, 0.1, 1.5))),
+    ("OffsetJump", ROBOT, TASK, TRIANGLE, fault(rk.OffsetJump(1, 0.2, 2.0))),
+    ("OffsetJump", ROBOT, FILTER, TRIANGLE, fault(rk.OffsetJump(1, 0.2, -2.0), rk.TorqueLimit(5.0))),
+    ("OffsetJump", ROBOT, REDUNDANT, TRIANGLE, fault(rk.OffsetJump(2, 0.2, 2.0))),
+    ("unstable gain", ROBOT, rk.PD(1e4, 0.225), CIRCLE, {"offset": OFFSET}),
+    ("unstable gain", ROBOT, rk.PD(7.0, 30.0), CIRCLE, {}),
+    ("unstable gain", ROBOT, rk.CTC(9e6, 60.0), CIRCLE, {"offset": OFFSET}),
+    ("unstable gain", ROBOT, rk.CTC(100.0, 5000.0), CIRCLE, {"offset": OFFSET}),
+    ("unstable gain", ROBOT, rk.AntagonismFilter(rk.PD(1e4, 0.225)), CIRCLE, {"offset": OFFSET, "encoder": 2000}),
+    ("unstable gain", ROBOT, rk.RedundantCTC(9e6, 60.0), CIRCLE, {"offset": OFFSET}),
+    ("encoder = 4 counts", ROBOT, TASK, TRIANGLE, {"encoder": 4}),
+    ("encoder = 5 counts", ROBOT, FILTER, TRIANGLE, {"encoder": 5}),
+    ("drives 2 and 3", ROBOT, rk.CTC(900.0, 60.0, (1, 2)), TRIANGLE, {"offset": OFFSET}),
+    ("drives 1 and 2", ROBOT, rk.CTC(900.0, 60.0, (0, 1)), TRIANGLE, {"offset": OFFSET}),
+    ("drives 2 and 3", ROBOT, rk.APD(7.0, 0.2, (1, 2)), TRIANGLE, {"offset": OFFSET}),
+    ("the gains do not hold it", HANGING, rk.PD(0.1, 0.01), HOLD, {}),
+    ("law returned None", ROBOT, silent, CIRCLE, {}),
+    (r"KeyError: 'the gain table' \(line \d+ of test_causes.py: return gains", ROBOT, raising, CIRCLE, {}),
+    ("returned torques that are not 3 finite numbers|nan; allowed", ROBOT, infinite, CIRCLE, {}),
+    ("friction is too stiff", ROBOT.replace(friction=1e3, friction_velocity=1e-6), PD, CIRCLE, {}),
+]
+
+
+@pytest.mark.parametrize(("cause", "robot", "law", "path", "options"), SETS, ids=range(len(SETS)))
+def test_the_cause_is_named(cause, robot, law, path, options):
+    with pytest.raises((rk.SimulationError, ValueError), match=cause) as caught:
+        rk.simulate(robot, law, path, **options)
+    if isinstance(caught.value, rk.SimulationError) and len(caught.value.partial):
+        assert np.all(np.isfinite(caught.value.partial.c))
+
+
+def test_a_study_names_the_cause_too():
+    with pytest.raises(rk.SimulationError, match=r"run 1: .*offset = "):
+        rk.sweep(ROBOT, FILTER, HOLD, [OFFSET, [2.5, -2.5, 2.5]])
+    with pytest.raises(rk.SimulationError, match=r"run 0: .*TorqueLimit\(0.02\)"):
+        rk.sweep(HANGING, TASK, HOLD, [0.0, 0.0, 0.0], faults=rk.TorqueLimit(0.02))
+
+
+def test_a_model_that_cannot_follow_is_refused_before_the_run():
+    with pytest.raises(ValueError, match="model cannot follow the trajectory: .*outside the workspace"):
+        rk.simulate(ROBOT, PD, TRIANGLE, model=ROBOT.replace(lengths=0.12))

@@ -1,0 +1,121 @@
+"""Machines that allow little: no cache, no home, no threads, a Numba that does not import, or is not wanted."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+RUN = """
+import sys
+import rapkm_lite as rk
+robot = rk.load()
+path = rk.triangle(robot, duration=0.3, dt=5e-3)
+run = rk.simulate(robot, rk.PD(7.05, 0.225), path, [4e-3, -2e-3, 5e-3])
+study = rk.sweep(robot, rk.PD(7.05, 0.225), path, [[1e-3, 0.0, 0.0]] * 3)
+print(run.energy.sum(), study.energies.sum(), "numba" in sys.modules)
+"""
+NO_THREADS = """
+import threading
+def refuse(*args, **kwargs):
+    raise AssertionError("a thread was started")
+threading._start_new_thread = refuse
+threading._start_joinable_thread = refuse
+"""
+NO_PROCESSES = """
+import socket, subprocess
+def refuse(*args, **kwargs):
+    raise AssertionError("a process or a connection was started")
+socket.socket.connect = subprocess.Popen.__init__ = refuse
+"""
+BROKEN_NUMBA = """
+import sys
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "numba.core":
+            raise ImportError("its compiler is broken")
+sys.meta_path.insert(0, Finder())
+"""
+
+
+def result(code=RUN, before="", cwd="/", **environment):
+    """What a new process prints, and what it says on stderr; an environment variable that is None is taken away."""
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg", **environment}
+    variables = {name: value for name, value in variables.items() if value is not None}
+    done = subprocess.run(
+        [sys.executable, "-c", before + code], env=variables, capture_output=True, text=True, cwd=cwd, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(), done.stderr
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return result(RAPKM_LITE_NUMBA="0")[0]
+
+
+@pytest.mark.parametrize("off", ["false", "no", "off", "FALSE", " Off "])
+def test_all_words_for_off_mean_off(plain, off):
+    assert result(RAPKM_LITE_NUMBA=off)[0] == plain and plain[-1] == "False"
+
+
+def close(one, other):
+    return all(abs(float(a) / float(b) - 1) < 1e-10 for a, b in zip(one[:2], other[:2], strict=True))
+
+
+def test_a_numba_that_does_not_import_costs_a_warning(plain):
+    pytest.importorskip("numba")
+    numbers, words = result(before=BROKEN_NUMBA)
+    assert numbers[:2] == plain[:2] and words.count("Numba is installed but does not import") == 1
+
+
+def test_no_folder_for_a_cache(plain, tmp_path):
+    file = tmp_path / "no_folder"
+    file.write_text("", encoding="utf-8")
+    assert close(result(NUMBA_CACHE_DIR=str(file / "cache"))[0], plain)
+
+
+def test_a_damaged_cache(plain, tmp_path):
+    pytest.importorskip("numba")
+    result(NUMBA_CACHE_DIR=str(tmp_path))
+    files = [path for path in tmp_path.rglob("*.nb?")]
+    assert files
+    for path in files:
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert close(result(NUMBA_CACHE_DIR=str(tmp_path))[0], plain)
+
+
+def test_without_home(plain):
+    assert result(HOME=None, XDG_CACHE_HOME=None, RAPKM_LITE_NUMBA="0")[0] == plain
+
+
+@pytest.mark.parametrize("numba", ["0", "1"])
+def test_without_threads_processes_and_connections(plain, numba):
+    assert close(result(before=NO_THREADS + NO_PROCESSES, RAPKM_LITE_NUMBA=numba)[0], plain)
+
+
+def test_explorers_without_threads():
+    code = """
+from rapkm_lite import explore
+for name in ("machine", "steady_state", "actuation", "prestress", "landscape", "decentralized_run", "computed_torque"):
+    getattr(explore, name)()
+    print(name)
+"""
+    assert len(result(code, NO_THREADS + NO_PROCESSES, RAPKM_LITE_NUMBA="0")[0]) == 7
+
+
+@pytest.mark.parametrize("lesson", sorted((ROOT / "notebooks").glob("0*.ipynb")), ids=lambda path: path.stem[:2])
+def test_first_cells_of_lessons_without_threads(lesson):
+    code = f"""
+import json
+cells = json.load(open({str(lesson)!r}, encoding="utf-8"))["cells"]
+for cell in [c for c in cells if c["cell_type"] == "code"][:2]:
+    text = "".join(cell["source"])
+    if "%" not in text and "explore." not in text:
+        exec(compile(text, "cell", "exec"), globals())
+print("done")
+"""
+    before = NO_THREADS + NO_PROCESSES + "display = print\n"
+    assert "done" in result(code, before, cwd=str(lesson.parent), RAPKM_LITE_NUMBA="0")[0]

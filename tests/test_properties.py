@@ -1,0 +1,189 @@
+"""Identities of the chapter for machines at random: 2 to 6 arms, any base polygon, lengths within a factor of three."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rapkm_lite as rk
+
+hypothesis = pytest.importorskip("hypothesis")
+from hypothesis import strategies as st  # noqa: E402
+
+settings = hypothesis.settings(max_examples=40, deadline=None, derandomize=True, database=None)
+
+
+@st.composite
+def machines(draw, friction=False):
+    """A machine and an inner pose: its arms are hung on a point that each of them reaches with a bend."""
+    N, rng = draw(st.integers(2, 6)), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    x = rng.uniform(-0.3, 0.3, 2)
+    lengths = rng.uniform(0.1, 0.3, (N, 2))
+    elbow = rng.uniform(0.4, np.pi - 0.4, N) * rng.choice([-1, 1], N)
+    base_angle = np.sort(rng.uniform(0.0, 2 * np.pi, N)) + np.arange(N) * 0.1
+    link = base_angle + elbow
+    a = lengths[:, :1] * np.stack([np.cos(base_angle), np.sin(base_angle)], -1)
+    d = lengths[:, 1:] * np.stack([np.cos(link), np.sin(link)], -1)
+    robot = rk.Manipulator(
+        base=x - a - d,
+        lengths=lengths,
+        masses=rng.uniform(0.05, 0.5, (N, 2)),
+        centers=lengths * rng.uniform(0.2, 0.8, (N, 2)),
+        inertias=rng.uniform(1e-4, 2e-3, (N, 2)),
+        rotor_inertia=rng.uniform(0.0, 1e-5, N),
+        friction=rng.uniform(0.0, 0.01, N) if friction else 0.0,
+        gravity=rng.normal(0.0, 5.0, 2),
+        load=rng.uniform(0.0, 0.3),
+        mode=np.sign(elbow),
+    )
+    q = rk.inverse_kinematics(robot, x)
+    hypothesis.assume(np.linalg.svd(rk.control_matrix(robot, q), compute_uv=False)[-1] > 0.5)
+    return robot, x, q, rng
+
+
+def motion(robot, q, rng):
+    """Rates and accelerations on V, and those of the end-effector."""
+    xd, xdd = rng.normal(0, 0.3, 2), rng.normal(0, 2.0, 2)
+    F = rk.orthogonal_complement(robot, q)
+    qd = F @ xd
+    return xd, xdd, qd, F @ xdd + rk.orthogonal_complement_dot(robot, q, qd) @ xd
+
+
+@settings
+@hypothesis.given(machines(friction=True))
+def test_identities(drawn):
+    robot, x, q, rng = drawn
+    xd, _, qd, qdd = motion(robot, q, rng)
+    at = rk.at(robot, q, qd)
+    assert_allclose(at.x, x, atol=1e-12)
+    assert_allclose(at.J @ at.F, 0.0, atol=1e-11)
+    assert_allclose(at.J @ qdd + at.J_dot @ qd, 0.0, atol=1e-9 * np.abs(qdd).max())
+    assert_allclose(at.N @ at.N, at.N, atol=1e-12)
+    assert_allclose(at.A_tilde.T @ at.A_tilde_T_pinv @ at.N, at.N, atol=1e-9)
+    R = rk.antagonism_filter(at.A)
+    assert_allclose(at.A.T @ R, at.A.T, atol=1e-9)
+    # (11) and (25) are one; what (2) makes of these torques is the motion again.
+    c = rk.inverse_dynamics(robot, q, qd, qdd)
+    G, C, Q = at.redundant
+    assert_allclose(at.A_tilde_T_pinv @ (G @ qdd + C @ qd + Q), c, atol=1e-8 * (1 + np.abs(c).max()))
+    assert_allclose(rk.forward_dynamics(robot, q, qd, c)[0], qdd, atol=1e-7 * (1 + np.abs(qdd).max()))
+
+
+@settings
+@hypothesis.given(machines())
+def test_the_drives_give_the_power_that_the_energy_takes(drawn):
+    robot, _, q, rng = drawn
+    _, _, qd, qdd = motion(robot, q, rng)
+    power = rk.inverse_dynamics(robot, q, qd, qdd) @ qd[: robot.n_arms]
+    at = rk.at(robot, q, qd)
+    # d/dt (qd G qd / 2 + V) = qd (G qdd + C qd + Q), since dG/dt - 2 C is skew.
+    energy = qd @ (at.G @ qdd + at.C @ qd + at.Q)
+    assert_allclose(power, energy, atol=1e-9 * (1 + abs(energy)))
+
+
+@settings
+@hypothesis.given(machines(), st.floats(-3.0, 3.0))
+def test_torques_do_not_depend_on_the_frame(drawn, angle):
+    robot, x, q, rng = drawn
+    _, _, qd, qdd = motion(robot, q, rng)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    moved = robot.replace(base=robot.base @ turn.T + [0.3, -0.2], gravity=turn @ robot.gravity)
+    there = rk.inverse_kinematics(moved, turn @ x + [0.3, -0.2])
+    c = rk.inverse_dynamics(robot, q, qd, qdd)
+    assert_allclose(rk.inverse_dynamics(moved, there, qd, qdd), c, atol=1e-8 * (1 + np.abs(c).max()))
+
+
+@settings
+@hypothesis.given(machines())
+def test_arms_have_no_order(drawn):
+    robot, _, q, rng = drawn
+    _, _, qd, qdd = motion(robot, q, rng)
+    N = robot.n_arms
+    order = rng.permutation(N)
+    joints = np.concatenate([order, N + order])
+    other = robot.replace(load=0.0).with_arms(order.tolist())
+    c = rk.inverse_dynamics(robot.replace(load=0.0), q, qd, qdd)
+    permuted = rk.inverse_dynamics(other, q[joints], qd[joints], qdd[joints])
+    assert_allclose(permuted, c[order], atol=1e-8 * (1 + np.abs(c).max()))
+
+
+@settings
+@hypothesis.given(machines(), st.sampled_from([1e-3, 0.1, 7.0, 1e3]), st.sampled_from([1e-3, 20.0]))
+def test_length_mass_and_time_scale(drawn, length, mass):
+    """The torques of the same motion, s times as large with m times the mass, are m s^2 times as large; ranks stay."""
+    robot, x, q, rng = drawn
+    _, _, qd, qdd = motion(robot, q, rng)
+    big = rk.Manipulator(
+        base=robot.base * length,
+        lengths=robot.lengths * length,
+        masses=robot.masses * mass,
+        centers=robot.centers * length,
+        inertias=robot.inertias * mass * length**2,
+        rotor_inertia=robot.rotor_inertia * mass * length**2,
+        gravity=robot.gravity * length,
+        load=robot.load * mass,
+        mode=robot.mode,
+    )
+    c = rk.inverse_dynamics(robot, q, qd, qdd)
+    assert_allclose(
+        rk.inverse_dynamics(big, q, qd, qdd), mass * length**2 * c, atol=1e-8 * mass * length**2 * (1 + np.abs(c).max())
+    )
+    assert rk.degree_of_freedom(big, q) == rk.degree_of_freedom(robot, q) == 2
+    assert rk.degree_of_actuation(big, q) == rk.degree_of_actuation(robot, q) == 2
+
+
+@settings
+@hypothesis.given(machines())
+def test_twice_as_fast_is_four_times_the_force(drawn):
+    robot, _, q, rng = drawn
+    _, _, qd, qdd = motion(robot, q, rng)
+    rest = rk.inverse_dynamics(robot, q, 0 * qd, 0 * qd)
+    c = rk.inverse_dynamics(robot, q, qd, qdd) - rest
+    assert_allclose(rk.inverse_dynamics(robot, q, 2 * qd, 4 * qdd) - rest, 4 * c, atol=1e-8 * (1 + np.abs(c).max()))
+
+
+@settings
+@hypothesis.given(machines())
+def test_coriolis_matrix_at_stretched_and_folded_arms(drawn):
+    """It is defined there: dG/dt - 2 C is skew, and a stretched arm (sin = 0) has no Coriolis forces."""
+    robot, _, q, rng = drawn
+    N = robot.n_arms
+    q = q.copy()
+    q[N:] = rng.choice([0.0, np.pi], N)
+    qd = rng.normal(0.0, 2.0, 2 * N)
+    assert_allclose(rk.coriolis_matrix(robot, q, qd), 0.0, atol=1e-15)
+    q[N] = 0.5
+    h = 1e-6
+    G_dot = (rk.mass_matrix(robot, q + h * qd) - rk.mass_matrix(robot, q - h * qd)) / (2 * h)
+    skew = G_dot - 2 * rk.coriolis_matrix(robot, q, qd)
+    assert_allclose(skew, -skew.T, atol=1e-8)
+    assert np.abs(rk.coriolis_matrix(robot, q, qd)).max() > 0.0
+
+
+@settings
+@hypothesis.given(machines())
+def test_feedback_norm_is_what_the_definition_says(drawn):
+    """The largest torque for a unit feedback acceleration, sought over directions; in redundant coordinates and pairs."""
+    robot, _, q, rng = drawn
+    at = rk.at(robot, q, 0 * q)
+    redundant = at.A_tilde_T_pinv @ at.redundant[0]
+    size = rk.feedback_norm(robot, q)
+    directions = np.linalg.svd(redundant)[2]
+    assert size > 0.0
+    assert_allclose(size, np.linalg.norm(redundant @ directions[0]), rtol=1e-7)
+    pair = (0, 1)
+    hypothesis.assume(abs(np.linalg.det(at.A[list(pair)])) > 1e-3)
+    chosen = at.using(pair)
+    M = rk.weighted_pseudoinverse(chosen.A) @ chosen.minimal[0]
+    assert_allclose(rk.feedback_norm(robot, q, pair), np.linalg.norm(M, 2), rtol=1e-6)
+
+
+def test_close_loops_is_limited_in_its_steps():
+    """Half a radian per step at most: from far off, one step cannot do."""
+    robot = rk.load()
+    q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    far = q + np.array([0.6, -0.5, 0.4, 0.5, 0.6, -0.4])
+    with pytest.raises(rk.ConvergenceError):
+        rk.close_loops(robot, far, iterations=1)
+    near = rk.close_loops(robot, far, iterations=100)
+    assert np.abs(rk.loop_constraints(robot, near)).max() < 1e-12
+    assert np.linalg.norm(near - far) <= np.linalg.norm(q - far) + 1e-9  # nearest: no farther than one that is known
