@@ -162,7 +162,7 @@ def test_coriolis_matrix_at_stretched_and_folded_arms(drawn):
 @settings
 @hypothesis.given(machines())
 def test_feedback_norm_is_what_the_definition_says(drawn):
-    """The largest torque for a unit feedback acceleration, sought over directions; in redundant coordinates and pairs."""
+    """The largest torque for a unit feedback acceleration, in redundant coordinates and for a pair."""
     robot, _, q, rng = drawn
     at = rk.at(robot, q, 0 * q)
     redundant = at.A_tilde_T_pinv @ at.redundant[0]
