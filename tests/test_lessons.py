@@ -190,7 +190,9 @@ def test_tables_agree_with_the_lesson(path):
     text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
     minutes = re.search(r"\*\*(?:Minutes|Time):?\W*(\d+)", text)
     row = next(
-        line for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines() if path.name in line
+        line
+        for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith(f"| [{path.stem}]")
     ).split("|")
     assert minutes and row[3].strip() == minutes[1]
     for name in re.findall(r"`([\w.]+)`", row[5]):
