@@ -75,7 +75,7 @@ def _check(parameter: inspect.Parameter, value, known: Known) -> None:
     elif kind == "str" or isinstance(default, str):
         of_kind(name, value, str, "text")
     elif kind == "dict":
-        _dictionary(name, value, known)
+        _dictionary(name, value)
     elif kind == "int":
         whole_number(name, value, -1 if default == -1 else 0)
     elif kind == "float" or isinstance(default, float):
@@ -87,12 +87,9 @@ def _check(parameter: inspect.Parameter, value, known: Known) -> None:
         _RULES[name](name, value, known)
 
 
-def _dictionary(name: str, value, known: Known) -> None:
+def _dictionary(name: str, value) -> None:
     if not isinstance(value, dict) or not value:
         raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
-    for label, part in value.items():
-        if name == "runs":
-            _run(f"{name}[{label!r}]", part, known)
 
 
 def _robot(name: str, value, known: Known) -> None:
