@@ -175,7 +175,7 @@ export function themeOf(el) {
   const colour = (hex, fill = false) => {
     if (!hex || !dark) return hex;
     let c = rgb(hex);
-    if (shine(c) > 0.95) return css(paper);
+    if (shine(c) > 0.95 || shine(c) < 0.02) return css(shine(c) > 0.95 ? paper : ink);
     if (fill && shine(c) > 0.6) return css(mix(paper, c, 0.16));
     while (contrast(c, paper) < (fill ? 3 : 4.5)) c = mix(c, [255, 255, 255], 0.15);
     return css(c);
