@@ -145,10 +145,10 @@ def plot_modes_and_forces(robot, x, modes, axes=None):
     return axes
 
 
-def plot_guaranteed_force(robot, poses: dict, guaranteed, axes=None, torque: float = 0.1, n: int = 90):
+def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: float = 0.1, n: int = 90):
     """Available forces with the disc of the guaranteed force at some poses (title -> q), and a map of its radius.
 
-    guaranteed : function of A (m, 2) and the torque limit in N m that gives the radius in N.
+    radius_of : function of A (m, 2) and the torque limit in N m that gives the radius in N.
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()
@@ -158,14 +158,14 @@ def plot_guaranteed_force(robot, poses: dict, guaranteed, axes=None, torque: flo
         count = len(poses) + 1
         axes = plt.subplots(1, count, figsize=(3.8 * count, 3.3), width_ratios=[1.0] * len(poses) + [1.3])[1]
     for ax, (title, q) in zip(axes, poses.items(), strict=False):
-        radius = float(guaranteed(control_matrix(robot, q), torque))
+        radius = float(radius_of(control_matrix(robot, q), torque))
         plot_available_forces(robot, q, ax, torque=torque, guaranteed=radius).set_title(title)
         around, A = np.linspace(0.0, 2 * np.pi, 181), control_matrix(robot, q)
         circle = np.stack([np.cos(around), np.sin(around)])
         draw_own("02.guaranteed_force", lambda f, A=A, circle=circle: f(A, torque) * circle, ax)
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
-    force = on_grid(inside, np.array([float(guaranteed(A_k, torque)) for A_k in A]))
+    force = on_grid(inside, np.array([float(radius_of(A_k, torque)) for A_k in A]))
     plot_map(x, y, force, axes[-1], label="guaranteed force in N", vmin=0, vmax=1.2).set_title("whole workspace")
     return axes
 
