@@ -191,7 +191,7 @@ _RULES: dict[str, Callable[[str, Any, Known], None]] = {
     "K_P": _gain,
     **dict.fromkeys(
         (
-            "F x y t values sigma forces guaranteed theory ratio simulated target jumps can_rest spacing gap "
+            "F x y t values sigma forces theory ratio simulated target jumps can_rest spacing gap "
             "marked rate zoom gains without with_filter antagonistic centres reference low high readings demand points "
             "start stop vmin vmax quantum friction box inside cube xd share part"
         ).split(),
