@@ -215,12 +215,12 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     return ax
 
 
-def film_loops(robot, t, gaps: dict, runs: dict):
-    """A film of runs (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,)."""
+def film_loops(robot, t, gaps: dict, poses: dict):
+    """A film of poses (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,)."""
     size = 1e3 * max(gap.max() for gap in gaps.values())
 
     def draw(axes, k):
-        for ax, (name, q) in zip(axes, runs.items(), strict=False):
+        for ax, (name, q) in zip(axes, poses.items(), strict=False):
             plot_cut_tree(robot, q[k], ax).legend().remove()
             ax.text(-0.26, 0.29, f"{name}, {t[k]:.1f} s", fontweight="bold")
             ax.set(xlim=(-0.27, 0.36), ylim=(-0.25, 0.32))
@@ -230,7 +230,7 @@ def film_loops(robot, t, gaps: dict, runs: dict):
         axes[-1].set(xlabel="time in s", ylabel="largest gap in mm", xlim=(0, t[-1]), ylim=(-0.03 * size, 1.1 * size))
         axes[-1].legend(loc="upper left")
 
-    names = list(runs)
+    names = list(poses)
     return film(
         draw,
         np.linspace(0, len(t) - 1, 26).astype(int),
