@@ -30,6 +30,11 @@ NEEDED = (
     "ipywidgets", "comm", "widgetsnbextension", "jupyterlab-widgets", "anywidget", "psygnal", "typing-extensions",
     "sympy", "mpmath",
 )  # fmt: skip
+PLUGIN = "@jupyterlite/pyodide-kernel-extension:kernel"
+SITE = {
+    "jupyter-lite-schema-version": 0,
+    "jupyter-config-data": {"litePluginSettings": {PLUGIN: {"pyodideUrl": "./static/pyodide/pyodide.js"}}},
+}
 SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
 
 
@@ -102,9 +107,10 @@ def main() -> int:
         for path in shipped(ROOT / "notebooks"):
             (work / "files" / path.name).write_text(student_text(path), encoding="utf-8")
         (work / "overrides.json").write_text(json.dumps(SETTINGS), encoding="utf-8")
-        distribution(options.pyodide, work / "pyodide")
+        (work / "jupyter-lite.json").write_text(json.dumps(SITE), encoding="utf-8")
         lite = [sys.executable, "-m", "jupyterlite_core.app", "build", "--lite-dir", work, "--contents", work / "files"]
-        run(*lite, "--pyodide", work / "pyodide", "--output-dir", options.output.resolve())
+        run(*lite, "--output-dir", options.output.resolve())
+    distribution(options.pyodide, options.output / "static/pyodide")
     size = sum(path.stat().st_size for path in options.output.rglob("*") if path.is_file())
     print(f"{options.output}: {size / 1e6:.0f} MB")
     return 0
