@@ -46,6 +46,24 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
     }
 
 
+def player(widget) -> widgets.Widget:
+    """A play button for a slider, with its speed."""
+    ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
+    play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
+    # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
+    speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
+    shown = widgets.HBox([play, speed])
+    shown.link = widgets.jslink((play, "value"), (widget, "value"))
+    return shown
+
+
+class Shown(widgets.VBox):
+    """A box whose text is short where nothing but text can be shown."""
+
+    def __repr__(self):
+        return "Explorer"
+
+
 def check(name: str, widget, value) -> None:
     """Raise ValueError for a value that the control cannot take."""
     if isinstance(widget, widgets.Dropdown):

@@ -16,7 +16,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import check, moved, snap, tidied
+from .controls import Shown, check, moved, player, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -104,22 +104,14 @@ class Explorer:
                 widget.continuous_update = live and _CONTINUOUS
             widget.observe(self._changed, "value")
             widget.add_class("rapkm-control")
-            cells += [self._player(widget), widget] if name == play else [widget]
+            cells += [player(widget), widget] if name == play else [widget]
         button = widgets.Button(description="Reset", tooltip="back to the first setting", layout={"width": "90px"})
         button.on_click(lambda _: self.reset())
         grid = {"display": "grid", "grid_template_columns": "repeat(auto-fill, minmax(250px, 1fr))"}
         bar = widgets.Box([*cells, button], layout=grid | {"grid_gap": "2px 18px", "align_items": "flex-end"})
-        self.widget = _Shown([bar, self.canvas], layout={"max_width": "100%"})
+        self.widget = Shown([bar, self.canvas], layout={"max_width": "100%"})
         self.widget.add_class("rapkm-explorer")
         self.update()
-
-    def _player(self, widget) -> widgets.Widget:
-        ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
-        play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
-        self._link = widgets.jslink((play, "value"), (widget, "value"))
-        # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
-        speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
-        return widgets.HBox([play, speed])
 
     @property
     def values(self) -> dict:
@@ -283,10 +275,3 @@ class Explorer:
     def __repr__(self):
         setting = ", ".join(f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}" for k, v in self.values.items())
         return f"Explorer({self.name}: {setting})"
-
-
-class _Shown(widgets.VBox):
-    """A box whose text is short where nothing but text can be shown."""
-
-    def __repr__(self):
-        return "Explorer"
