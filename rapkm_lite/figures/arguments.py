@@ -23,10 +23,11 @@ from ..machine.arguments import (
     switch,
     whole_number,
 )
-from ..machine.manipulator import manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.trajectory import Trajectory
 
 Known = dict[str, Any]
+_FIRST = ("robot", "trajectory", "ax", "axes")
 
 
 def guarded(names: dict[str, Any]) -> dict[str, Any]:
@@ -44,19 +45,22 @@ def _guard(function: Callable) -> Callable:
     @functools.wraps(function)
     def checked(*args, **named):
         given = signature.bind(*args, **named).arguments
-        known: Known = {}
-        for name, value in given.items():
-            parameter = signature.parameters[name]
-            if parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL):
-                if not (value is None and parameter.default is None):
-                    _check(parameter, value, known)
-                known[name] = value
+        known: Known = dict(given)
+        parameters = [signature.parameters[name] for name in given]
+        plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
+        asked = [p for p in plain if not (given[p.name] is None and p.default is None)]
+        for parameter in asked:
+            if parameter.name in _FIRST or str(parameter.annotation) in ("bool", "str", "int", "float"):
+                _check(parameter, given[parameter.name], known)
         try:
             return function(*args, **named)
         except (AttributeError, TypeError, LookupError, ValueError, np.linalg.LinAlgError) as error:
+            # Curves may be whatever can be drawn; what could not is held to the names.
+            for parameter in asked:
+                _check(parameter, given[parameter.name], known)
             if "allowed" in str(error) or "needed" in str(error):
                 raise
-            words = ", ".join(f"{name} = {_size(value)}" for name, value in known.items())
+            words = ", ".join(f"{p.name} = {_size(given[p.name])}" for p in plain)
             raise ValueError(
                 f"{function.__name__} cannot draw {words} ({error}); allowed: values and shapes as its docstring says"
             ) from error
@@ -118,9 +122,8 @@ def _axes(name: str, value, known: Known) -> None:
 
 
 def _drives(known: Known) -> int | None:
-    owner = known.get("trajectory") or known.get("run") or known.get("path")
-    robot = known.get("robot") or getattr(owner, "robot", None)
-    return None if robot is None else robot.n_arms
+    owners = [known.get("robot"), *(getattr(known.get(name), "robot", None) for name in ("trajectory", "run", "path"))]
+    return next((robot.n_arms for robot in owners if isinstance(robot, Manipulator)), None)
 
 
 def _pose(name: str, value, known: Known) -> None:
