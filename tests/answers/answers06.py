@@ -202,7 +202,7 @@ MEANS = [
     ("wrong", "mean absolute offset", lambda S, sigma: (sigma * np.sqrt(2 / np.pi)) ** 2 * np.trace(S), "mean"),
     ("wrong", "opposite", lambda S, sigma: -mean(S, sigma), "sign"),
     ("wrong", "zero, as the mean offset is", lambda S, sigma: np.zeros(len(S)) @ S @ np.zeros(len(S)), "zero"),
-    ("wrong", "three drives", lambda S, sigma: sigma**2 * (S[0, 0] + S[1, 1] + S[2, 2]), "right in"),
+    ("close", "three drives", lambda S, sigma: sigma**2 * (S[0, 0] + S[1, 1] + S[2, 2])),
     ("wrong", "one draw", sampled(1), ""),
     ("wrong", "median", lambda S, sigma: mean(S, sigma) * 0.7, "factor"),
 ]
@@ -275,7 +275,7 @@ MINIMA = [
     ("wrong", "nothing", lambda S, size: 0.0, "zero"),
     ("wrong", "half", lambda S, size: least(S, size) / 2, "half"),
     ("wrong", "in mJ", lambda S, size: 1e3 * least(S, size), "1000"),
-    ("wrong", "three drives", lambda S, size: size**2 * np.linalg.eigvalsh(S[:3, :3])[0], "right in"),
+    ("close", "three drives", lambda S, size: size**2 * np.linalg.eigvalsh(S[:3, :3])[0]),
     ("wrong", "determinant", lambda S, size: size**2 * np.linalg.det(S), ""),
     ("wrong", "ten directions", random_directions(10), ""),
 ]
