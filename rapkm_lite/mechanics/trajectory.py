@@ -11,6 +11,7 @@ from ..machine.arguments import check_leading, exact_array, matvec, positive_num
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
 from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
+from .sampling import check_rates, equidistant, sample_times
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,8 +55,6 @@ class Desired(Value):
         return frozen(self.qdd[..., : self.n_arms])
 
 
-MOST = 10_000_000  # samples: nearly three hours at 1 kHz
-
 _MOTION = ("x", "xd", "xdd", "q", "qd", "qdd")
 
 
@@ -75,9 +74,9 @@ class Trajectory(Desired):
     robot: Manipulator
 
     def __post_init__(self):
-        self._set(t=_times(self.t))
+        self._set(t=equidistant(self.t))
         super().__post_init__()
-        self._set(t=_times(self.t))
+        self._set(t=equidistant(self.t))
         super().__post_init__()
         if manipulator(self.robot).n_arms != self.n_arms:
             raise ValueError(f"n_arms = {self.n_arms}, the robot has {self.robot.n_arms}; allowed: the same number")
@@ -152,9 +151,9 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     Trajectory(101 samples, 1 s, 'testbed')
     """
     manipulator(robot)
-    t = _times(t)
+    t = equidistant(t)
     x, xd, xdd = (exact_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
-    _check_rates(t, x, xd)
+    check_rates(t, x, xd)
     return _follow(robot, t, x, xd, xdd, {"samples": len(t)})
 
 
@@ -189,7 +188,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
 
 
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
-    t = _samples(duration, dt)
+    t = sample_times(duration, dt)
     rest = float(exact_array("rest", rest))
     if not 0.0 <= 2 * rest < duration:
         raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
@@ -240,7 +239,7 @@ def circle(
     """
     manipulator(robot)
     radius = positive_number("radius", radius)
-    t = _samples(duration, dt)
+    t = sample_times(duration, dt)
     s = t / duration
     full = 2 * np.pi * positive_number("turns", turns)
     angle = full * s**3 * (10 - 15 * s + 6 * s * s)
@@ -261,40 +260,6 @@ def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Traj
     Trajectory(501 samples, 0.5 s, 'testbed')
     """
     manipulator(robot)
-    t = _samples(duration, dt)
+    t = sample_times(duration, dt)
     still = np.zeros((len(t), 2))
     return _follow(robot, t, still + exact_array("x", x, 2), still, still, {"x": x})
-
-
-def _samples(duration: float, dt: float) -> np.ndarray:
-    duration, dt = positive_number("duration", duration), positive_number("dt", dt)
-    steps = round(min(duration / dt, 1e9))
-    if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
-        raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
-    if steps > MOST:
-        raise ValueError(f"duration = {duration:g} s has {steps} samples of dt = {dt:g} s; allowed: up to {MOST}")
-    return np.arange(steps + 1) * (duration / steps)
-
-
-def _times(t) -> np.ndarray:
-    t = real_array("t", t)
-    if t.ndim != 1 or len(t) < 2:
-        raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
-    if t[0] != 0.0 or t[-1] <= 0.0 or not np.allclose(np.diff(t), t[-1] / (len(t) - 1), rtol=1e-6, atol=0.0):
-        raise ValueError(f"t = {t[0]:g}, {t[1]:g}, ..., {t[-1]:g}; allowed: rising, equidistant times that start at 0")
-    return t
-
-
-def _check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
-    """Refuse rates that are no derivative of the positions; a few jumps are set-points, and allowed."""
-    moved, meant = np.diff(x, axis=0), t[1] * (xd[1:] + xd[:-1]) / 2
-    off = np.linalg.norm(moved - meant, axis=-1)
-    size = max(np.abs(moved).max(), np.abs(meant).max())
-    wrong = off > 0.1 * size + 1e-12
-    if np.count_nonzero(wrong) > 2 + 0.05 * len(t):
-        k = int(np.argmax(off))
-        raise ValueError(
-            f"xd[{k}] = {xd[k].round(6).tolist()} m/s does not fit x: from t = {t[k]:g} s to {t[k + 1]:g} s "
-            f"x moves by {moved[k].round(9).tolist()} m, xd means {meant[k].round(9).tolist()} m; "
-            "allowed: the time derivative of x"
-        )
