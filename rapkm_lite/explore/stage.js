@@ -508,7 +508,7 @@ export function mount(el, scene, link) {
       rich(make("b", {}, span), minus(text));
       return span;
     }));
-    say(message.note ?? "");
+    if (message.note || message.from) say(message.note ?? "");
     root.classList.add("live");
     paint();
     Object.assign(root.dataset, { drawn: ++state.drawn, places: JSON.stringify(state.places) });
@@ -573,6 +573,14 @@ export function mount(el, scene, link) {
     }
   }
 
+  // A number typed beside a slider may lie between two of its steps.
+  function typed({ target, key = "Enter" }) {
+    if (key !== "Enter" || !target.matches?.(".widget-readout")) return;
+    if (!el.closest(".rapkm-explorer")?.contains(target)) return;
+    const number = () => Number(target.textContent.replace("−", "-")), before = number();
+    setTimeout(() => before === number() || say(`${before} was rounded to ${number()}`), 400);
+  }
+
   // A new style sheet may come late, so colours are looked up again for a while.
   const again = () => (theme = null, paint());
   const watch = new MutationObserver(() => [0, 300, 1200].forEach((ms) => setTimeout(again, ms)));
@@ -583,6 +591,7 @@ export function mount(el, scene, link) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again, { signal });
   window.addEventListener("resize", paint, { signal });
   document.addEventListener("keydown", page, { signal, capture: true });
+  for (const name of ["blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
   link.receive(receive);
   link.send({ kind: "hello" });
   const leave = () => {
