@@ -105,5 +105,5 @@ def test_a_study_names_the_cause_too():
 
 
 def test_a_model_that_cannot_follow_is_refused_before_the_run():
-    with pytest.raises(ValueError, match="model cannot follow the trajectory: .*outside the workspace"):
+    with pytest.raises(ValueError, match=r"model cannot follow the trajectory: .*outside the workspace"):
         rk.simulate(ROBOT, PD, TRIANGLE, model=ROBOT.replace(lengths=0.12))

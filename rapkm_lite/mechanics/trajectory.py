@@ -76,8 +76,6 @@ class Trajectory(Desired):
     def __post_init__(self):
         self._set(t=equidistant(self.t))
         super().__post_init__()
-        self._set(t=equidistant(self.t))
-        super().__post_init__()
         if manipulator(self.robot).n_arms != self.n_arms:
             raise ValueError(f"n_arms = {self.n_arms}, the robot has {self.robot.n_arms}; allowed: the same number")
         for name in _MOTION:
