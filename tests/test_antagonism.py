@@ -130,5 +130,5 @@ def test_no_log_begins_with_its_offsets(name):
 
 
 def test_unknown_log_names_what_is_allowed():
-    with pytest.raises(ValueError, match=r"name = 'offset_x'; allowed: offset_a, offset_b, offset_c, gain"):
+    with pytest.raises(ValueError, match=r"name = 'offset_x'; allowed: 'offset_a', 'offset_b', 'offset_c', 'gain'"):
         rk.mystery_run("offset_x")

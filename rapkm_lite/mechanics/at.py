@@ -148,7 +148,9 @@ class At(Value):
     # Minimal coordinates.
     @quantity
     def _levers(self):
-        return cores.inner_levers(self.robot.tree, self._closed)
+        levers = cores.inner_levers(self.robot.tree, self._v)
+        _ = self._closed
+        return levers
 
     @quantity
     def _over(self):

@@ -68,10 +68,10 @@ def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.
 
 
 def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """v, after a check that the tips meet, |h| <= 1e-4 times the longest link."""
-    gap, limit = np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0), 1e-4 * tree.longest
+    """v, after a check that the tips meet, |h| <= 1e-3 times the longest link."""
+    gap, limit = np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0), 1e-3 * tree.longest
     if gap > limit:
-        words = f"allowed: {limit:.3g} m (1e-4 of the longest link) where rates or torques are asked for"
+        words = f"allowed: {limit:.3g} m (1e-3 of the longest link) where rates or torques are asked for"
         raise ValueError(f"q leaves the loops open by {gap:.3g} m; {words}; close_loops(robot, q) closes them")
     return v
 

@@ -33,7 +33,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT).mT
     B = product(A1T_pinv, A2.mT)
-    if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max():
+    if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):
         raise ValueError(f"rows holds {first.shape[-1]} rows, fewer than the rank of A_tilde; allowed: delta of them")
     bottom = _solve_small(B, product(B.mT, A1T_pinv))
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out

@@ -40,7 +40,8 @@ def patience(*kind, after: float = 0.7):
 
 def _notebook() -> bool:
     """True under a Jupyter kernel."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
     return getattr(shell, "kernel", None) is not None
 
 
