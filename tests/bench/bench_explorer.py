@@ -2,7 +2,8 @@
 
     python tests/bench/bench_explorer.py
 
-Prints for each: median time from the key press to the next painted picture, and pictures per second while dragging.
+Prints for each: median time from the key press to the next painted picture, pictures per second while a slider is
+dragged, and, where a picture has a handle, while it is held.
 """
 
 from __future__ import annotations
@@ -40,12 +41,14 @@ WATCH = """i => {
   const area = lab.handles()[i].closest('.jp-Cell');
   const seen = e => requestAnimationFrame(() => setTimeout(() => painted.push(performance.now())));
   area.addEventListener('load', e => { if (e.target.tagName === 'IMG') seen(e); }, true);
+  const root = area.querySelector('.rapkm');
+  if (root) new MutationObserver(seen).observe(root, {attributeFilter: ['data-drawn']});
   document.addEventListener('keydown', () => pressed.push(performance.now()), true);
 }"""
 
 
-def measure(page, url: str, token: str, path: str) -> tuple[list[float], float]:
-    """Latencies in ms of 25 key presses, and pictures per second over a drag of 4 s."""
+def measure(page, url: str, token: str, path: str) -> tuple[list[float], float, float | None]:
+    """Latencies in ms of 25 key presses, pictures per second over a drag of 4 s, and with a handle held for 4 s."""
     notebook = Notebook(page, url, token, path)
     notebook.run_all()
     notebook.ask(WATCH, 0)
@@ -73,12 +76,37 @@ def measure(page, url: str, token: str, path: str) -> tuple[list[float], float]:
     rate = notebook.ask("() => 1000 * painted.length / (performance.now() - began)")
     page.mouse.up()
     notebook.settle()
+    grabbed = notebook.ask(GRAB)
     notebook.check()
-    return latencies[3:], rate
+    return latencies[3:], rate, grabbed
+
+
+# A hand that circles for 4 s at the rate of the display.
+GRAB = """async () => {
+  const knob = document.querySelector('.rapkm-knob');
+  if (!knob) return null;
+  const box = knob.getBoundingClientRect(), panel = knob.parentElement;
+  const [x, y] = [box.left + box.width / 2, box.top + box.height / 2];
+  const send = (type, px, py) => panel.dispatchEvent(new PointerEvent(type,
+    {clientX: px, clientY: py, button: 0, pointerId: 1, pointerType: 'mouse', bubbles: true}));
+  panel.setPointerCapture = () => {};
+  send('pointerdown', x, y);
+  painted.length = 0;
+  const began = performance.now();
+  while (performance.now() - began < 4000) {
+    await new Promise(requestAnimationFrame);
+    const phase = (performance.now() - began) / 300;
+    send('pointermove', x - 40 + 40 * Math.cos(phase), y + 40 * Math.sin(phase));
+  }
+  const rate = 1000 * painted.length / (performance.now() - began);
+  panel.dispatchEvent(new PointerEvent('lostpointercapture', {pointerId: 1}));
+  return rate;
+}"""
 
 
 def main(names: list[str]) -> None:
-    cells = {name: EXPLORER.format(name=name) for name in names or ["decentralized_run"]} | {"interact": INTERACT}
+    cells = {name: EXPLORER.format(name=name) for name in names or ["machine", "decentralized_run"]}
+    cells |= {} if names else {"interact": INTERACT}
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "root"
         root.mkdir()
@@ -89,10 +117,11 @@ def main(names: list[str]) -> None:
             browser = p.chromium.launch(executable_path=find_browser(), args=ARGUMENTS)
             for name in cells:
                 page = browser.new_page(viewport={"width": 1280, "height": 1000})
-                latencies, rate = measure(page, url, token, f"{name}.ipynb")
+                latencies, rate, grabbed = measure(page, url, token, f"{name}.ipynb")
                 spread = f"{min(latencies):.0f} to {max(latencies):.0f}"
                 median = statistics.median(latencies)
-                print(f"{name:20s} key to picture {median:5.0f} ms ({spread}), dragged {rate:4.1f}/s", flush=True)
+                print(f"{name:20s} key to picture {median:5.0f} ms ({spread}), dragged {rate:4.1f}/s", end="")
+                print(f", held {grabbed:4.1f}/s" if grabbed else "", flush=True)
                 page.close()
             browser.close()
 
