@@ -13,6 +13,7 @@ import pytest
 
 GROUPS = {
     "slow": [
+        "test_answers",
         "test_colours",
         "test_compiled_law",
         "test_docs",
@@ -26,13 +27,15 @@ GROUPS = {
         "test_grader",
         "test_lanes",
         "test_nbgrader",
+        "test_package",
         "test_skeleton",
+        "test_stage_js",
         "test_sweep",
         "test_teaching",
         "test_types",
     ],
     "oracle": ["test_oracles", "test_symbolic"],
-    "browser": ["test_lab", "test_start"],
+    "browser": ["test_lab", "test_stage", "test_start"],
 }
 # Longer than their file lets one expect.
 SLOW = {
