@@ -16,7 +16,8 @@ def missing(what: str):
     (pytest.fail if DEMANDED else pytest.skip)(f"{what}; the browser tests need playwright and a Chromium")
 
 
-@pytest.fixture(scope="session")
+# No longer than a module: playwright's event loop would stand in the way of the tests that run notebooks.
+@pytest.fixture(scope="module")
 def browser():
     """A headless Chromium."""
     try:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_lab import browser  # noqa: F401
 
 import rapkm_lite as rk
 
@@ -28,7 +27,7 @@ def address(tmp_path_factory):
 class Page:
     """The start page in a context of its own; `requests` and `errors` must stay empty."""
 
-    def __init__(self, browser, address, width=1280, **settings):  # noqa: F811
+    def __init__(self, browser, address, width=1280, **settings):
         self.page = browser.new_context(viewport={"width": width, "height": 900}, **settings).new_page()
         self.requests, self.errors = [], []
         self.page.on("request", lambda r: None if r.url.startswith("file:") else self.requests.append(r.url))
@@ -52,7 +51,7 @@ class Page:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1024, 3840])
-def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme):  # noqa: F811
+def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme):
     seen = Page(browser, address, width, color_scheme=scheme)
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     unnamed = "[...document.querySelectorAll('input, select, button, .rapkm-knob, canvas')].filter(e => !"
@@ -63,7 +62,7 @@ def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme
     assert seen.requests == [] and seen.errors == []
 
 
-def test_the_end_effector_follows_the_mouse_and_the_keys_and_the_address_brings_it_back(browser, address):  # noqa: F811
+def test_the_end_effector_follows_the_mouse_and_the_keys_and_the_address_brings_it_back(browser, address):
     seen = Page(browser, address)
     knob = seen.page.locator(".rapkm-knob").first
     box = knob.bounding_box()
@@ -84,7 +83,7 @@ def test_the_end_effector_follows_the_mouse_and_the_keys_and_the_address_brings_
     assert seen.errors == []
 
 
-def test_far_outside_it_stops_where_an_arm_is_nearly_stretched(browser, address):  # noqa: F811
+def test_far_outside_it_stops_where_an_arm_is_nearly_stretched(browser, address):
     seen = Page(browser, address)
     for name, value in (("x", 150), ("y", 180)):
         seen.page.evaluate(f"(e => (e.value = {value}, e.oninput()))(document.getElementById('{name}'))")
@@ -94,7 +93,7 @@ def test_far_outside_it_stops_where_an_arm_is_nearly_stretched(browser, address)
     assert seen.errors == []
 
 
-def test_the_numbers_are_those_of_the_package(browser, address):  # noqa: F811
+def test_the_numbers_are_those_of_the_package(browser, address):
     seen = Page(browser, address)
     robot, law = rk.load(), rk.PD(7.05, 0.225)
     path = rk.triangle(robot)
@@ -118,7 +117,7 @@ def test_the_numbers_are_those_of_the_package(browser, address):  # noqa: F811
     assert "no less" in seen.page.inner_text("#said")
 
 
-def test_reduced_motion_steps_instead_of_playing(browser, address):  # noqa: F811
+def test_reduced_motion_steps_instead_of_playing(browser, address):
     seen = Page(browser, address, reduced_motion="reduce")
     seen.page.click("#play")
     seen.wait("time", 0.25)
