@@ -133,6 +133,8 @@ def killed(mutant: Mutant, folder: Path, seconds: int) -> bool:
     variables = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, timeout=seconds)
+        if done.returncode != 0 and mutant.what == "nothing":
+            print(done.stdout.decode(errors="replace")[-3000:])
         return done.returncode != 0
     except subprocess.TimeoutExpired:
         return True
