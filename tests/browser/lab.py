@@ -50,7 +50,9 @@ window.lab = {
       .flatMap(c => c.outputs).filter(o => o.output_type === 'error').map(o => o.ename + ': ' + o.evalue),
     ...[...panel().node.querySelectorAll('.jp-OutputArea-output')].map(e => e.innerText)
       .filter(t => /Traceback \\(most|Error displaying widget|Failed to load model|Error creating widget/.test(t))],
-  handles: () => [...panel().node.querySelectorAll('.jp-OutputArea .noUi-handle')],
+  // What a folded part hides nobody can take in hand.
+  handles: () => [...panel().node.querySelectorAll('.jp-OutputArea .noUi-handle')]
+    .filter(e => e.getClientRects().length),
   sliders: () => lab.handles().map(
     h => h.closest('.jupyter-widgets').querySelector('.widget-label')?.textContent ?? ''),
   focus: i => { const h = lab.handles()[i]; h.scrollIntoView({block: 'center'}); h.focus();
