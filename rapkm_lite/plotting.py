@@ -52,7 +52,6 @@ from .figures.tables import (
 )
 from .lessons.lesson00.figures import (
     film_workshop,
-    plot_at_work,
     plot_working_modes,
 )
 from .lessons.lesson01.figures import (
@@ -158,7 +157,6 @@ __all__ = [
     "plane_axes",
     "plane_limits",
     "plot_antagonism",
-    "plot_at_work",
     "plot_available_forces",
     "plot_bands",
     "plot_chatter",

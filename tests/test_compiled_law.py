@@ -128,5 +128,5 @@ def test_what_does_not_compile_says_so():
     def short(t, q_a, qd_a, d):
         return -q_a[:2]
 
-    with pytest.raises(rk.SimulationError, match="not finite"):
+    with pytest.raises(rk.SimulationError, match="not 3 finite numbers"):
         rk.simulate(ROBOT, short, PATH)

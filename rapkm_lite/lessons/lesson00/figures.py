@@ -27,7 +27,7 @@ def plot_working_modes(robot, x, axes=None):
     return axes
 
 
-def plot_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""):
+def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""):
     """The machine at q (2N,) on its path, and a meter beside it: `spent` of `most` energy, both in J."""
     plot_path(path, ax, lw=0.9)
     plot_machine(robot, q, ax, labels=False)
@@ -61,7 +61,7 @@ def film_workshop(robot, offset):
 
     def draw(axes, k):
         for ax, run, meter, name in zip(axes, runs, meters, ("machine A", "machine B"), strict=True):
-            plot_at_work(robot, run.q[k], lap, meter[k], most, ax, f"{name}, {run.t[k]:.1f} s")
+            _draw_at_work(robot, run.q[k], lap, meter[k], most, ax, f"{name}, {run.t[k]:.1f} s")
 
     return film(
         draw,
