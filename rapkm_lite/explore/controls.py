@@ -53,7 +53,7 @@ def player(widget) -> widgets.Widget:
     # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
     speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
     shown = widgets.HBox([play, speed])
-    shown.link = widgets.jslink((play, "value"), (widget, "value"))
+    shown.link = widgets.jslink((play, "value"), (widget, "value"))  # type: ignore
     return shown
 
 
@@ -99,7 +99,7 @@ def snap(widget, value):
 def moved(widget, steps: int):
     """The value `steps` steps further on a slider."""
     if isinstance(widget, widgets.FloatLogSlider):
-        return snap(widget, widget.value * widget.base ** (steps * widget.step))
+        return snap(widget, widget.value * widget.base ** (steps * widget.step))  # type: ignore
     return snap(widget, widget.value + steps * widget.step)
 
 

@@ -49,12 +49,12 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
     outline, curves = workspace_outline(robot), lru_cache(maxsize=8)(lambda mode: singular_curves(robot, modes[mode]))
     # Outside, where the map is cut off, the value of the nearest point inside.
-    nearest = tuple(distance_transform_edt(~inside, return_distances=False, return_indices=True))
+    nearest = tuple(distance_transform_edt(~inside, return_distances=False, return_indices=True))  # type: ignore
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ndarray:
         A = act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
-        rows = slice(None) if which[drives] is None else list(which[drives])
+        rows = slice(None) if which[drives] is None else list(which[drives])  # type: ignore
         return on_grid(inside, act.singular_values(A[:, rows])[:, 1])[nearest].filled(0.0)
 
     def draw(picture, x, y, mode, drives):

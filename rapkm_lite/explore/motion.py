@@ -64,7 +64,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     def setup(picture):
         draw_workspace(picture, "plane", robot)
         picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
-        corner = np.array([plane["xlim"][1] - 1.15 * SCALE * UNIT, plane["ylim"][1] - 0.06])
+        corner = np.array([plane["xlim"][1] - 1.15 * SCALE * UNIT, plane["ylim"][1] - 0.06])  # type: ignore
         picture.arrow("plane", corner, [SCALE * UNIT, 0], 0.009, facecolor=AFTER)
         words = {"ha": "center", "va": "bottom", "fontsize": 10}
         picture.text("plane", corner[0] + SCALE * UNIT / 2, corner[1] + 0.015, f"{UNIT:g} N", **words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 
 class Case(tuple):
@@ -79,7 +80,7 @@ class Exercise:
     called : the name of the answer in the lesson, where it is not the last part of the exercise's name.
     """
 
-    reference: Callable | object
+    reference: Any
     hints: tuple[str, ...] = ()
     unit: str = ""
     cases: Callable = lambda rng: [()]

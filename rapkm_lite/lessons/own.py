@@ -10,7 +10,7 @@ import numpy as np
 from .checker import own_answer, verdict_of
 
 
-def draw_own(name: str, curve: Callable[[Any], tuple], ax, per_arm: bool = False) -> None:
+def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) -> None:
     """Draw what the student's own answer gives, dashed, when it is wrong or close, and print which line is which.
 
     name : of the exercise.

@@ -195,7 +195,7 @@ def _runs(setup: Setup, law, k: int) -> bool:
     faults = setup.faults
     if faults is not None:
         faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
-    setup = setup._replace(trajectory=Trajectory(trajectory.n_arms, *motion, setup.model), faults=faults)
+    setup = setup._replace(trajectory=Trajectory(trajectory.n_arms, *motion, setup.model), faults=faults)  # type: ignore
     try:
         code = encode(law, setup.model)
         outcome = closed_loop(setup, law)[0] if code is None else single(setup, code)

@@ -115,16 +115,16 @@ class Picture:
         same array is given.
         """
         outline = np.empty((0, 2)) if clip is None else np.asarray(clip, dtype=float)
-        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))
+        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))  # type: ignore
 
     def legend(self, panel: str, entries) -> None:
         """A legend above the panel; entries are (words, keywords of a line)."""
         words = [(words, checked("line", {"linewidth": 2, **style})) for words, style in entries]
-        self._add("legend", panel, np.empty((0, 2)), {}, words)
+        self._add("legend", panel, np.empty((0, 2)), {}, words)  # type: ignore
 
     def scale(self, panel: str, palette: Palette, label: str) -> None:
         """The colours of a map with their levels, beside the panel."""
-        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))
+        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))  # type: ignore
 
     def handle(self, panel: str, x, y, /, along=None, grip=None, **controls) -> None:
         """A point of the picture that can be taken by hand and moves controls.

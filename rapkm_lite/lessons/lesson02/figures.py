@@ -190,7 +190,7 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
     around, tilts = np.deg2rad(np.linspace(-30.0, 30.0, 241)), np.deg2rad([6.0, 15.0, 25.0])
     for half, look in ((around >= 0, {"lw": 3.0}), (around <= 0, {"lw": 1.2})):
         for sign in (1.0, -1.0):
-            ax.plot(*(middle + sign * centre(around[half])).T, color=pair_line(robot, pair)["color"], **look)
+            ax.plot(*(middle + sign * centre(around[half])).T, color=pair_line(robot, pair)["color"], **look)  # type: ignore
     for i, end in zip(pair, base, strict=True):
         ax.add_patch(Circle(tuple(end), length, fill=False, color=arm_line(i)["color"], lw=0.9, ls=":"))
         ax.plot(*end, "o", color=arm_line(i)["color"], ms=10, zorder=4)
