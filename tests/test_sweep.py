@@ -78,7 +78,7 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
     assert all(np.all(np.isfinite(getattr(study, name).data)) for name in COLUMNS)
     same(
         rk.sweep(ROBOT, [gains[i] for i in (0, 2, 3)], PATH, OFFSETS[0]),
-        rk.Sweep(*[None] * 3, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None),
+        rk.Sweep(ROBOT, PD, PATH, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None),
     )
     with pytest.raises(ValueError, match="1 runs failed"):
         np.asarray(study)
@@ -137,10 +137,10 @@ def test_result_is_an_array_of_energies():
         ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
         ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
         ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
-        ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise' or 'mask'"),
-        ({"chunk": 0}, "chunk = 0; allowed: a whole number >= 1"),
+        ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise', 'mask'"),
+        ({"chunk": 0}, "chunk = 0; allowed: >= 1"),
         ({"executor": 3}, "executor = 3; allowed: an executor"),
-        ({"encoder": -5}, "encoder = -5; allowed: > 0"),
+        ({"encoder": -5}, "encoder = -5; allowed: >= 1"),
     ],
 )
 def test_bad_arguments(arguments, message):
