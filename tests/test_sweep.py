@@ -78,7 +78,15 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
     assert all(np.all(np.isfinite(getattr(study, name).data)) for name in COLUMNS)
     same(
         rk.sweep(ROBOT, [gains[i] for i in (0, 2, 3)], PATH, OFFSETS[0]),
-        rk.Sweep(ROBOT, PD, PATH, OFFSETS, *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS), None, None),
+        rk.Sweep(
+            ROBOT,
+            PD,
+            PATH,
+            OFFSETS,
+            *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS),
+            study.failed[[0, 2, 3]],
+            study.failure_time[[0, 2, 3]],
+        ),
     )
     with pytest.raises(ValueError, match="1 runs failed"):
         np.asarray(study)
