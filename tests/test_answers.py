@@ -126,8 +126,8 @@ ODD = {
 def test_odd_answers_crash_nothing(name, capsys, monkeypatch):
     monkeypatch.delenv("RAPKM_LITE_STRICT", raising=False)
     for what, answer in ODD.items():
-        if name == "03.offset_c" and what == "NaN":
-            continue  # there the honest answer: the log does not tell
+        if name == "03.offset_c" and what in ("NaN", "a masked array"):
+            continue  # there no number is the honest answer: the log does not tell
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             check(name, answer)

@@ -102,6 +102,9 @@ def guarded(action: Callable, *arguments) -> Any:
 
 def given(answer: Any, case: tuple) -> Any:
     """What a function answers for one case, or the value itself; ends the examination where there is none yet."""
+    if isinstance(answer, type):
+        sentence = f"the answer is the class {answer.__name__}; a value or a function is wanted"
+        raise Ended("wrong", sentence, "not numeric")
     got = guarded(answer, *map(copied, case)) if callable(answer) else answer
     if got is None or got is Ellipsis or got is NotImplemented:
         raise Ended("todo", "not yet: no value is returned")

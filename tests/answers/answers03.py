@@ -353,6 +353,7 @@ ANSWERS = {
         ("wrong", "something", np.array([4e-3, -2e-3, 5e-3]), "do not even explain"),
         ("wrong", "one of three", [1e-3, np.nan, np.nan], "none of the three"),
         ("wrong", "a wrong number", 5e-3, "off by"),
+        ("wrong", "it looks calibrated", 0.0, "off by"),
         ("wrong", "two", [np.nan, np.nan], "shape"),
         ("wrong", "complex", 1j * np.ones(3), "complex"),
     ],

@@ -180,7 +180,7 @@ def refusal(answer) -> Result:
     (n,), (error,), _ = rests("offset_c")
     if got.shape in ((), (1,)) and np.all(np.isfinite(got)):
         off = abs(abs(float(got.reshape(()))) - abs(n @ error))
-        if off < 2e-4:
+        if off < 1.2e-4:
             return Result("ok", f"this is eta.offset, the one number that the log tells, within {1e3 * off:.1g} mrad")
         raise Ended("wrong", f"one number is right, eta.offset, but it is off by {1e3 * off:.3g} mrad")
     if got.shape not in ((), (3,)):
