@@ -89,13 +89,22 @@ def _base(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
+def _imported(all_of_them: list[Statement]) -> set[str]:
+    """Names that come from outside; calling what they hold, as in plotting.film(...), changes nothing here."""
+    aliases = [a for s in all_of_them if isinstance(s.node, ast.Import | ast.ImportFrom) for a in s.node.names]
+    return {alias.asname or alias.name.partition(".")[0] for alias in aliases}
+
+
 def _changes(node: ast.stmt) -> set[str]:
     """Names that a statement binds or may change."""
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
         return {node.name}
     names = set()
+    # The variable of a comprehension lives in it alone.
+    loops = (inner for part in ast.walk(node) if isinstance(part, ast.comprehension) for inner in ast.walk(part.target))
+    inside = {id(part) for part in loops}
     for part in ast.walk(node):
-        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store | ast.Del):
+        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store | ast.Del) and id(part) not in inside:
             names.add(part.id)
         elif isinstance(part, ast.Attribute | ast.Subscript) and isinstance(part.ctx, ast.Store):
             names.add(_base(part))
@@ -110,30 +119,51 @@ def _uses(node: ast.stmt) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load)}
 
 
+def _only_calls(node: ast.stmt) -> bool:
+    """True for a statement that is one call for its effect; np.random.seed(1) has one on what follows."""
+    return isinstance(node, ast.Expr) and ".random." not in ast.unparse(node)
+
+
 def _asks(node: ast.stmt) -> bool:
-    """True when a statement checks an answer, whatever the name of the function that does."""
-    return any(
-        (isinstance(part, ast.Name) and part.id == "check")
-        or (isinstance(part, ast.Constant) and isinstance(part.value, str) and _EXERCISE.fullmatch(part.value))
-        for part in ast.walk(node)
-    )
+    """True when a statement checks an answer, whatever the name of the function that does, pictures and hints apart."""
+    parts = list(ast.walk(node))
+    if any(isinstance(part, ast.Name) and part.id == "check" for part in parts):
+        return True
+    texts = [part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)]
+    shown = isinstance(node, ast.Expr) and _base(node.value) in ("plotting", "explore", "hint")
+    return not shown and any(_EXERCISE.fullmatch(text) for text in texts)
 
 
 def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
-    """The statements on which the wanted names and all calls of `check` depend, in their order; imports always."""
-    keep: set[int] = set()
-    names = set(wanted)
-    grown = True
-    while grown:
-        grown = False
-        for i, statement in enumerate(all_of_them):
-            node = statement.node
-            imports = isinstance(node, ast.Import | ast.ImportFrom)
-            if i not in keep and (imports or _asks(node) or _changes(node) & names):
-                keep.add(i)
-                names |= _uses(node)
-                grown = True
-    return [all_of_them[i] for i in sorted(keep)]
+    """The statements on which the wanted names and all calls of `check` depend, in their order; imports always.
+
+    Read from the end: a statement counts when something after it uses what it binds or changes.  What a function uses
+    counts from where the function is called, for it may be bound after the function.
+    """
+    outside = _imported(all_of_them)
+    bodies: dict[str, set[str]] = {}
+    for statement in all_of_them:
+        if isinstance(statement.node, ast.FunctionDef | ast.ClassDef):
+            bodies[statement.node.name] = bodies.get(statement.node.name, set()) | _uses(statement.node)
+    names, kept = _with_bodies(wanted, bodies), []
+    for statement in reversed(all_of_them):
+        node = statement.node
+        changed = _changes(node) - (outside if _only_calls(node) else set())
+        if isinstance(node, ast.Import | ast.ImportFrom) or _asks(node) or changed & names:
+            kept.append(statement)
+            if isinstance(node, ast.Assign):  # what the name held before does not matter
+                names -= {target.id for target in node.targets if isinstance(target, ast.Name)}
+            names |= _with_bodies(_uses(node), bodies)
+    return kept[::-1]
+
+
+def _with_bodies(names: set[str], bodies: dict[str, set[str]]) -> set[str]:
+    """The names, and all that the functions among them use, and the functions among those."""
+    found, new = set(names), set(names)
+    while new:
+        new = set().union(*(bodies.get(name, set()) for name in new)) - found
+        found |= new
+    return found
 
 
 def called(name: str, exercise: Exercise) -> str:
