@@ -188,9 +188,10 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
         return w[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1) @ frame
 
     around, tilts = np.deg2rad(np.linspace(-30.0, 30.0, 241)), np.deg2rad([6.0, 15.0, 25.0])
-    for half, look in ((around >= 0, {"lw": 3.0}), (around <= 0, {"lw": 1.2})):
+    for half, width in ((around >= 0, 3.0), (around <= 0, 1.2)):
         for sign in (1.0, -1.0):
-            ax.plot(*(middle + sign * centre(around[half])).T, color=pair_line(robot, pair)["color"], **look)  # type: ignore
+            x, y = (middle + sign * centre(around[half])).T
+            ax.plot(x, y, color=pair_line(robot, pair)["color"], lw=width)
     for i, end in zip(pair, base, strict=True):
         ax.add_patch(Circle(tuple(end), length, fill=False, color=arm_line(i)["color"], lw=0.9, ls=":"))
         ax.plot(*end, "o", color=arm_line(i)["color"], ms=10, zorder=4)

@@ -130,6 +130,12 @@ def asked(offsets):
     return np.asarray(offsets(robot, x), dtype=float), control_matrix(robot, q), null_vector(robot, q)
 
 
+def along_eta(offsets) -> bool:
+    """True where the offsets of a design are along eta but for 5 %: they fight, and shift nothing."""
+    chosen, _, n = asked(offsets)
+    return bool(np.linalg.norm(chosen - n * (n @ chosen)) < 0.05 * np.linalg.norm(chosen))
+
+
 @functools.cache
 def rests(name: str):
     """Null vectors (k, 3), mean errors and mean torques of the second half of each rest of a log."""
