@@ -163,7 +163,7 @@ def _behaviour(exercise: Exercise, answer: Any) -> Result:
     if callable(answer):
         answer = Answer(answer) if inspect.isroutine(answer) else answer
     else:
-        answer = fitting(numbers(answer), np.shape(exercise.reference))[()]
+        answer = fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
     for sentence, made in exercise.mistakes.items():
         if _true(made, answer):
             raise Ended("wrong", sentence, sentence)

@@ -147,7 +147,7 @@ EXERCISES = {
         points=10.0,
         mistakes={
             "no offsets at all: nothing is seen, and nothing is shifted": lambda f: not np.any(tasks.asked(f)[0]),
-            "these offsets point along eta: this is the part that fights and shifts nothing (the complement)": tasks.along_eta,
+            "these offsets point along eta: this is the part that fights, not the one that shifts": tasks.along_eta,
             "the offsets are 1000 times too large: units, mrad given for rad or mm for m": (
                 lambda f: np.abs(tasks.asked(f)[0]).max() > 1.0
             ),
