@@ -163,7 +163,7 @@ def gain(name: str, value, zero: bool = False) -> np.ndarray:
     zero : also numbers and diagonals that are zero.
     """
     K = real_array(name, value)
-    if K.size == 0:
+    if K.size == 0 or K.ndim > 2:
         raise ValueError(f"{name} has shape {K.shape}; allowed: one number, one per coordinate, or a matrix")
     return bounded(name, K, 0.0, strict=not zero) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
 

@@ -150,7 +150,12 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """
     manipulator(robot)
     t = equidistant(t)
-    x, xd, xdd = (exact_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
+    x, xd, xdd = (real_array(name, v, 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
+    for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
+        if v.shape != (len(t), 2):
+            raise ValueError(
+                f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
+            )
     check_rates(t, x, xd)
     return _follow(robot, t, x, xd, xdd, {"samples": len(t)})
 

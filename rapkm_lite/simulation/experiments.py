@@ -74,10 +74,12 @@ def experiment(source="testbed") -> Experiment:
             if key not in tables[table]:
                 raise ValueError(f"the table [{table}] of {str(source)!r} lacks {key!r}; needed: {', '.join(needed)}")
     control = tables["control"]
+    law = PD(control["K_P"], control["K_D"])
+    law.gains(robot.n_arms)
     path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])
     sensors = Sensors(**tables.get("sensor", {})).of_drives(robot.n_arms)
     faults = tuple(map(read_fault, tables.get("fault", [])))
-    return Experiment(robot, PD(control["K_P"], control["K_D"]), path, sensors, faults)
+    return Experiment(robot, law, path, sensors, faults)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,190 @@
+"""TOML experiments as nobody should write them: each is refused by one sentence, and a name stays in its folder."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite.machine.datafiles import UNITS_OF
+
+# What works, key by key; every case below differs from it in one place.
+GOOD = {
+    "manipulator": {
+        "base": "[[-0.2, 0.0], [0.2, 0.0], [0.0, 0.3]]", "lengths": "0.25", "masses": "0.1", "centers": "0.125",
+        "inertias": "1e-3", "rotor_inertia": "1e-6", "resistance": "0.6", "torque_constant": "0.02",
+        "friction": "4e-3", "friction_velocity": "0.01", "gravity": "[0.0, -9.81]", "load": "0.1", "mode": "1",
+    },
+    "control": {"K_P": "7.0", "K_D": "0.2", "dt": "0.01"},
+    "path": {"side": "0.1", "duration": "0.6", "centre": "[0.0, 0.1]", "angle": "0.1", "rest": "0.05"},
+    "sensor": {"offset": "[1e-3, 0.0, 0.0]", "encoder": "2000", "velocity_filter": "0.002"},
+}  # fmt: skip
+FAULTS = {
+    "DeadDrive": {"drive": "1", "time": "0.1"},
+    "EncoderDropout": {"drive": "1", "start": "0.1", "stop": "0.2"},
+    "OffsetJump": {"drive": "1", "time": "0.1", "jump": "1e-3"},
+    "TorqueLimit": {"limit": "0.5"},
+}
+KEYS = [(table, key) for table, keys in GOOD.items() for key in keys]
+DEEP = "[" * 30 + "1.0" + "]" * 30
+WRONG = [
+    "'abc'", "''", "true", "false", "nan", "-inf", "9" * 400, "1e400", "[]", "[[1.0], [2.0, 3.0]]", "['1.0', '2.0']",
+    "1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "[true, true, true]", "{}", "{value = {value = 1.0}}", "-1e99",
+    "[1.0, nan, 2.0]", DEEP, "'../../etc/passwd'", r'"a\u0000b"',
+]  # fmt: skip
+
+
+def text(changes=(), without=(), table_without=(), more=""):
+    """The tables of GOOD as TOML, with some entries changed or left out."""
+    changes, lines = dict(changes), []
+    for table, keys in GOOD.items():
+        if table in table_without:
+            continue
+        lines.append(f"[{table}]")
+        lines += [f"{k} = {changes.get((table, k), v)}" for k, v in keys.items() if (table, k) not in without]
+    return "\n".join([*lines, more, ""])
+
+
+@pytest.fixture
+def said(tmp_path):
+    """The sentence that refuses a file of this text; one line of printable characters."""
+
+    def of(words, name="mine.toml"):
+        path = tmp_path / name
+        path.write_bytes(words if isinstance(words, bytes) else words.encode())
+        with pytest.raises(ValueError) as caught:
+            rk.experiment(path)
+        sentence = str(caught.value)
+        assert re.search("allowed|needed", sentence), sentence
+        assert not isinstance(caught.value, np.linalg.LinAlgError)
+        assert sentence.isprintable() and len(sentence) < 700, sentence
+        return sentence
+
+    return of
+
+
+def test_the_good_file_is_good(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(text(), encoding="utf-8")
+    assert rk.experiment(path).robot.n_arms == 3
+    units = {(t, k): f"{{value = {v}, unit = '{UNITS_OF[t][k]}'}}" for t, keys in GOOD.items() for k, v in keys.items()}
+    path.write_text(text(units), encoding="utf-8")
+    assert repr(rk.experiment(path)) == repr(rk.experiment(path))
+    for kind, entries in FAULTS.items():
+        fault = "".join(f"{k} = {{value = {v}, unit = '{UNITS_OF['fault'][k]}'}}\n" for k, v in entries.items())
+        path.write_text(text(more=f"[[fault]]\nkind = '{kind}'\n{fault}"), encoding="utf-8")
+        assert type(rk.experiment(path).faults[0]).__name__ == kind
+
+
+def test_every_key_of_every_table_is_tried():
+    assert {t: set(keys) for t, keys in GOOD.items()} == {t: set(k) for t, k in UNITS_OF.items() if t != "fault"}
+    assert {"kind"}.union(*FAULTS.values()) == set(UNITS_OF["fault"])
+
+
+@pytest.mark.parametrize(("table", "key"), KEYS)
+def test_a_unit_is_checked_and_named(said, table, key):
+    for unit in ("'furlong'", "''", "3", "['m']", "true", "'M'"):
+        sentence = said(text({(table, key): f"{{value = {GOOD[table][key]}, unit = {unit}}}"}))
+        assert f"{key} in [{table}] has the unit" in sentence and repr(UNITS_OF[table][key]) in sentence, sentence
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_unit_of_a_fault_is_checked_and_named(said, kind):
+    for key in FAULTS[kind]:
+        entries = FAULTS[kind] | {key: f"{{value = {FAULTS[kind][key]}, unit = 'furlong'}}"}
+        more = f"[[fault]]\nkind = '{kind}'\n" + "".join(f"{k} = {v}\n" for k, v in entries.items())
+        assert f"{key} in [fault] has the unit 'furlong'" in said(text(more=more))
+
+
+@pytest.mark.parametrize(("table", "key"), KEYS)
+def test_a_wrong_value_names_its_key(said, table, key):
+    for value in WRONG:
+        if key in ("angle", "offset") and value == "-1e99":
+            continue  # whatever is finite is an angle
+        sentence = said(text({(table, key): value}))
+        assert re.search(rf"\b{key}\b", sentence), (value, sentence)
+
+
+@pytest.mark.parametrize(("table", "key"), KEYS)
+def test_an_entry_beside_the_value_is_named(said, table, key):
+    assert f"entry of {key} in [{table}] 'origin'" in said(text({(table, key): "{value = 1.0, origin = 'me'}"}))
+    assert f"{key} in [{table}]" in said(text({(table, key): "{unit = 'm'}"}))
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [("manipulator", k) for k in ("base", "lengths", "masses")] + [("control", "K_P"), ("control", "K_D")],
+)
+def test_a_missing_key_is_named(said, table, key):
+    assert re.search(rf"\[{table}\].* lacks '{key}'; needed", said(text(without=[(table, key)])))
+
+
+def test_missing_and_unknown_tables(said):
+    assert "lacks 'base'" in said(text(table_without=["manipulator"]))
+    for table in ("control", "path"):
+        assert f"lacks the table [{table}]" in said(text(table_without=[table]))
+    assert "did you mean 'sensor'?" in said(text(more="[sensors]\noffset = 0.0"))
+    assert "unknown TOML table" in said(text(more='["a\\u0000b/../c"]\nx = 1'))
+    for table in GOOD:
+        assert table in said(text(table_without=[table], more=f"[[{table}]]\nx = 1"))
+        assert table in said(text(table_without=[table], more="").join([f"{table} = 3\n", ""]))
+        assert "unknown TOML key" in said(
+            text(table_without=[table], more=f"[{table}]\nside_length = 1" + _needed(table))
+        )
+    for fault in ("fault = 3", "fault = [3]", "[fault]\nkind = 'DeadDrive'", "[[fault]]", "[[fault]]\nkind = 'Fire'",
+                  "[[fault]]\nkind = 3", "[[fault]]\nkind = 'DeadDrive'\ndrive = 1",
+                  "[[fault]]\nkind = 'DeadDrive'\ndrive = 1\ntime = 0.1\nplace = 2"):  # fmt: skip
+        words = text(more=fault) if fault.startswith("[") else f"{fault}\n{text()}"
+        assert "fault" in said(words).lower() or "DeadDrive" in said(words)
+
+
+def _needed(table):
+    """The keys without which a table is refused before its unknown key is seen."""
+    return "".join(f"\n{k} = {v}" for k, v in GOOD[table].items() if table in ("manipulator", "control"))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [b"", b"\x00", b"\xff\xfe\x00", "a = ".encode("utf-16"), b"[manipulator", b"a = 1\na = 2", b"a = " + b"9" * 5000,
+     b"a = " + b"[" * 5000, b"a = " + b"{a = " * 3000, b"[" + b"a." * 5000 + b"a]\nb = 1",
+     b"name = 3\n", b"about = []\n"],
+    ids=range(12),
+)  # fmt: skip
+def test_what_is_no_experiment_at_all(said, words):
+    said(words)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../data/testbed", "/etc/passwd", "testbed/../testbed", "./testbed", "mystery_runs/gain", "", ".", "..", "a\0b",
+     "~", "testbed\0", "file:///testbed", "x" * 10_000, "testbed.toml/..", "con", "TESTBED ", "\n", "{}", "table1.csv"],
+    ids=range(19),
+)  # fmt: skip
+def test_a_name_stays_in_the_data_folder(name):
+    for read in (rk.load, rk.experiment):
+        with pytest.raises(ValueError, match=r"source = .*there is no data file .*; allowed: a file name") as caught:
+            read(name)
+        assert len(str(caught.value)) < 700
+    with pytest.raises(ValueError, match=r"name = .*there is no data file .*; allowed: a file name"):
+        rk.data_path(name if name != "table1.csv" else "table1")
+
+
+@pytest.mark.parametrize("source", ["a\0b.toml", "nowhere/mine.toml", "x" * 5000 + ".toml", ".toml"], ids=range(4))
+def test_a_path_that_cannot_be_read(source):
+    for read in (rk.load, rk.experiment):
+        with pytest.raises(ValueError, match=r"source: the file .*; allowed: a TOML file"):
+            read(source)
+
+
+def test_a_path_ends_in_toml(tmp_path):
+    for name in ("mine.txt", "mine", "mine.toml.bak", "mine.TOML"):
+        path = tmp_path / name
+        path.write_text(text(), encoding="utf-8")
+        for source in (path, str(path)):
+            with pytest.raises(ValueError, match="there is no data file"):
+                rk.load(source)
+    (tmp_path / "folder.toml").mkdir()
+    with pytest.raises(ValueError, match=r"source: the file .* cannot be read"):
+        rk.load(tmp_path / "folder.toml")
+    assert rk.load(Path(rk.data_path("testbed.toml"))) == rk.load()
