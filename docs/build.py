@@ -19,8 +19,6 @@ sys.path.insert(0, str(HERE))
 from pages import lessons, reference, start  # noqa: E402
 from sphinx.cmd.build import build_main  # noqa: E402
 
-# Where docs/lite.py puts the lessons that run in the browser.
-RUN = "lite/lab/index.html?path=00_start_here.ipynb"
 WORK, SITE = HERE / "_work", HERE / "_site"
 PLAN = """\
 # rapkm_lite
@@ -30,11 +28,12 @@ other as soon as their encoders disagree by a few milliradians. These lessons sh
 away, and control the robot where minimal coordinates fail.
 
 <a href="index.html">Take the machine in your hands</a> first: the start page needs no installation.
-{hosted}
+
 ```{{toctree}}
 :caption: Lessons
 :maxdepth: 1
 
+run
 {lessons}
 lessons/dashboard
 lessons/solutions/index
@@ -56,6 +55,18 @@ reference/index
 
 {develop}
 ```
+"""
+RUN = """\
+# Run the lessons
+
+<!-- here -->
+{hosted}
+On your own machine, in a clone of the repository, with Python 3.11 or newer:
+
+    python -m pip install -r requirements.txt
+    python -m jupyter lab notebooks/00_start_here.ipynb
+
+This takes 860 MB, with compiler and tests. `python -m pip install . jupyterlab` makes do with 550 MB.
 """
 SOLUTIONS = """\
 # Solutions
@@ -98,8 +109,9 @@ def prepare(notebooks: Path, repository: str) -> None:
     listed = "\n".join(f"lessons/{name}" for name in names)
     write(
         WORK / "contents.md",
-        PLAN.format(hosted=hosted(repository), lessons=listed, teaching=plan, develop="\n".join(develop)),
+        PLAN.format(lessons=listed, teaching=plan, develop="\n".join(develop)),
     )
+    write(WORK / "run.md", RUN.format(hosted=hosted(repository)))
 
 
 def hosted(repository: str) -> str:
@@ -111,15 +123,15 @@ def hosted(repository: str) -> str:
         "Colab": f"https://colab.research.google.com/github/{repository}/blob/main/docs/hosted/colab.ipynb",
         "Codespaces": f"https://codespaces.new/{repository}",
     }
-    return "\nRun the lessons on " + ", ".join(f"[{name}]({link})" for name, link in places.items()) + ".\n"
+    return "\nOn other people's machines: " + ", ".join(f"[{name}]({link})" for name, link in places.items()) + ".\n"
 
 
 def pages(folder: Path, name: str) -> list[str]:
     """Copy the pages of a folder; links to files that are no pages lose their link."""
     made = []
     for path in sorted(folder.glob("*.md")):
-        text = lessons.linked(path.read_text(encoding="utf-8"))
-        write(WORK / f"{name}/{path.name}", lessons.without_dead_links(text.replace("```mermaid", "```text"), folder))
+        text = lessons.linked(path.read_text(encoding="utf-8")).replace("```mermaid", "```text")
+        write(WORK / f"{name}/{path.name}", lessons.without_dead_links(text, folder, WORK / name))
         made.append(f"{name}/{path.stem}")
     return [page for page in made if page != "develop/glossary"]
 
@@ -143,7 +155,7 @@ def main() -> int:
         arguments = ["-q", "-b", "html", "-c", str(HERE), "-d", doctrees, *strict, str(WORK), str(SITE)]
         status = build_main(arguments)
     shutil.copy(mathjax(), SITE / "_static/tex-svg.js")
-    (SITE / "index.html").write_text(start.page("contents.html", RUN), encoding="utf-8")
+    (SITE / "index.html").write_text(start.page("contents.html", "run.html"), encoding="utf-8")
     size = sum(path.stat().st_size for path in SITE.rglob("*") if path.is_file())
     print(f"{SITE}: {len(list(SITE.rglob('*.html')))} pages, {size / 1e6:.1f} MB")
     return status

@@ -33,6 +33,7 @@ html_theme = "furo"
 html_title = "rapkm_lite"
 html_static_path = ["pages/static"]
 html_css_files = ["site.css"]
+html_favicon = "pages/static/icon.svg"
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {"navigation_with_keys": True}

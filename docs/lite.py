@@ -35,6 +35,7 @@ SITE = {
     "jupyter-lite-schema-version": 0,
     "jupyter-config-data": {"litePluginSettings": {PLUGIN: {"pyodideUrl": "./static/pyodide/pyodide.js"}}},
 }
+FIRST = "lab/index.html?path=00_start_here.ipynb"
 SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
 
 
@@ -78,7 +79,9 @@ def distribution(source: Path, target: Path) -> None:
         run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT)
         missing = [name for name in NEEDED if name not in packages]
         if missing:
-            run(sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", folder, *missing)
+            # Some also come compiled for the machine that builds; a browser wants the pure ones.
+            pure = "--only-binary=:all:", "--platform=any", "--implementation=py", "--abi=none", "--python-version=3.12"
+            run(sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", *pure, "--dest", folder, *missing)
         added = {}
         for wheel in sorted(Path(folder).glob("*.whl")):
             shutil.copy(wheel, target)
@@ -91,6 +94,16 @@ def distribution(source: Path, target: Path) -> None:
     # Explorers are made by a door of the package, so the widgets come with it; symbolic cells ask for SymPy themselves.
     text = json.dumps(lock, indent=None, separators=(",", ":"))
     (target / "pyodide-lock.json").write_text(text, encoding="utf-8")
+
+
+def link(lite: Path) -> None:
+    """The pages of the site around `lite` that offer the lessons lead to them."""
+    here = f"{lite.name}/{FIRST}"
+    offer = f'<p><a href="{here}">Run lesson 00 here</a>, in this browser; the first start takes a minute.</p>'
+    for name, old, new in (("index.html", 'href="run.html"', f'href="{here}"'), ("run.html", "<!-- here -->", offer)):
+        page = lite.parent / name
+        if page.exists():
+            page.write_text(page.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 
 
 def main() -> int:
@@ -111,6 +124,7 @@ def main() -> int:
         lite = [sys.executable, "-m", "jupyterlite_core.app", "build", "--lite-dir", work, "--contents", work / "files"]
         run(*lite, "--output-dir", options.output.resolve())
     distribution(options.pyodide, options.output / "static/pyodide")
+    link(options.output)
     size = sum(path.stat().st_size for path in options.output.rglob("*") if path.is_file())
     print(f"{options.output}: {size / 1e6:.0f} MB")
     return 0

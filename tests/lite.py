@@ -21,6 +21,8 @@ ERRORS = """[...document.querySelectorAll('.jp-OutputArea-output')].map(e => e.i
 # What each explorer has painted so far, and the pictures of widgets.
 SEEN = """[...document.querySelectorAll('.rapkm')].map(e => e.dataset.drawn).join()
     + [...document.querySelectorAll('.jupyter-widgets img')].map(e => e.src.length).join()"""
+# Nothing but this machine answers.
+OFFLINE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -34,9 +36,11 @@ def drive(context, address: str, notebook: str, limit: float) -> list[str]:
     """What is wrong with a lesson; empty when all is well."""
     wrong: list[str] = []
     page = context.new_page()
-    page.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else wrong.append(r.url))
+    page.set_default_timeout(120_000)
+    # The kernel's worker asks too, not only the page.
+    context.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else wrong.append(r.url))
     page.goto(f"{address}/lab/index.html?path={notebook}")
-    page.wait_for_selector(".jp-Notebook .jp-Cell", timeout=120_000)
+    page.wait_for_selector(".jp-Notebook .jp-Cell")
     page.wait_for_timeout(1500)
     if page.locator(".jp-Dialog .jp-mod-accept").count():
         page.click(".jp-Dialog .jp-mod-accept")
@@ -44,7 +48,7 @@ def drive(context, address: str, notebook: str, limit: float) -> list[str]:
     page.click('text="Run" >> nth=0')
     page.click('.lm-Menu-item:has-text("Run All Cells") >> nth=0')
     started = time.monotonic()
-    page.wait_for_function(f"{WAITING} > 0", timeout=60_000)
+    page.wait_for_function(f"{WAITING} > 0")
     while page.evaluate(WAITING):
         if time.monotonic() - started > limit:
             return [*wrong, f"{page.evaluate(WAITING)} cells still wait after {limit:.0f} s"]
@@ -81,7 +85,7 @@ def main() -> int:
     names = sorted(p.name for p in (options.site / "files").glob("*.ipynb") if p.name.startswith(options.only))
     with sync_playwright() as p:
         path = shutil.which("chromium") or shutil.which("chromium-browser")
-        browser = p.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-dev-shm-usage"])
+        browser = p.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-dev-shm-usage", OFFLINE])
         bad = [
             n
             for n in names

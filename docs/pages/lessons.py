@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from pathlib import Path
@@ -18,6 +19,8 @@ def lesson_of_equation(index: str) -> dict[str, str]:
 
 def linked(text: str) -> str:
     """Links to an anchor inside another page, as HTML: the anchors are no headings, which MyST would look for."""
+    # In the repository the lessons are in notebooks, one or two folders up; on the site in lessons, one up.
+    text = re.sub(r"\]\((?:\.\./)+notebooks/(?=\w+\.(?:md|ipynb))", "](../lessons/", text)
     pattern = re.compile(r"\[([^\]\n]+)\]\(([\w./-]+)\.(?:md|ipynb)#([\w-]+)\)")
     return pattern.sub(r'<a href="\2.html#\3">\1</a>', text)
 
@@ -122,21 +125,27 @@ def _outputs(cell: dict, words: str) -> None:
             continue
         data.pop(WIDGET, None)
         if "image/png" in data:
-            data.pop("text/html", None)
-            plain = "".join(data.pop("text/plain", ""))
-            alt = output.get("metadata", {}).get("image/png", {}).get("alt") or cell["metadata"].get("alt") or words
-            alt = alt[min(len(kept), len(alt) - 1)] if isinstance(alt, list) else alt
-            cell["metadata"]["mystnb"] = {"image": {"alt": alt if "<" not in plain or alt else plain}}
+            page = "".join(data.pop("text/html", ""))
+            data.pop("text/plain", None)
+            alt = re.search(r'<img[^>]* alt="([^"]*)"', page)
+            if "<picture>" in page:
+                # A film moves, and stands still where motion is to be reduced.
+                output["data"] = {"text/html": page}
+            cell["metadata"]["mystnb"] = {"image": {"alt": html.unescape(alt[1]) if alt else words}}
         kept.append(output)
     cell["outputs"] = kept
 
 
-def without_dead_links(text: str, folder: Path) -> str:
-    """Links to pages of the same folder stay; those to other files of the repository become their words."""
+def without_dead_links(text: str, folder: Path, copied: Path) -> str:
+    """Links to pages of the same folder or of the lessons stay; those to other files become their words.
+
+    folder : of the page in the repository.  copied : the folder it goes to, beside that of the lessons.
+    """
 
     def keep(link: re.Match) -> str:
         target = link[2]
-        page = target.endswith(".md") and "/" not in target and (folder / target).exists()
-        return link[0] if page or target.startswith(("http", "#")) else link[1]
+        near = target.endswith(".md") and "/" not in target and (folder / target).exists()
+        lesson = target.startswith("../lessons/") and (copied / target).resolve().exists()
+        return link[0] if near or lesson or target.startswith(("http", "#")) else link[1]
 
     return re.sub(r"(?<!!)\[([^\]\n]+)\]\(([^)\s]+)\)", keep, text)

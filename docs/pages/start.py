@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 
@@ -55,6 +56,7 @@ def script() -> str:
 def page(read: str, run: str) -> str:
     """The whole page; `read` and `run` are the addresses of the site and of the lessons in the browser."""
     css = "\n".join(path.read_text(encoding="utf-8") for path in (EXPLORE / "stage.css", HERE / "page.css"))
-    parts = {"css": css, "read": read, "run": run, "values": json.dumps(values()), "script": script()}
+    icon = "data:image/svg+xml," + quote((HERE.parent / "pages/static/icon.svg").read_text(encoding="utf-8"))
+    parts = {"css": css, "icon": icon, "read": read, "run": run, "values": json.dumps(values()), "script": script()}
     text = (HERE / "index.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(\w+)\}\}", lambda name: parts[name[1]].replace("</script", "<\\/script"), text)

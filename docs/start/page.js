@@ -162,8 +162,8 @@ function picture(dt) {
   const [bars, highest] = drawEnergy(here), [chain, size] = drawForces(at);
   const scale = limit(at.torque.map((c) => 1e3 * c), [30, 60, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
   const frames = {
-    machine: [-285, 285, -270, 300], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -scale, scale],
-    forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, 0, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
+    machine: [-285, 285, -270, 300], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
+    forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
   };
   const saved = 1 - total(here.on) / total(here.off), measured = 1 - total(table1[1]) / total(table1[0]);
   let apart = 0;
@@ -343,9 +343,9 @@ mount($("stage"), {
   labels: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, c.words])),
   panels: {
     machine: { title: "Take the end-effector", aspect: "equal", xticks: [], yticks: [], xlabel: "mm; grey: all forces of drives with at most 40 mN m" },
-    offset: { title: "Encoder errors, mrad: drag", xticks: [] },
+    offset: { title: "Encoder errors, mrad", xticks: [] },
     torque: { xticks: [] },
-    forces: { title: "Their forces, mN, in a chain", aspect: "equal" },
+    forces: { title: "Forces in a chain, mN", aspect: "equal" },
     energy: { title: "Energy of a lap, J", xticks: [] },
     run: { title: "Torques along the path, mN m", xlabel: "time in s" },
   },

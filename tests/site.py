@@ -1,0 +1,148 @@
+"""All pages of a built site in headless Chromium, from disk and from a web server: python -m tests.site docs/_site
+
+Fails on an outside request, a console error, a raw formula, a broken link or anchor, a picture without words,
+horizontal scrolling at 360 px, an open answer, and a search that finds nothing.  --shots FOLDER takes screenshots.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import http.server
+import shutil
+import sys
+import threading
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+from .lite import OFFLINE, Quiet
+
+# Maths is set when MathJax has made a container for each formula.
+READY = "() => document.querySelectorAll('mjx-container').length >= document.querySelectorAll('.math').length"
+LOOK = r"""() => {
+  const wrong = [], all = (what) => [...document.querySelectorAll(what)], words = document.body.cloneNode(true);
+  if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
+  if (all('img').some((i) => !i.alt.trim())) wrong.push('picture without words');
+  if (all('img').some((i) => i.complete && !i.naturalWidth)) wrong.push('broken picture');
+  if (all('mjx-merror, [data-mjx-error]').length) wrong.push('formula with an error');
+  words.querySelectorAll('pre, code, script, style, mjx-container').forEach((e) => e.remove());
+  const raw = words.textContent.match(/\$[^$\n]{1,60}\$|\\[a-zA-Z]{3,}|\\\(/);
+  if (raw) wrong.push(`raw formula ${raw[0]}`);
+  if (all('details.hide[open], details.dig-deeper[open], article details[open]').length) wrong.push('an open answer');
+  return wrong;
+}"""
+# Width, and whether dark.
+VIEWS = [(width, dark) for width in (360, 1024, 1920) for dark in (False, True)]
+SHOWN = (
+    "contents",
+    "lessons/00_start_here",
+    "lessons/04_antagonism_filter_energy",
+    "lessons/equations",
+    "reference/mechanics",
+)
+
+
+class Page(HTMLParser):
+    """Links and anchors of a page."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.links, self.names = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        self.names += [found["id"]] if found.get("id") else []
+        self.links += [found[key] for key in ("href", "src") if found.get(key)]
+
+
+def links(root: Path) -> list[str]:
+    """Links and anchors that lead nowhere, and anchors that stand twice."""
+    made = (path for path in root.rglob("*.html") if path.relative_to(root).parts[0] != "lite")
+    pages, wrong = {path: Page(path.read_text(encoding="utf-8")) for path in made}, []
+    for path, page in pages.items():
+        here = path.relative_to(root)
+        wrong += [f"{here}: two anchors {name}" for name in set(page.names) if page.names.count(name) > 1]
+        for link in page.links:
+            url = urlparse(link)
+            if url.scheme or link.startswith("//"):
+                continue
+            target = (path.parent / unquote(url.path)).resolve() if url.path else path
+            known = pages.get(target)
+            if not target.exists() or (known and url.fragment and unquote(url.fragment) not in known.names):
+                wrong.append(f"{here}: {link}")
+    return wrong
+
+
+def look(context, base: str, name: str, shots: Path | None) -> list[str]:
+    """What is wrong with a page as a visitor sees it."""
+    wrong: list[str] = []
+    page = context.new_page()
+    page.on("request", lambda r: None if r.url.startswith((base, "data:", "blob:")) else wrong.append(r.url))
+    page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda e: wrong.append(str(e)))
+    page.goto(f"{base}/{name}")
+    page.wait_for_function(READY)
+    wrong += page.evaluate(LOOK)
+    if shots:
+        page.screenshot(path=shots / f"{name.replace('/', '_')}-{page.viewport_size['width']}.png")
+    page.close()
+    return [f"{base.split(':')[0]} {name}: {what}" for what in wrong]
+
+
+def search(context, base: str) -> list[str]:
+    """Type into the search box of a page; the first lesson that is found opens."""
+    page = context.new_page()
+    page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
+    page.fill("input[name=q] >> nth=0", "antagonism")
+    page.press("input[name=q] >> nth=0", "Enter")
+    try:
+        page.wait_for_selector("ul.search li a", timeout=60_000)
+        page.click("ul.search li a >> nth=0")
+        page.wait_for_selector("article h1")
+        return []
+    except Exception as error:
+        return [f"{base.split(':')[0]} search: {str(error).splitlines()[0]}"]
+    finally:
+        page.close()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("site", type=Path)
+    parser.add_argument("--shots", type=Path, help="folder for screenshots at three widths, light and dark")
+    options = parser.parse_args()
+    from playwright.sync_api import sync_playwright
+
+    root = options.site.resolve()
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(root)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    bases = root.as_uri(), f"http://127.0.0.1:{server.server_address[1]}"
+    names = sorted(str(path.relative_to(root).as_posix()) for path in root.rglob("*.html"))
+    names = [name for name in names if not name.startswith("lite/")]
+    wrong = links(root)
+    with sync_playwright() as p:
+        path = shutil.which("chromium") or shutil.which("chromium-browser")
+        browser = p.chromium.launch(executable_path=path, args=["--no-sandbox", OFFLINE])
+        for base in bases:
+            context = browser.new_context(viewport={"width": 360, "height": 740})
+            context.set_default_timeout(90_000)
+            wrong += [what for name in names for what in look(context, base, name, None)]
+            wrong += search(browser.new_context(viewport={"width": 1280, "height": 800}), base)
+            context.close()
+        for width, dark in VIEWS if options.shots else ():
+            context = browser.new_context(
+                viewport={"width": width, "height": width * 3 // 4 + 300}, color_scheme="dark" if dark else "light"
+            )
+            folder = options.shots / ("dark" if dark else "light")
+            folder.mkdir(parents=True, exist_ok=True)
+            wrong += [what for name in ("index", *SHOWN) for what in look(context, bases[0], f"{name}.html", folder)]
+            context.close()
+        browser.close()
+    print("\n".join(wrong) or f"{len(names)} pages, from disk and from a web server: well")
+    return 1 if wrong or not names else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
