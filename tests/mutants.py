@@ -1,8 +1,9 @@
 """Does a test notice when the code is wrong?  ``python -m tests.mutants [--count 200] [--seed 1] [--rooms ...]``
 
 Draws places in the rooms mechanics, control and simulation, changes one thing at each (an operator, a comparison, a
-number, a sign, a truth value), and runs the fast tests nearest to the module on a copy of the package.  A change that
-no test notices survives, and is listed with its line.  Words of errors and docstrings are left alone.
+number, a sign, a truth value) in a copy of the package, and runs the fast tests that come by that line: which ones
+those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.  Words
+of errors and docstrings are left alone; changes that change nothing stand with their reason in ``equivalents.txt``.
 """
 
 from __future__ import annotations
@@ -10,82 +11,69 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import json
 import os
 import random
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
+import time
+from collections import defaultdict
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("mechanics", "control", "simulation")
-# The tests nearest to a module first; then those of its room.
-NEAREST = {
-    "closure": ["test_kinematics", "test_properties"],
-    "calibration": ["test_calibration"],
-    "encoders": ["test_calibration"],
-    "rests": ["test_calibration"],
-    "maps": ["test_actuation", "test_bad_input"],
-    "trajectory": ["test_trajectory", "test_bad_input"],
-    "stability": ["test_properties", "test_control", "test_audit"],
-    "explain": ["test_lost_runs"],
-    "faults": ["test_faults"],
-    "sensors": ["test_faults"],
-    "sweeps": ["test_lost_runs", "test_faults"],
-    "chunks": ["test_lost_runs"],
-    "patience": ["test_patience"],
-    "energy": ["test_simulation", "test_audit"],
-}
-NEXT = {
-    "mechanics": [
-        "test_properties",
-        "test_dynamics",
-        "test_kinematics",
-        "test_at",
-        "test_actuation",
-        "test_antagonism",
-    ],
-    "control": ["test_control", "test_laws_with_memory", "test_bad_input"],
-    "simulation": ["test_simulation", "test_faults", "test_lost_runs", "test_laws_with_memory"],
-}
+KNOWN = Path(__file__).with_name("equivalents.txt")
 SWAPS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.GtE, ast.LtE: ast.Gt,
     ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
     ast.Is: ast.IsNot, ast.IsNot: ast.Is,
 }  # fmt: skip
+# What a test that checks the whole house needs besides: it does not read the rooms' code, or not quickly.
+LEFT_OUT = ("test_lessons", "test_storing", "test_nbgrader", "test_grader", "test_rooms", "test_docs", "test_package")
 
 
 class Mutant(NamedTuple):
+    """A module with one change: `lines` are those of the innermost statement that was changed."""
+
     module: Path
+    lines: range
     line: int
+    source: str
     what: str
     text: str
 
+    @property
+    def name(self) -> str:
+        return f"{self.module.relative_to(ROOT / 'rapkm_lite')} | {self.source} | {' '.join(self.what.split())}"
 
-def places(tree: ast.Module) -> list[ast.AST]:
-    """Nodes that can be changed: none in annotations, decorators, docstrings, raised errors and f-strings."""
-    found: list[ast.AST] = []
 
-    def walk(node: ast.AST):
+# Changes.
+def places(tree: ast.Module) -> list[tuple[ast.AST, ast.stmt]]:
+    """Nodes that can be changed, with their statements: none in annotations, docstrings, raised errors, f-strings."""
+    found: list[tuple[ast.AST, ast.stmt]] = []
+
+    def walk(node: ast.AST, statement):
         if isinstance(node, ast.Raise | ast.JoinedStr | ast.AnnAssign | ast.Import | ast.ImportFrom):
             return
+        statement = node if isinstance(node, ast.stmt) else statement
         if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in SWAPS:
-            found.append(node)
+            found.append((node, statement))
         elif isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPS:
-            found.append(node)
+            found.append((node, statement))
         elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
-            found.append(node)
+            found.append((node, statement))
         elif isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
-            found.append(node)
+            found.append((node, statement))
         for name, value in ast.iter_fields(node):
             if name not in ("annotation", "returns", "decorator_list", "type_params"):
                 for child in value if isinstance(value, list) else [value]:
                     if isinstance(child, ast.AST):
-                        walk(child)
+                        walk(child, statement)
 
-    walk(tree)
+    walk(tree, None)
     return found
 
 
@@ -115,59 +103,187 @@ def draw(count: int, seed: int, rooms) -> list[Mutant]:
     mutants = []
     for module, tree, k in random.Random(seed).sample(every, min(count, len(every))):
         other = copy.deepcopy(tree)
-        node = places(other)[k]
+        node, statement = places(other)[k]
+        line: int = getattr(node, "lineno", 0)
+        source = module.read_text(encoding="utf-8").splitlines()[line - 1].strip()
+        # A compound statement ends where its body begins.
+        body = getattr(statement, "body", None)
+        end = body[0].lineno - 1 if isinstance(body, list) and body else statement.end_lineno or statement.lineno
+        lines = range(statement.lineno, max(end, line) + 1)
         what = changed(node)
-        mutants.append(Mutant(module, node.lineno, what, ast.unparse(ast.fix_missing_locations(other))))
+        text = ast.unparse(ast.fix_missing_locations(other))
+        mutants.append(Mutant(module, lines, line, source, what, text))
     return mutants
 
 
-def killed(mutant: Mutant, folder: Path, seconds: int) -> bool:
-    """Does a test notice?  A run that takes too long counts as noticed."""
+# Tests.
+class Tracer:
+    """A plugin for pytest that notes which lines of the rooms each test runs, and for how long it runs."""
+
+    def __init__(self, folder: Path):
+        self.rooms = tuple(f"{folder / 'rapkm_lite' / room}{os.sep}" for room in ROOMS)
+        self.seen: dict[str, dict[str, list]] = {}
+        self.seconds: dict[str, float] = {}
+        self.failed: list[str] = []
+        self.lines: defaultdict[str, set] = defaultdict(set)
+
+    def trace(self, frame, event, argument):
+        name = frame.f_code.co_filename
+        if not name.startswith(self.rooms):
+            return None
+        lines = self.lines[name]
+        lines.add(frame.f_lineno)
+
+        def local(frame, event, argument):
+            lines.add(frame.f_lineno)
+            return local
+
+        return local
+
+    def pytest_runtest_logstart(self, nodeid, location):
+        self.lines = defaultdict(set)
+        self.start = time.perf_counter()
+        sys.settrace(self.trace)
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_runtest_logfinish(self, nodeid, location):
+        sys.settrace(None)
+        self.seconds[nodeid] = time.perf_counter() - self.start
+        self.seen[nodeid] = {Path(name).stem: sorted(lines) for name, lines in self.lines.items()}
+
+
+def inside(folder: Path, seconds: float, work) -> int | None:
+    """What a piece of work returns in a process of its own, silently; None when it takes too long."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.chdir(folder)
+            sys.path.insert(0, str(folder))
+            quiet = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(quiet, 1)
+            os.dup2(quiet, 2)
+            code = int(work())
+        finally:
+            os._exit(code)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.02)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return None
+
+
+def tests_by_line(folder: Path) -> dict:
+    """Trace the fast tests once: their seconds and lines, without those that fail in an unchanged tree."""
+    place = folder / "seen.json"
+    files = [str(p) for p in sorted((folder / "tests").glob("test_*.py")) if p.stem not in LEFT_OUT]
+    files += [str(folder / "rapkm_lite" / room) for room in ROOMS]
+
+    def work():
+        import pytest
+
+        tracer = Tracer(folder)
+        pytest.main(["-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
+        good = {name: seen for name, seen in tracer.seen.items() if name not in tracer.failed}
+        place.write_text(json.dumps({"seen": good, "seconds": tracer.seconds, "failed": tracer.failed}))
+        return 0
+
+    if inside(folder, 3600.0, work) != 0:
+        sys.exit("the fast tests could not be traced; allowed: a tree in which they run")
+    return json.loads(place.read_text())
+
+
+def killed(mutant: Mutant, folder: Path, found: dict, seconds: float) -> bool:
+    """Does a test notice?  The quick tests of the line first, then all of them; too long a run counts as noticed."""
+    stem, wanted = mutant.module.stem, set(mutant.lines)
+    near = [name for name, seen in found["seen"].items() if wanted & set(seen.get(stem, ()))]
+    # What runs on import belongs to every test that comes by the module.
+    near = near or [name for name, seen in found["seen"].items() if stem in seen]
+    near.sort(key=lambda name: found["seconds"][name])
+    if not near:
+        return False
+    quick = near[:40]
+
+    def work():
+        import pytest
+
+        for names in (quick, near[len(quick) :]):
+            if names and pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-m", "fast", *names]) != 0:
+                return 1
+        return 0
+
     place = folder / mutant.module.relative_to(ROOT)
     original = place.read_text(encoding="utf-8")
     place.write_text(mutant.text, encoding="utf-8")
-    stem, room = mutant.module.stem, mutant.module.parent.name
-    names = list(dict.fromkeys([*NEAREST.get(stem, []), *NEXT[room]]))
-    tests = [str(folder / "tests" / f"{name}.py") for name in names]
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "fast", *tests]
-    variables = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
-        done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, timeout=seconds)
-        if done.returncode != 0 and mutant.what == "nothing":
-            print(done.stdout.decode(errors="replace")[-3000:])
-        return done.returncode != 0
-    except subprocess.TimeoutExpired:
-        return True
+        return inside(folder, seconds, work) != 0
     finally:
         place.write_text(original, encoding="utf-8")
+
+
+def equivalents() -> dict[str, str]:
+    """Reasons of changes that change nothing, by the name of the mutant."""
+    if not KNOWN.exists():
+        return {}
+    lines = [line for line in KNOWN.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    return {name.strip(): reason.strip() for name, reason in (line.rsplit(" | ", 1) for line in lines)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=int, default=600, help="patience with one mutant")
+    parser.add_argument("--seconds", type=float, default=120.0, help="patience with one mutant")
+    parser.add_argument("--minutes", type=float, default=1e6, help="draw no more mutants after that time")
     parser.add_argument("--rooms", nargs="*", default=ROOMS, choices=ROOMS)
     given = parser.parse_args()
-    survivors, judged = [], 0
+    end = time.monotonic() + 60.0 * given.minutes
+    survivors, equal, judged, reasons = [], [], 0, equivalents()
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    sys.path[:] = [part for part in sys.path if Path(part or ".").resolve() != ROOT]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for part in ("rapkm_lite", "tests", "data"):
-            shutil.copytree(ROOT / part, folder / part)
-        for part in ("pyproject.toml", "README.md"):
-            shutil.copy2(ROOT / part, folder / part)
-        for room in given.rooms:
-            module = next((ROOT / "rapkm_lite" / room).glob("[!_]*.py"))
-            if killed(Mutant(module, 0, "nothing", module.read_text(encoding="utf-8")), folder, given.seconds):
-                sys.exit(f"the tests of {room} fail without any change; allowed: a tree whose fast tests pass")
+        for part in ("rapkm_lite", "tests", "data", "docs", "notebooks"):
+            shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        for part in ROOT.glob("*.*"):
+            if part.is_file():
+                shutil.copy2(part, folder / part.name)
+        os.environ["PYTHONPATH"] = str(folder)
+        # What every child needs, read once; nothing of the package, which changes.
+        import hypothesis
+        import pytest
+        import scipy.integrate
+        import scipy.optimize  # noqa: F401
+
+        try:
+            import numba  # noqa: F401
+        except ImportError:
+            print(f"without Numba; pytest {pytest.__version__}, hypothesis {hypothesis.__version__}")
+        found = tests_by_line(folder)
+        print(f"{len(found['seen'])} tests, {sum(found['seconds'].values()):.0f} s traced; failed and left out:")
+        print("\n".join(found["failed"]) or "none", flush=True)
         for mutant in draw(given.count, given.seed, given.rooms):
+            if time.monotonic() > end:
+                break
             judged += 1
-            dead = killed(mutant, folder, given.seconds)
             line = f"{mutant.module.relative_to(ROOT)}:{mutant.line}  {' '.join(mutant.what.split())[:150]}"
+            if mutant.name in reasons:
+                equal.append(f"{line}  ({reasons[mutant.name]})")
+                print(f"{judged:4} nothing  {line}", flush=True)
+                continue
+            dead = killed(mutant, folder, found, given.seconds)
             print(f"{judged:4} {'killed  ' if dead else 'SURVIVES'} {line}", flush=True)
-            survivors += [] if dead else [line]
-    print(f"{judged - len(survivors)} of {judged} killed; {len(survivors)} survive:")
-    print("\n".join(survivors))
+            survivors += [] if dead else [f"{line}\n    {mutant.name}"]
+    real = judged - len(equal)
+    print(f"{real - len(survivors)} of {real} killed; {len(survivors)} survive:", *survivors, sep="\n")
+    print(f"{len(equal)} more change nothing:", *equal, sep="\n")
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ def fault(*faults):
 
 
 LONGER = ROBOT.replace(lengths=0.28)
+FIRST = ROBOT.replace(lengths=[[0.28, 0.28], [0.2, 0.2], [0.2, 0.2]])
 SETS = [
     ("working mode", ROBOT, TASK, CIRCLE, mode(1, 1, -1)),
     ("working mode", ROBOT, PD, CIRCLE, mode(1, -1, 1)),
@@ -53,6 +54,9 @@ SETS = [
     ("lengths that are off by 40 %", ROBOT, TASK, TRIANGLE, {"model": LONGER}),
     ("lengths that are off by 40 %", ROBOT, FILTER, TRIANGLE, {"model": LONGER}),
     ("lengths that are off by 40 %", ROBOT, CTC, CIRCLE, {"model": LONGER}),
+    ("lengths that are off by 40 %", ROBOT, FILTER, rk.circle(ROBOT, 0.1, 0.5), {"model": FIRST}),
+    ("lengths that are off by 40 %", ROBOT, rk.AntagonismFilter(mine), rk.circle(ROBOT, 0.1, 0.5), {"model": FIRST}),
+    ("offset = .* is large", ROBOT, rk.AntagonismFilter(mine), HOLD, {"offset": [1.5, -1.5, 1.5]}),
     ("offset = ", ROBOT, FILTER, HOLD, {"offset": [2.5, -2.5, 2.5]}),
     ("offset = ", ROBOT, TASK, HOLD, {"offset": [2.5, -2.5, 2.5]}),
     ("offset = ", ROBOT, REDUNDANT, TRIANGLE, {"offset": [0.5, -0.5, 0.5]}),
@@ -61,6 +65,7 @@ SETS = [
     ("TorqueLimit", HANGING, TASK, HOLD, fault(rk.TorqueLimit(0.02))),
     ("TorqueLimit", HANGING, REDUNDANT, HOLD, fault(rk.TorqueLimit(0.03))),
     ("own limit of 0.05 N m", HANGING, rk.PID(20.0, 10.0, 0.4, 0.05), HOLD, {}),
+    ("own limit of 0.05 N m", HANGING, rk.AntagonismFilter(rk.PID(20.0, 10.0, 0.4, 0.05)), HOLD, {}),
     ("DeadDrive\\(0, 0.2\\)", ROBOT, TASK, TRIANGLE, fault(rk.DeadDrive(0, 0.2), rk.DeadDrive(1, 0.25))),
     ("DeadDrive\\(0, 0.2\\)", ROBOT, REDUNDANT, TRIANGLE, fault(*(rk.DeadDrive(i, 0.2) for i in range(3)))),
     ("DeadDrive\\(0, 0.2\\)", FIVE_BAR, TASK, rk.experiment("five_bar").trajectory, fault(rk.DeadDrive(0, 0.2))),

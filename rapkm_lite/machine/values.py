@@ -43,9 +43,10 @@ if TYPE_CHECKING:
     Array = Field[np.ndarray, ArrayLike]
     FilledArray = Field[np.ndarray, ArrayLike | None]
     OptionalArray = Field[np.ndarray | None, ArrayLike | None]
+    OptionalCount = Field[int | None, float | None]
     OptionalPair = Field[tuple[int, int] | None, Sequence[int] | np.ndarray | None]
 else:
-    Array = FilledArray = OptionalArray = OptionalPair = Any
+    Array = FilledArray = OptionalArray = OptionalCount = OptionalPair = Any
 
 
 def default(value: Any) -> Any:

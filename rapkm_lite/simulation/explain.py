@@ -21,7 +21,6 @@ from ..control.sample import Controller
 from ..machine.arguments import short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
-from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, Plant, encode, single
 from .faults import Fault, TorqueLimit, blank_table
 from .loop import closed_loop
@@ -87,8 +86,10 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
     t, wrong = float(setup.trajectory.t[k]), _difference(setup.model, setup.robot)
     begun = sorted((fault for fault in setup.broken if _begin(fault) <= t), key=_begin)
     if not ours:
-        yield from [f"the controller's model has {wrong}"] if "mode" in wrong else []
+        # Without repeating it: a model that is far off was so from the start, a fault since it began.
+        yield from [f"the controller's model has {wrong}"] if _far_off(setup.model, setup.robot) else []
         yield from map(_words, begun)
+        yield from [f"{_offsets(setup)}, is large"] if np.abs(setup.sensors.offset).max() > 0.1 else []
         return
     factor = growth(setup, law, k)
     if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
@@ -117,9 +118,11 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
             yield f"{_words(fault)}; without that it is not lost"
     if len(begun) > 1 and _runs(_with(setup, []), law, k):
         yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
-    if isinstance(law, PID) and np.isfinite(law.limit).any():
-        if _runs(setup, dataclasses.replace(law, limit=math.inf), k):
-            yield f"the law's own limit of {law.limit.min():g} N m; without it it is not lost"
+    inner = getattr(law, "law", law)
+    if isinstance(inner, PID) and np.isfinite(inner.limit).any():
+        free = dataclasses.replace(inner, limit=math.inf)
+        if _runs(setup, free if inner is law else dataclasses.replace(law, law=free), k):
+            yield f"the law's own limit of {inner.limit.min():g} N m; without it it is not lost"
 
 
 def _singular(setup: Setup, law, k: int) -> Iterator[str]:
@@ -147,8 +150,18 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
     if sensors.encoder is not None and without(encoder=None):
         yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
     if sensors.offset.any() and without(offset=0.0 * sensors.offset):
-        given = f"offset = {short(sensors.offset.tolist())} rad"
-        yield f"{given}, up to {1e3 * np.abs(sensors.offset).max():.3g} mrad, is too large here; without it is not lost"
+        yield f"{_offsets(setup)}, is too large here; without it is not lost"
+
+
+def _offsets(setup: Setup) -> str:
+    offset = setup.sensors.offset
+    return f"offset = {short(offset.tolist())} rad, up to {1e3 * np.abs(offset).max():.3g} mrad"
+
+
+def _far_off(model: Manipulator, robot: Manipulator) -> bool:
+    """Is a model in another working mode, or a length or base point of it wrong by more than 5 % of a link?"""
+    off = max(np.abs(model.lengths - robot.lengths).max(), np.abs(model.base - robot.base).max())
+    return bool(np.any(model.mode != robot.mode)) or off > 0.05 * robot.lengths.min()
 
 
 def _difference(model: Manipulator, robot: Manipulator) -> str:
@@ -191,11 +204,11 @@ def _runs(setup: Setup, law, k: int) -> bool:
     """Does this run go on well beyond sample k?"""
     trajectory = setup.trajectory.for_robot(setup.model)
     rows = slice(k + k // 2 + 100)
-    motion = (getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t"))
+    motion = {name: getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
     faults = setup.faults
     if faults is not None:
         faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
-    setup = setup._replace(trajectory=Trajectory(trajectory.n_arms, *motion, setup.model), faults=faults)  # type: ignore
+    setup = setup._replace(trajectory=dataclasses.replace(trajectory, robot=setup.model, **motion), faults=faults)
     try:
         code = encode(law, setup.model)
         outcome = closed_loop(setup, law)[0] if code is None else single(setup, code)

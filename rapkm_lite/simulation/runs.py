@@ -173,7 +173,7 @@ def simulate(
     >>> rk.simulate(rk.load(), spring, rk.hold(rk.load(), [0.0, 0.0], 0.1), offset=1e-3).c[0].round(4)
     array([-0.007, -0.007, -0.007])
     """
-    given = Sensors(offset, encoder, velocity_filter)  # type: ignore
+    given = Sensors(offset, encoder, velocity_filter)
     if sensors is not None and given != Sensors():
         raise ValueError(f"sensors = {sensors!r} together with {given!r}; allowed: one of both")
     return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..machine.arguments import bounded, exact_array, real_array, whole_number
-from ..machine.values import Array, Value, default
+from ..machine.values import Array, OptionalCount, Value, default
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,7 +25,7 @@ class Sensors(Value):
     """
 
     offset: Array = default(0.0)
-    encoder: int | None = None
+    encoder: OptionalCount = default(None)
     velocity_filter: float | None = None
 
     def __post_init__(self):

@@ -114,7 +114,7 @@ def sweep(
     manipulator(robot)
     chunk = _check_options(failed, chunk, executor, progress)
     laws, offsets = _rows(law, offsets, robot.n_arms)
-    setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)  # type: ignore
+    setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
     in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup.model) is None]
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
@@ -254,6 +254,15 @@ def _result(table: Columns, robot, law, trajectory, offsets, mask: bool) -> Swee
     def column(v: np.ndarray) -> np.ndarray:
         return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
-    columns = map(column, (table.energies, table.torque_norm, table.antagonistic_energy, table.x_final))
-    times = np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN))
-    return Sweep(robot, law, trajectory, offsets, *columns, failed, times)  # type: ignore
+    return Sweep(
+        robot,
+        law,
+        trajectory,
+        offsets,
+        column(table.energies),
+        column(table.torque_norm),
+        column(table.antagonistic_energy),
+        column(table.x_final),
+        failed,
+        np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN)),
+    )
