@@ -28,6 +28,7 @@ GROUPS = {
         "test_lanes",
         "test_nbgrader",
         "test_package",
+        "test_reach",
         "test_skeleton",
         "test_stage_js",
         "test_sweep",
