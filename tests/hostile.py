@@ -31,6 +31,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rapkm_lite as rk
+from rapkm_lite import explore
 
 ROBOT = rk.load()
 PATH = rk.triangle(ROBOT, duration=0.3, dt=0.01)
@@ -45,6 +46,13 @@ LOG = rk.data_path("mystery_runs/gain.csv")
 X = np.linspace(-0.1, 0.1, 12)
 ALONG = np.linspace(0.1, 1.0, 12)
 SWITCHED = rk.simulate(ROBOT, rk.SwitchedCTC(400.0, 40.0), PATH)
+
+
+PICTURE = explore.Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
+
+
+def draw(picture, gain):
+    picture.line("a", [0, 1], [0, gain])
 
 
 def pd(t, q_a, qd_a, desired):
@@ -87,13 +95,20 @@ GOOD: dict[str, Any] = {
     "simulated": ALONG, "theories": {"a": ALONG, "b": ALONG}, "target": 0.5, "jumps": ALONG,
     "log": rk.mystery_run("offset_a"),
     "can_rest": ALONG > 0.5, "magnify": 20.0, "spacing": ALONG, "gap": ALONG, "runs": {"PD": RUN}, "antagonism": False,
-    "table": rk.table1(), "gaps": {"a": ALONG}, "functions": {"a": ALONG}, "rate": ALONG,
+    "table": rk.table1(), "functions": {"a": ALONG}, "rate": ALONG,
     "measured": {"a": ALONG}, "predicted": {"a": ALONG}, "zoom": (-0.1, 0.1, -0.1, 0.1),
     "rules": ("printed", "sigma_min"),
     "gains": ALONG, "without": np.ones((12, 3)), "with_filter": np.ones((12, 3)), "antagonistic": ALONG,
     "centres": np.stack(np.meshgrid(X, X), -1), "samples": {"a": ALONG}, "reference": None, "low": [0.0] * 3,
     "high": [1.0] * 3, "readings": np.full((4, 3), 0.5), "names": ["a", "b", "c"], "marked": 0.015,
     "J": rk.constraint_jacobian(ROBOT, Q), "J_dot": rk.constraint_jacobian_dot(ROBOT, Q, 0.1 * Q),
+    "frames": ALONG, "seconds": 1.0, "alt": "A hand turns.", "panels": 1, "loops": 2, "poster": -1, "dpi": 40.0,
+    "gaps": {"a": ALONG, "b": ALONG}, "poses": {"a": np.stack([Q] * 12), "b": np.stack([Q] * 12)},
+    "part": ALONG, "demand": ALONG, "points": {"a": ALONG}, "share": 0.5, "end": [0.05, 0.0],
+    "radius_of": lambda A, torque: 0.3, "cube": np.ones((12, 12, 12)), "head": ["law", "error in mm"],
+    "picture": PICTURE, "panel": "a", "groups": [([1.0, 2.0, 3.0], {})], "form": ".2f", "width": 0.4,
+    "levels": (0.0, 1.0, 2.0), "light": ("#888888", "#EEEEEE"), "dark": ("#777777", "#333333"),
+    "options": ["a", "b"], "step": 0.5, "steps": 8, "value": 2.0, "controls": {"gain": explore.slider("K", 1, 9, 1, 5)},
     "G": rk.mass_matrix(ROBOT, Q), "C": rk.coriolis_matrix(ROBOT, Q, 0.1 * Q), "Q": np.zeros(6), "N": 3, "m": 3,
     "F_dot": rk.orthogonal_complement_dot(ROBOT, Q, 0.1 * Q),
     "N_dot": rk.nullspace_projector_dot(ROBOT, Q, 0.1 * Q),
@@ -121,9 +136,21 @@ OTHER: dict[tuple[str, str], Any] = {
     ("plot_torque_steps", "friction"): 0.02, ("plot_joint_moves", "start"): [-0.05, 0.0],
     ("plot_joint_moves", "stop"): [0.05, 0.0], ("plot_energies", "rows"): {"a": [1.0, 2.0, 3.0]},
     ("plot_placement", "values"): np.ones((12, 12)), ("lines_per_drive", "values"): RUN.c,
-    ("plot_landscape", "values"): X,
+    
     ("plot_effective_gain", "K"): 400.0, ("switching_map", "rule"): "cross",
-    ("plot_pair_curves", "pairs"): [(0, 1)], ("lines_per_drive", "ax"): plt.figure().add_subplot(),
+    ("plot_pair_curves", "pairs"): [(0, 1)], ("film", "draw"): lambda ax, s: ax.plot([0, 1], [0, s]),
+    ("plot_landscape", "values"): ALONG, ("plot_landscape", "theory"): np.ones((12, 12, 12)),
+    ("plot_five_bar_curves", "start"): [-0.05, 0.0], ("plot_guaranteed_force", "poses"): {"a": Q},
+    ("table", "rows"): [["PD", "1.65"]], ("film_loops", "t"): ALONG, ("film", "rest"): 0.2,
+    **{(name, "low"): 1.0 for name in ("slider", "log_slider")},
+    **{(name, "high"): 9.0 for name in ("slider", "log_slider")},
+    **{(name, "frames"): 12 for name in ("film_force_polygon", "film_three_lines")},
+    **{(name, "ax"): plt.figure().add_subplot() for name in ("lines_per_drive", "plane_axes")},
+    ("plot_lyapunov", "rate"): 0.5,
+    ("choice", "value"): "a", ("switch", "value"): True, ("draw_machine", "names"): True, ("Picture", "setup"): None,
+    **{(name, "panels"): {"a": {"ylim": (0, 2)}} for name in ("explorer", "Picture")}, ("explorer", "draw"): draw,
+    ("Explorer", "draw"): draw, ("Explorer", "play"): None, ("Explorer", "live"): True,
+    ("offset_sliders", "limit"): 8, ("offset_sliders", "values"): [4.0, -2.0, 5.0],
 }  # fmt: skip
 
 
@@ -159,7 +186,9 @@ def bad(good) -> list:
 
 def functions(module) -> Iterator[tuple[str, Any]]:
     """Everything callable that a module shows, and the methods of values that work."""
-    for name in getattr(module, "__all__", None) or [n for n in vars(module) if not n.startswith("_")]:
+    for name in getattr(module, "__all__", None) or [
+        n for n in vars(module) if not n.startswith("_") and n != "guarded"
+    ]:
         thing = getattr(module, name)
         if callable(thing) and not (isinstance(thing, type) and issubclass(thing, BaseException)):
             yield name, thing

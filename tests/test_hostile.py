@@ -44,13 +44,15 @@ def test_there_are_thousands_of_cases(judged):
     assert len(judged[0]) >= (3000 if judged[1] > 0.95 else 60)
 
 
-def test_the_good_arguments_are_good():
+@pytest.mark.parametrize("module", [rk, plotting, explore], ids=MODULES)
+def test_the_good_arguments_are_good(module):
     """The hostile calls differ in one argument from calls that work; a function without such a call is not covered."""
-    for function, thing in hostile.functions(rk):
+    for function, thing in hostile.functions(module):
         arguments = hostile.good_arguments(function, thing)
         assert arguments is not None or function == "Calibration", function
         if arguments is not None:
             thing(**arguments)
+            hostile.plt.close("all")
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def _guard(function: Callable) -> Callable:
                 _check(parameter, given[parameter.name], known)
         try:
             return function(*args, **named)
-        except (AttributeError, TypeError, LookupError, ValueError, np.linalg.LinAlgError) as error:
+        except (ArithmeticError, AttributeError, TypeError, LookupError, ValueError) as error:
             # Curves may be whatever can be drawn; what could not is held to the names.
             for parameter in asked:
                 _check(parameter, given[parameter.name], known)
