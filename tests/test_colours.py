@@ -108,7 +108,7 @@ def test_the_poster_is_the_last_frame_and_paper_stays_white():
 @pytest.mark.parametrize(
     "frames, alt, more, sentence",
     [
-        ([1.0], "A hand.", {}, "frames: 1; allowed"),
+        ([1.0], "A hand.", {}, "frames has 1 steps; allowed"),
         ([0.0, 1.0], " ", {}, "alt = ' '; allowed"),
         ([0.0, 1.0], "A hand.", {"loops": 0}, "loops = 0; allowed"),
     ],

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import ipywidgets as widgets
 
+from ..machine.arguments import exact_array, function, having, of_kind, positive_number, short, whole_number
+from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
 
 def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
     """A slider; whole numbers when all four are.  The label names the unit."""
+    _within(low, high, value)
+    positive_number("step", step)
     whole = all(isinstance(v, int) for v in (low, high, step, value))
     kind = widgets.IntSlider if whole else widgets.FloatSlider
     form = {} if whole else {"readout_format": f".{max(0, math.ceil(-math.log10(step) - 1e-9))}f"}
@@ -19,7 +24,9 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
     """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`."""
-    step = math.log10(high / low) / steps
+    positive_number("low", low)
+    _within(low, high, value)
+    step = math.log10(high / low) / whole_number("steps", steps, 1)
     # A browser moves a value between two steps to the nearer one, so the steps are laid through the value.
     first = math.log10(value) - step * round(math.log10(value / low) / step)
     ends = {"base": 10, "min": first, "max": first + steps * step, "step": step}
@@ -28,7 +35,12 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
 
 def choice(label: str, options, value=None) -> widgets.Widget:
     """A drop-down list of words, or of (word, value) pairs."""
-    options = list(options)
+    if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
+        raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
+    options = list(options.items() if isinstance(options, dict) else options)
+    known = [option[1] if isinstance(option, tuple) else option for option in options]
+    if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
+        raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
     first = options[0][1] if isinstance(options[0], tuple) else options[0]
     return widgets.Dropdown(options=options, value=first if value is None else value, description=label, **_common())
 
@@ -44,6 +56,27 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
         f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(v))
         for i, v in enumerate((tuple(values) * robot.n_arms)[: robot.n_arms])
     }
+
+
+def _within(low: float, high: float, value: float) -> None:
+    """Refuse ends of a slider that are no range, and a value outside."""
+    ends = [float(exact_array(name, v)) for name, v in (("low", low), ("high", high), ("value", value))]
+    if not ends[0] < ends[1]:
+        raise ValueError(f"low = {low!r} and high = {high!r}; allowed: low < high")
+    if not ends[0] <= ends[2] <= ends[1]:
+        raise ValueError(f"value = {value!r}; allowed: low to high, {low!r} to {high!r}")
+
+
+def parts(draw, controls, play, live, about) -> None:
+    """Refuse what is no part of an explorer."""
+    function("draw", draw)
+    for name, widget in of_kind("controls", controls, dict, "a dict of name -> widget").items():
+        having(f"controls[{name!r}]", widget, "a widget with a value, such as slider returns", "value", "observe")
+    if play is not None and (not isinstance(play, str) or play not in controls):
+        raise ValueError(f"play = {short(play)}; allowed: one of {', '.join(controls)}")
+    if live is not None:
+        truth("live", live)
+    of_kind("about", about, str, "text")
 
 
 def player(widget) -> widgets.Widget:

@@ -13,10 +13,10 @@ import ipywidgets as widgets
 import traitlets
 
 from ..figures.marks import Picture, bundle, encode, png, scene
-from ..machine.arguments import ConvergenceError
+from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, check, moved, player, snap, tidied
+from .controls import Shown, check, moved, parts, player, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -64,6 +64,7 @@ def explorer(
     >>> explore.explorer(draw, {"gain": explore.slider("gain in N m/rad", 1, 9, 1, 5)}, {"a": {"xlabel": "time in s"}})
     Explorer(draw: gain = 5)
     """
+    parts(draw, controls, play, live, about)
     parameters = list(inspect.signature(draw).parameters.values())[1:]
     names = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
     rest = len(names) < len(parameters)
@@ -72,8 +73,6 @@ def explorer(
             f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
             f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
         )
-    if play is not None and play not in controls:
-        raise ValueError(f"play = {play!r}; allowed: one of {', '.join(controls)}")
     picture = Picture(panels, layout, widths, size, setup)
     return Explorer(draw, controls, picture, play, COMPILED if live is None else live, about)
 
@@ -86,6 +85,8 @@ class Explorer:
     """
 
     def __init__(self, draw, controls: dict, picture: Picture, play: str | None, live: bool, about: str = ""):
+        parts(draw, controls, play, live, about)
+        of_kind("picture", picture, Picture, "a Picture")
         self.draw, self.controls, self.picture = draw, dict(controls), picture
         self.numbers: dict[str, str] = {}
         self.problem = ""

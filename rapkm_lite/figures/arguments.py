@@ -14,6 +14,7 @@ import numpy as np
 
 from ..machine.arguments import (
     exact_array,
+    function,
     having,
     joint_indices,
     of_kind,
@@ -39,10 +40,10 @@ def guarded(names: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _guard(function: Callable) -> Callable:
-    signature = inspect.signature(function)
+def _guard(picture: Callable) -> Callable:
+    signature = inspect.signature(picture)
 
-    @functools.wraps(function)
+    @functools.wraps(picture)
     def checked(*args, **named):
         given = signature.bind(*args, **named).arguments
         known: Known = dict(given)
@@ -53,16 +54,18 @@ def _guard(function: Callable) -> Callable:
             if parameter.name in _FIRST or str(parameter.annotation) in ("bool", "str", "int", "float"):
                 _check(parameter, given[parameter.name], known)
         try:
-            return function(*args, **named)
+            return picture(*args, **named)
         except (ArithmeticError, AttributeError, TypeError, LookupError, ValueError) as error:
             # Curves may be whatever can be drawn; what could not is held to the names.
             for parameter in asked:
                 _check(parameter, given[parameter.name], known)
+            if isinstance(error, KeyError) and "allowed" in str(error):
+                raise ValueError(error.args[0]) from error  # a KeyError shows its words in quotes
             if "allowed" in str(error) or "needed" in str(error):
                 raise
             words = ", ".join(f"{p.name} = {_size(given[p.name])}" for p in plain)
             raise ValueError(
-                f"{function.__name__} cannot draw {words} ({error}); allowed: values and shapes as its docstring says"
+                f"{picture.__name__} cannot draw {words} ({error}); allowed: values and shapes as its docstring says"
             ) from error
 
     return checked
@@ -85,8 +88,7 @@ def _check(parameter: inspect.Parameter, value, known: Known) -> None:
     elif kind == "float" or isinstance(default, float):
         exact_array(name, value)
     elif kind.startswith("Callable"):
-        if not callable(value) or isinstance(value, type):
-            raise ValueError(f"{name} = {short(value)}; allowed: a function")
+        function(name, value)
     elif name in _RULES:
         _RULES[name](name, value, known)
 

@@ -147,7 +147,7 @@ def film(
     if not alt.strip():
         raise ValueError(f"alt = {alt!r}; allowed: a sentence that says what is seen and what it shows")
     if len(steps) < 2:
-        raise ValueError(f"frames: {len(steps)}; allowed: two or more")
+        raise ValueError(f"frames has {len(steps)} steps; allowed: two or more")
     if loops < 1:
         raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
     with matplotlib.style.context(STYLE):

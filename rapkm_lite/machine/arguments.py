@@ -194,6 +194,13 @@ def of_kind(name: str, value: Any, kind, allowed: str) -> Any:
     return value
 
 
+def function(name: str, value: Any) -> Any:
+    """Return `value` when it can be called, and is no class."""
+    if not callable(value) or isinstance(value, type):
+        raise ValueError(f"{name} = {short(value)}; allowed: a function")
+    return value
+
+
 def having(name: str, value: Any, allowed: str, *attributes: str) -> Any:
     """Return `value`, no class, when it has the attributes that a value of another room would have."""
     if isinstance(value, type) or not all(hasattr(value, attribute) for attribute in attributes):

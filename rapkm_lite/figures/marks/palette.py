@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap, is_color_like, to_hex
+
+from ...machine.arguments import real_array, short
 
 LINE = {
     "color",
@@ -41,9 +44,15 @@ class Palette:
     dark: tuple[str, ...]
 
     def __post_init__(self):
+        levels = real_array("levels", self.levels)
+        if levels.ndim != 1 or np.any(np.diff(levels) <= 0.0):
+            raise ValueError(f"levels = {short(self.levels)}; allowed: numbers (k,) that rise")
+        for name, colours in (("light", self.light), ("dark", self.dark)):
+            if not isinstance(colours, list | tuple) or not all(map(is_color_like, colours)):
+                raise ValueError(f"{name} = {short(colours)}; allowed: a tuple of colours such as '#888888'")
         if not len(self.light) == len(self.dark) == len(self.levels) - 1:
             raise ValueError(
-                f"{len(self.light)} light and {len(self.dark)} dark colours for {len(self.levels)} levels; "
+                f"light has {len(self.light)}, dark {len(self.dark)} colours, levels {len(self.levels)} numbers; "
                 "allowed: one colour of each kind between neighbouring levels"
             )
 

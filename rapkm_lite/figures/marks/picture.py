@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...machine.arguments import bounded, exact_array, function, of_kind, short
 from .palette import Palette, checked
 
 # Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
@@ -38,18 +39,20 @@ class Picture:
     """
 
     def __init__(self, panels: dict, layout=None, widths=None, size=(9.4, 3.3), setup=None):
-        for name, settings in panels.items():
+        for name, settings in of_kind("panels", panels, dict, "a dict of name -> keywords of a panel").items():
+            of_kind(f"panels[{name!r}]", settings, dict, "a dict of keywords")
             unknown = sorted(set(settings) - PANEL)
             if unknown:
                 raise ValueError(f"panel {name!r} has no {unknown[0]!r}; allowed: {', '.join(sorted(PANEL))}")
         self.panels = {name: dict(settings) for name, settings in panels.items()}
-        self.layout = [list(row) for row in layout or [list(panels)]]
-        self.widths = list(widths or [1] * len(self.layout[0]))
-        self.size = tuple(size)
+        self.layout = [list(panels)] if layout is None else _rows(layout, list(panels))
+        columns = len(self.layout[0])
+        self.widths = [1] * columns if widths is None else exact_array("widths", widths, columns).tolist()
+        self.size = tuple(bounded("size", exact_array("size", size, 2), 0.0, strict=True).tolist())
         self.frames = {k: [*p.get("xlim", (0, 1)), *p.get("ylim", (0, 1))] for k, p in panels.items()}
         self.begin()
         if setup is not None:
-            setup(self)
+            function("setup", setup)(self)
         self.fixed = self.marks
         self.begin()
 
@@ -182,3 +185,13 @@ class Picture:
     def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words="") -> None:
         self._check(panel)
         self.marks.append(Mark(kind, panel, data, style, words))
+
+
+def _rows(layout, panels: list) -> list[list]:
+    """The rows of a layout, equally long, of names of panels; "." leaves a place empty."""
+    rows = [list(row) for row in layout if isinstance(row, list | tuple)] if isinstance(layout, list | tuple) else []
+    names = {name for row in rows for name in row if isinstance(name, str)} - {"."}
+    whole = rows and len(rows) == len(layout) and {len(row) for row in rows} == {len(rows[0])}
+    if not whole or names != set(panels):
+        raise ValueError(f"layout = {short(layout)}; allowed: rows of the names {', '.join(map(repr, panels))}")
+    return rows

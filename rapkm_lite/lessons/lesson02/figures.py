@@ -20,6 +20,7 @@ from ...figures.maps import (
     plot_pair_curves,
 )
 from ...figures.style import ALARM, NEUTRAL, arm_line, arm_text_colour, axes_or_new
+from ...machine.arguments import exact_array
 from ...mechanics.actuation import (
     control_matrix,
     distal_cross_products,
@@ -110,7 +111,7 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     guaranteed : radius in N of a disc to draw, the force that is available in every direction.
     """
     ax = axes_or_new(ax, figsize=(3.6, 3.6))
-    A = control_matrix(robot, q)
+    A = control_matrix(robot, exact_array("q", q, robot.n_joints))
     corners = force_polygon(A, torque)
     ax.fill(*corners.T, color="#DCE3EA", zorder=1)
     ax.plot(*np.vstack([corners, corners[:1]]).T, color=NEUTRAL, lw=1.4, zorder=2)
