@@ -37,7 +37,7 @@ def choice(label: str, options, value=None) -> widgets.Widget:
     """A drop-down list of words, or of (word, value) pairs."""
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
         raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
-    options = list(options.items() if isinstance(options, dict) else options)
+    options = list(options)
     known = [option[1] if isinstance(option, tuple) else option for option in options]
     if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
         raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
