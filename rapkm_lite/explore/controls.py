@@ -85,9 +85,8 @@ def player(widget) -> widgets.Widget:
     play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
     # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
     speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
-    shown = widgets.HBox([play, speed])
-    shown.link = widgets.jslink((play, "value"), (widget, "value"))  # type: ignore
-    return shown
+    widgets.jslink((play, "value"), (widget, "value"))
+    return widgets.HBox([play, speed])
 
 
 class Shown(widgets.VBox):
@@ -131,9 +130,8 @@ def snap(widget, value):
 
 def moved(widget, steps: int):
     """The value `steps` steps further on a slider."""
-    if isinstance(widget, widgets.FloatLogSlider):
-        return snap(widget, widget.value * widget.base ** (steps * widget.step))  # type: ignore
-    return snap(widget, widget.value + steps * widget.step)
+    base, way = getattr(widget, "base", None), steps * widget.step
+    return snap(widget, widget.value + way if base is None else widget.value * base**way)
 
 
 def _ends(widget) -> tuple[float, float]:

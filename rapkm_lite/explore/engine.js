@@ -52,7 +52,6 @@ export class Pose {
     }
     return true;
   }
-  /** The angle of drive i. */
   angle(i) { return Math.atan2(this.ay[i], this.ax[i]); }
   /** Move to the least-squares pose of base angles, by Newton steps from here; false where there is none. */
   estimate(angles) {
@@ -83,11 +82,6 @@ export class Pose {
     const det = m11 * m22 - m12 * m12, gx = (m22 * fx - m12 * fy) / det, gy = (m11 * fy - m12 * fx) / det;
     for (let i = 0; i < c.length; i++) c[i] = this.bx[i] * gx + this.by[i] * gy;
     return c;
-  }
-  /** The direction of torques that move nothing, of length one, for three arms: the cross product of A's columns. */
-  nullVector() {
-    const { bx, by } = this, cross = [1, 2, 0].map((j, i) => bx[j] * by[(i + 2) % 3] - bx[(i + 2) % 3] * by[j]);
-    return cross.map((n) => n / Math.hypot(...cross));
   }
   /** Corners of all end-effector forces that torques of at most `torque` make, counter-clockwise. */
   forcePolygon(torque) {

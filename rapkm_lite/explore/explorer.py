@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -90,9 +91,10 @@ class Explorer:
         self.draw, self.controls, self.picture = draw, dict(controls), picture
         self.numbers: dict[str, str] = {}
         self.problem = ""
-        self.about = about or (inspect.getdoc(draw) or "").split("\n")[0]
         # The draw function of a ready-made explorer is local to the function that bears its name.
         self.name = draw.__qualname__.split(".")[0]
+        maker = getattr(sys.modules[draw.__module__], self.name, draw)
+        self.about = about or (inspect.getdoc(draw) or inspect.getdoc(maker) or "").split("\n")[0]
         self._defaults = self.values
         self._held, self._watched, self._slow = False, False, 0
         self._told: dict = {}

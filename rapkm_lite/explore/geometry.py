@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from ..figures import marks
 from ..figures.machine import arm_points, plane_limits
 from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
-from ..figures.marks import Palette, draw_machine, draw_workspace, drive_legend, pair_legend, per_drive
-from ..figures.marks.plane import clamped, singular_curves, workspace_outline
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
@@ -25,7 +24,7 @@ TIME = "time in s"
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
 # Steps of the map on which the arms stand out; weak is far from the colour of the paper.
-MAP = Palette(
+MAP = marks.Palette(
     (0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5),
     ("#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F4F3E4", "#FCFBEE"),
     ("#8A8A94", "#70707C", "#5A5A66", "#474752", "#383842", "#2B2B33", "#202026"),
@@ -47,24 +46,27 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     # An image ends where its last pixels end, half a step beyond their centres.
     wide, tall = (gx[1] - gx[0]) / 2, (gy[1] - gy[0]) / 2
     extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
-    outline, curves = workspace_outline(robot), lru_cache(maxsize=8)(lambda mode: singular_curves(robot, modes[mode]))
+    outline, curves = (
+        marks.workspace_outline(robot),
+        lru_cache(maxsize=8)(lambda mode: marks.singular_curves(robot, modes[mode])),
+    )
     # Outside, where the map is cut off, the value of the nearest point inside.
-    nearest = tuple(distance_transform_edt(~inside, return_distances=False, return_indices=True))  # type: ignore
+    nearest = tuple(np.asarray(distance_transform_edt(~inside, return_distances=False, return_indices=True)))
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ndarray:
         A = act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
-        rows = slice(None) if which[drives] is None else list(which[drives])  # type: ignore
+        rows = list(which[drives] or range(robot.n_arms))
         return on_grid(inside, act.singular_values(A[:, rows])[:, 1])[nearest].filled(0.0)
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
-        point = clamped(robot, 1e-3 * np.array([x, y]))
+        point = marks.clamped(robot, 1e-3 * np.array([x, y]))
         q = inverse_kinematics(robot, point, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
             for curve in curves(mode)[pair]:
                 picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
-        draw_machine(picture, "machine", robot, q)
+        marks.draw_machine(picture, "machine", robot, q)
         picture.handle("machine", *point, x=(1e3, 0), y=(0, 1e3))
         A = act.control_matrix(robot, q)
         numbers = {
@@ -78,7 +80,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             # The distal links that lie almost along each other are what makes a pair weak.
             for i in pair if weak else ():
                 picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
-            draw_machine(picture, name, robot, q, arms=pair, names=False)
+            marks.draw_machine(picture, name, robot, q, arms=pair, names=False)
             words = f"{pair_name(pair)}: {value:.2f} rad/m" + ", parallel" * bool(weak)
             look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
             picture.title(name, words, fontsize=10, **look)
@@ -86,12 +88,8 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         return numbers
 
     plane = plane_limits(robot, 0.05)
-    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {
-        "xticks": [],
-        "yticks": [],
-        "title": " ",
-        "small": True,
-    }
+    bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
+    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | bare
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
     controls = {
         "x": slider("x in mm", -200, 200, 2, 20),
@@ -99,18 +97,9 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         "mode": choice("working mode", modes),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
-    return explorer(
-        draw,
-        controls,
-        panels,
-        layout=[["machine", name] for name in "abc"[: len(pairs)]],
-        widths=[2.7, 1],
-        size=(8.2, 5.4),
-        setup=lambda picture: picture.scale("machine", MAP, "σ_min in rad/m"),
-        live=True,
-        about="The arms on a map of the smallest singular value σ_min of the chosen drives, and the five-bar of each "
-        "pair; where the two distal links of a pair are parallel, the pair grips in one direction only.",
-    )
+    layout = [["machine", name] for name in "abc"[: len(pairs)]]
+    scale = partial(marks.Picture.scale, panel="machine", palette=MAP, label="σ_min in rad/m")
+    return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.4), setup=scale, live=True)
 
 
 def actuation(robot: Manipulator | None = None) -> Explorer:
@@ -137,7 +126,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         k = round(place / 100 * (len(t) - 1))
         share = np.linspace(0, 100, len(t))
         picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
-        draw_machine(picture, "plane", robot, t.q[k])
+        marks.draw_machine(picture, "plane", robot, t.q[k])
         picture.handle("plane", *t.x[k], along=t.x, place=share)
         for i, pair in enumerate(pairs):
             style = pair_line(robot, pair)
@@ -160,24 +149,20 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         return {
             "point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
             "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
-            "σ_min of the pairs": per_drive(sigma[k], 2) + " rad/m",
+            "σ_min of the pairs": marks.per_drive(sigma[k], 2) + " rad/m",
             "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
-            "null vector": per_drive(null[k], 2),
+            "null vector": marks.per_drive(null[k], 2),
         }
 
-    def setup(picture):
-        draw_workspace(picture, "plane", robot)
-        pair_legend(picture, "sigma", robot)
-        drive_legend(picture, "null", robot)
-        picture.legend("force", [("all drives", {"color": AFTER})])
-
+    drives = marks.drive_lines(robot)
     way = {"xlabel": "place on the path in %", "xlim": (0, 100)}
     force = {"xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal", "xlim": (-2, 2), "ylim": (-2, 2)}
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "sigma": {"title": "Pairs", "ylabel": "σ_min in rad/m", "ylim": (0, 8)} | way,
-        "null": {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05)} | way,
-        "force": {"title": "Forces"} | force,
+        "sigma": way
+        | {"title": "Pairs", "ylabel": "σ_min in rad/m", "ylim": (0, 8), "legend": marks.pair_lines(robot)},
+        "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
+        "force": force | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
@@ -185,18 +170,9 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         "size": slider("side or diameter in mm", 40, 320, 5, 240),
         "torque": slider("torque limit in mN m", 20, 200, 5, 85),
     }
-    return explorer(
-        draw,
-        controls,
-        panels,
-        layout=[["plane", "sigma"], ["force", "null"]],
-        widths=[1, 1.35],
-        size=(9.2, 6.6),
-        setup=setup,
-        live=True,
-        about="The machine at a place of its path; how well each pair of drives grips along the path, the components "
-        "of the null vector, and the forces that the drives and each pair can produce.",
-    )
+    layout = [["plane", "sigma"], ["force", "null"]]
+    space = partial(marks.draw_workspace, panel="plane", robot=robot)
+    return explorer(draw, controls, panels, layout=layout, widths=[1, 1.35], size=(9.2, 6.6), setup=space, live=True)
 
 
 def prestress(robot: Manipulator | None = None) -> Explorer:
@@ -214,36 +190,27 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
         wish = 1e-3 * level * np.ones(robot.n_arms)
         stress = matvec(projector, wish)
         c = least + stress
-        for i in range(robot.n_arms):
-            picture.line("without", t.t, 1e3 * least[:, i], **arm_line(i))
-            picture.line("with", t.t, 1e3 * c[:, i], **arm_line(i))
-        top = 1e3 * max(np.abs(c).max(), np.abs(least).max())
-        for panel in ("without", "with"):
-            picture.fit(panel, top)
-            picture.line(panel, t.t[[0, -1]], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=1)
+        for panel, torque in (("without", least), ("with", c)):
+            marks.traces(picture, panel, t.t, 1e3 * torque)
+            picture.fit(panel, 1e3 * c, 1e3 * least)
+            marks.zero_line(picture, panel)
         energy = [t.dt * np.sum(robot.resistance * (v / robot.torque_constant) ** 2) for v in (least, c)]
         return {
-            "changes of sign without": per_drive(sign_changes(least), 0),
-            "with": per_drive(sign_changes(c), 0),
+            "changes of sign without": marks.per_drive(sign_changes(least), 0),
+            "with": marks.per_drive(sign_changes(c), 0),
             "heat without": f"{energy[0]:.2f} J",
             "heat with": f"{energy[1]:.2f} J",
             "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
         }
 
-    def setup(picture):
-        drive_legend(picture, "without", robot)
-        drive_legend(picture, "with", robot)
-
-    panels = {
-        name: {"title": title, "xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
-        for name, title in (("without", "No prestress"), ("with", "With prestress"))
-    }
+    torque = {"xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
+    torque["legend"] = marks.drive_lines(robot)
+    panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
         "side": slider("side of the triangle in mm", 60, 300, 5, 240),
     }
-    about = "Torques of the drives along the triangle, without prestress and with it."
-    return explorer(draw, controls, panels, setup=setup, live=True, about=about)
+    return explorer(draw, controls, panels, live=True)
 
 
 def sign_changes(c: np.ndarray) -> np.ndarray:

@@ -1,20 +1,21 @@
-"""Explorers of the machine at rest under offsets: the steady state of PD control, and the drives' opinions."""
+"""Explorers of offsets: the steady state of PD control, the drives' opinions, the antagonistic energy."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from ..control.laws import PD
+from ..figures import marks
 from ..figures.machine import plane_limits
-from ..figures.marks import bars, clamped, draw_machine, draw_workspace, drive_legend, offset_values, per_drive
-from ..figures.style import NEUTRAL, arm_colour, arm_line
+from ..figures.style import ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
 from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.trajectory import hold
+from ..mechanics.trajectory import hold, triangle
+from ..simulation.energy import antagonism_form
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
@@ -28,49 +29,44 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
-        offset = offset_values(values, N)
+        offset = marks.offset_values(values, N)
         K_P = np.array([values[f"K_P_{i + 1}"] for i in range(N)])
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
         K_D = 0.225 * np.sqrt(K_P / 7.05)
-        point = clamped(robot, 1e-3 * np.array([x, y]))
+        point = marks.clamped(robot, 1e-3 * np.array([x, y]))
         q = inverse_kinematics(robot, point)
         A = act.control_matrix(robot, q)
         theory = 1e3 * steady_state_error(A, K_P, offset)
         torque = 1e3 * steady_state_torque(A, K_P, offset)
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error = 1e3 * run.error
-        draw_machine(picture, "plane", robot, q)
+        marks.draw_machine(picture, "plane", robot, q)
         picture.handle("plane", *point, x=(1e3, 0), y=(0, 1e3))
+        marks.traces(picture, "error", run.t, error)
         for i in range(N):
-            picture.trace("error", run.t, error[:, i], **arm_line(i))
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
         picture.fit("error", error, theory, least=1.0)
-        bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
+        marks.bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
-        bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
+        marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
         picture.fit("torque", 1.25 * torque, least=10.0)
-        for panel in ("rest", "torque"):
-            picture.line(panel, [0.4, N + 0.6], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=4)
         return {
-            "error at rest, theory": per_drive(theory, 2) + " mrad",
-            "simulated": per_drive(error[-1], 2) + " mrad",
+            "error at rest, theory": marks.per_drive(theory, 2) + " mrad",
+            "simulated": marks.per_drive(error[-1], 2) + " mrad",
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
-            "rest torque": per_drive(torque, 1) + " mN m",
+            "rest torque": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W",
         }
 
-    def setup(picture):
-        draw_workspace(picture, "plane", robot)
-        drive_legend(picture, "error", robot)
-        wide = {"color": NEUTRAL, "linewidth": 7}
-        picture.legend("rest", [("theory", wide | {"alpha": 0.45}), ("simulated", wide)])
-
-    drives = {"xticks": range(1, N + 1), "xlabel": "drive", "xlim": (0.4, N + 0.6)}
+    space = partial(marks.draw_workspace, panel="plane", robot=robot)
+    wide = {"color": NEUTRAL, "linewidth": 7}
+    both = [("theory", wide | {"alpha": 0.45}), ("simulated", wide)]
+    lines = marks.drive_lines(robot)
     panels = {
         "plane": plane_limits(robot, 0.05),
-        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5)},
-        "rest": {"ylabel": "error at rest in mrad", **drives},
-        "torque": {"ylabel": "torque at rest in mN m", **drives},
+        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5), "legend": lines},
+        "rest": {"ylabel": "error at rest in mrad", "legend": both, **marks.drive_axis(N)},
+        "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
@@ -80,8 +76,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         "y": slider("y in mm", -200, 230, 2, int(middle[1])),
     }
     layout = [["plane", "error"], ["rest", "torque"]]
-    about = "The machine at rest with calibration offsets: the angle errors settle where theory says, and torques stay."
-    return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=setup, about=about)
+    return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
 
 
 def three_opinions(robot: Manipulator | None = None) -> Explorer:
@@ -90,8 +85,8 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
 
     def draw(picture, x, y, K_P, **offsets):
-        offset = offset_values(offsets, N)
-        A = act.control_matrix(robot, inverse_kinematics(robot, clamped(robot, 1e-3 * np.array([x, y]))))
+        offset = marks.offset_values(offsets, N)
+        A = act.control_matrix(robot, inverse_kinematics(robot, marks.clamped(robot, 1e-3 * np.array([x, y]))))
         torque = 1e3 * steady_state_torque(A, K_P, offset)
         # Drive i is content on the line A_i p = -offset_i of points p about the desired one; all lengths in mm.
         rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset), rcond=None)[0]
@@ -114,26 +109,20 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         picture.line("opinions", 0, 0, color=NEUTRAL, marker="+", markersize=13, markeredgewidth=2, zorder=5)
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}
         picture.line("opinions", *rest, color=NEUTRAL, zorder=6, **tip)
-        bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
+        marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
         picture.fit("torque", 1.25 * torque, least=10.0)
-        picture.line("torque", [0.4, N + 0.6], [0, 0], color=NEUTRAL, linewidth=0.8, zorder=4)
         apart = np.abs(normal @ rest - level)
         return {
             "rest": f"({rest[0] + 0.0:.2f}, {rest[1] + 0.0:.2f}) mm beside the desired point",
-            "distances from the lines": per_drive(apart, 2) + " mm",
-            "torque at rest": per_drive(torque, 1) + " mN m",
+            "distances from the lines": marks.per_drive(apart, 2) + " mm",
+            "torque at rest": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W",
         }
 
     away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": (-3, 3), "ylim": (-3, 3)}
     panels = {
         "opinions": away | {"aspect": "equal", "title": "Where each drive is content"},
-        "torque": {
-            "xlabel": "drive",
-            "ylabel": "torque at rest in mN m",
-            "xticks": range(1, N + 1),
-            "xlim": (0.4, N + 0.6),
-        },
+        "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
     controls |= {
@@ -141,8 +130,75 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         "x": slider("desired x in mm", -100, 100, 5, 20),
         "y": slider("desired y in mm", -100, 100, 5, 30),
     }
-    about = (
-        "A line for each drive: where its measured angle would be right. The end-effector rests between the lines "
-        "(square); the bars from it to the lines are what each drive keeps pulling at."
-    )
-    return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True, about=about)
+    return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
+
+
+# Energies in J of the level lines.
+LEVELS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+
+
+def landscape(robot: Manipulator | None = None) -> Explorer:
+    """Level lines of the antagonistic energy over two offsets, and the share of each principal direction."""
+    robot = frictionless(robot)
+
+    @lru_cache(maxsize=64)
+    def form(side: int, shift: int) -> np.ndarray:
+        path = triangle(robot, 1e-3 * side, dt=0.01, centre=robot.base.mean(axis=0) + [1e-3 * shift, 0.0])
+        return 1e-6 * antagonism_form(robot, path, 1.0)
+
+    circle = np.linspace(0, 2 * np.pi, 181)
+    wheel = np.stack([np.cos(circle), np.sin(circle)])
+
+    def draw(picture, K_P, side, shift, **offsets):
+        if robot.n_arms < 3:
+            raise ValueError(f"this machine has {robot.n_arms} arms and no antagonism; allowed: at least 3 arms")
+        S = K_P**2 * form(side, shift)
+        dq = np.array(list(offsets.values()))
+        # E = (u - u0)^T S11 (u - u0) + rest, with u the first two offsets.
+        S11, S12 = S[:2, :2], S[:2, 2:]
+        centre = -np.linalg.solve(S11, S12 @ dq[2:])
+        rest = dq[2:] @ S[2:, 2:] @ dq[2:] - centre @ S11 @ centre
+        root = np.linalg.inv(np.linalg.cholesky(S11)).T
+        for k, level in enumerate(LEVELS):
+            if level > rest:
+                ring = centre[:, None] + np.sqrt(level - rest) * root @ wheel
+                shade = str(0.62 - 0.55 * k / (len(LEVELS) - 1))
+                picture.line("map", *ring, color=shade, linewidth=1.6)
+                if np.abs(ring[:, 45]).max() < 11:
+                    picture.text("map", *ring[:, 45], f"{level:g} J", fontsize=9, color=shade, va="bottom")
+        picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
+        picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
+        costs, directions = np.linalg.eigh(S)
+        shares = costs * (directions.T @ dq) ** 2
+        for k, share in enumerate(shares):
+            picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
+            picture.text("shares", k + 1, share, f"{share:.2f}", ha="center", va="bottom", fontsize=9)
+        picture.fit("shares", 1.2 * shares, symmetric=False, least=0.5)
+        for i in range(robot.n_arms):
+            for k in range(robot.n_arms):
+                at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
+                component = directions[i, k] * np.sign(directions[:, k].sum() or 1)
+                picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
+        marks.zero_line(picture, "directions")
+        return {
+            "antagonistic energy": f"{dq @ S @ dq:.2f} J",
+            "trace of S": f"{np.trace(S):.3f} J/mrad²",
+            "principal costs": " / ".join(f"{c:.3f}" for c in np.maximum(costs, 0)) + " J/mrad²",
+        }
+
+    arms = [(words, {"color": look["color"], "linewidth": 7}) for words, look in marks.drive_lines(robot)]
+    ticks = {"xlim": (0.5, robot.n_arms + 0.5), "xticks": range(1, robot.n_arms + 1)}
+    ticks |= {"xlabel": "principal direction, cheapest first"}
+    frame = {"xlim": (-12, 12), "ylim": (-12, 12), "aspect": "equal"}
+    panels = {
+        "map": {"xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
+        "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
+        "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.05, 1.05), "legend": arms, **ticks},
+    }
+    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
+    controls |= {
+        "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
+        "side": slider("side of the triangle in mm", 20, 240, 10, 120),
+        "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
+    }
+    return explorer(draw, controls, panels, size=(9.4, 3.8))

@@ -1,4 +1,4 @@
-"""Explorer of a whole run under PD control: torques, errors and energies beside Table 1."""
+"""Explorers of whole runs under PD control: energies beside Table 1, a player, via points and late drives."""
 
 from __future__ import annotations
 
@@ -7,13 +7,18 @@ from functools import lru_cache
 import numpy as np
 
 from ..control.laws import PD, AntagonismFilter, CommandFilter
-from ..figures.marks import bars, drive_legend, offset_values, per_drive
-from ..figures.style import NEUTRAL, arm_line
+from ..figures import marks
+from ..figures.machine import plane_limits
+from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.trajectory import triangle
+from ..mechanics import actuation as act
+from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.trajectory import polygon, triangle
+from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
-from .controls import choice, log_slider, offset_sliders, switch
+from ..simulation.sweeps import sweep
+from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import TIME, frictionless
 
@@ -30,48 +35,38 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     if robot.same_kinematics(load()):
         paths["reading of Table 1"] = experiment("table1_reading").trajectory
     table = measured_energies() if N == 3 else None
-    plain = lru_cache(maxsize=4)(
-        lambda path, on, encoder, K_P, K_D, *offset: (
-            simulate(machines[on], PD(K_P, K_D), paths[path], np.array(offset), encoder or None).energy
-        )
-    )
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
-        offset = offset_values(offsets, N)
+        offset = marks.offset_values(offsets, N)
         run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder or None)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        for i in range(N):
-            picture.trace("torque", run.t, torque[:, i], **arm_line(i))
-            picture.trace("error", run.t, error[:, i], **arm_line(i))
+        marks.traces(picture, "torque", run.t, torque)
+        marks.traces(picture, "error", run.t, error)
         picture.fit("torque", torque, least=50.0)
         picture.fit("error", error, least=5.0)
         groups = [(energy, {})]
         if table is not None:
             groups.append((table[int(filter != "off")], {"alpha": 0.4}))
-        bars(picture, "energy", groups)
+        marks.bars(picture, "energy", groups)
         picture.fit("energy", *(1.15 * v for v, _ in groups), symmetric=False, least=0.5)
-        numbers = {"energy": per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J"}
+        numbers = {"energy": marks.per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J"}
         if filter != "off":
-            before = plain(path, friction, encoder, K_P, K_D, *offset).sum()
+            # Energies alone, for which no history of the run is kept.
+            before = sweep(machines[friction], PD(K_P, K_D), paths[path], [offset], encoder or None).energies.sum()
             numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
         return numbers | {
-            "torque at the end": per_drive(torque[-1], 1) + " mN m",
+            "torque at the end": marks.per_drive(torque[-1], 1) + " mN m",
             "largest torque": f"{np.abs(torque).max():.0f} mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
         }
 
-    def setup(picture):
-        drive_legend(picture, "torque", robot)
-        drive_legend(picture, "error", robot)
-        wide = {"color": NEUTRAL, "linewidth": 7}
-        measured = [("Table 1", wide | {"alpha": 0.4})] if table is not None else []
-        picture.legend("energy", [("this run", wide), *measured])
-
-    time, drives = {"xlabel": TIME, "xlim": (0, 5)}, {"xlim": (0.4, N + 0.6), "xticks": range(1, N + 1)}
+    wide = {"color": NEUTRAL, "linewidth": 7}
+    both = [("this run", wide), ("Table 1", wide | {"alpha": 0.4})][: 1 if table is None else 2]
+    time = {"xlabel": TIME, "xlim": (0, 5), "legend": marks.drive_lines(robot)}
     panels = {
         "torque": {"ylabel": "torque in mN m", **time},
         "error": {"ylabel": "angle error in mrad", **time},
-        "energy": {"xlabel": "drive", "ylabel": "electric energy in J", **drives},
+        "energy": {"ylabel": "electric energy in J", "legend": both, **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
@@ -83,5 +78,122 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         "encoder": choice("encoder counts per turn", counts),
         "path": choice("path", paths.keys()),
     }
-    about = "Torques, angle errors and electric energies of a run of five seconds along the path, with offsets."
-    return explorer(draw, controls, panels, widths=[1.15, 1.15, 1], size=(9.4, 3.6), setup=setup, about=about)
+    return explorer(draw, controls, panels, widths=[1.15, 1.15, 1], size=(9.4, 3.6))
+
+
+# Metres of arrow for 1 N, and the newtons of the arrow that shows it.
+SCALE, UNIT = 0.4, 0.25
+
+
+def animation(robot: Manipulator | None = None) -> Explorer:
+    """The machine moves along the triangle; arrows are the forces of the drives at the end-effector."""
+    robot = frictionless(robot)
+    N = robot.n_arms
+    path = triangle(robot)
+    calibration = {False: np.zeros(N), True: 1e-3 * np.resize([4.0, -2.0, 5.0], N)}
+
+    @lru_cache(maxsize=8)
+    def recorded(filter: str, offsets: bool):
+        run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, calibration[offsets])
+        A = act.control_matrix(robot, run.q)
+        return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
+
+    def draw(picture, time, filter, offsets):
+        run, force, error = recorded(filter, offsets)
+        k = min(round(1e-3 * time / run.dt), len(run.t) - 1)
+        marks.draw_machine(picture, "plane", robot, run.q[k])
+        total = force[k].sum(axis=0)
+        for vector, colour in [*zip(force[k], map(arm_colour, range(N)), strict=True), (total, AFTER)]:
+            picture.arrow("plane", run.x[k], SCALE * vector, 0.009, facecolor=colour, edgecolor="white", zorder=6)
+        picture.handle("plane", *run.x[k], along=path.x[::25], time=1e3 * path.t[::25])
+        for panel, values in (("torque", 1e3 * run.c), ("error", error[:, None])):
+            for i, column in enumerate(values.T):
+                style = arm_line(i) if panel == "torque" else {"color": AFTER}
+                picture.trace(panel, run.t, column, **style)
+                picture.line(panel, run.t[k], column[k], marker="o", markersize=6, color=style["color"], zorder=5)
+            picture.fit(panel, values, symmetric=panel == "torque", least=0.5)
+            picture.line(panel, run.t[[k, k]], picture.ylim(panel), color=NEUTRAL, linewidth=0.9, zorder=1)
+            picture.handle(panel, run.t[k], None, time=(1e3, 0))
+        antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
+        return {
+            "time": f"{run.t[k]:.2f} s",
+            "force on the end-effector": f"{np.hypot(*total):.2f} N",
+            "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
+            "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
+            "path error": f"{error[k]:.2f} mm",
+        }
+
+    def setup(picture):
+        marks.draw_workspace(picture, "plane", robot)
+        picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
+        corner = np.array([picture.xlim("plane")[1] - 1.15 * SCALE * UNIT, picture.ylim("plane")[1] - 0.06])
+        picture.arrow("plane", corner, [SCALE * UNIT, 0], 0.009, facecolor=AFTER)
+        words = {"ha": "center", "va": "bottom", "fontsize": 10}
+        picture.text("plane", corner[0] + SCALE * UNIT / 2, corner[1] + 0.015, f"{UNIT:g} N", **words)
+
+    plane = plane_limits(robot, 0.05) | {"title": "Forces of the drives; black: their sum"}
+    time = {"xlabel": TIME, "xlim": (0, 5)}
+    panels = {
+        "plane": plane,
+        "torque": {"title": "Torque", "ylabel": "torque in mN m", "legend": marks.drive_lines(robot), **time},
+        "error": {"title": "Distance from the path", "ylabel": "path error in mm", **time},
+    }
+    controls = {
+        "time": slider("time in ms", 0, 5000, 40, 400),
+        "filter": choice("antagonism filter", LAWS.keys()),
+        "offsets": switch("calibration offsets 4, −2, 5 mrad", True),
+    }
+    layout = [["plane", "torque"], ["plane", "error"]]
+    return explorer(draw, controls, panels, layout=layout, size=(9.2, 4.8), setup=setup, play="time")
+
+
+WAYS = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
+
+
+def via_points(robot: Manipulator | None = None) -> Explorer:
+    """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press."""
+    robot = frictionless(robot)
+    N, middle = robot.n_arms, robot.base.mean(axis=0)
+    ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
+    path = polygon(robot, ends, duration=3.0, dt=2e-3)
+    share = np.linalg.norm(path.x - ends[0], axis=-1) / np.linalg.norm(ends[1] - ends[0])
+
+    @lru_cache(maxsize=128)
+    def run(legs: int, late: int, filter: bool):
+        at = np.linspace(0, 1, legs + 1)
+        via = np.unwrap(inverse_kinematics(robot, ends[0] + at[:, None] * (ends[1] - ends[0]))[:, :N], axis=0)
+        q_a = np.stack([np.interp(share, at, via[:, i]) for i in range(N)], axis=-1)
+        samples = late // 2
+        q_a[:, 0] = np.concatenate([np.repeat(q_a[:1, 0], samples), q_a[: len(q_a) - samples, 0]])
+        law = PD(7.05, 0.225)
+        return simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
+
+    def draw(picture, legs, late, filter):
+        done = run(legs, late, filter)
+        there = len(path) // 2 + 1
+        off = 1e3 * (done.x - path.x)[:there]
+        null = antagonistic_torque(done)
+        pressing = 1e3 * null
+        for axis in (0, 1):
+            picture.trace("way", 240 * share[:there], off[:, axis], **WAYS[axis][1])
+        picture.fit("way", off, least=1.0)
+        marks.traces(picture, "torque", done.t, pressing)
+        picture.fit("torque", pressing, least=5.0)
+        energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
+        return {
+            "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",
+            "farthest from the edge": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
+            "electric energy": f"{energy:.2f} J, of which antagonism {lost:.3f} J",
+            "at the end": marks.per_drive(pressing[-1], 1) + " mN m",
+        }
+
+    way = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, 240)}
+    torque = {"xlabel": TIME, "ylabel": "torque that only presses in mN m", "xlim": (0, 3)}
+    panels = {"way": way | {"legend": WAYS}, "torque": torque | {"legend": marks.drive_lines(robot)}}
+    counts = [(f"{240 / legs:g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
+    controls = {
+        "legs": choice("distance of the via points", counts, 8),
+        "late": slider("drive 1 late in ms", 0, 10, 2, 0),
+        "filter": switch("antagonism filter"),
+    }
+    return explorer(draw, controls, panels, size=(9.2, 3.8))

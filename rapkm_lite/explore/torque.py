@@ -5,12 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
 from ..figures.maps import pair_line, pair_name
-from ..figures.marks import draw_workspace, drive_legend, offset_values, pair_legend, per_drive, singular_curves
-from ..figures.style import AFTER, ALARM, NEUTRAL, arm_line
+from ..figures.marks import draw_workspace, drive_lines, offset_values, pair_lines, per_drive, singular_curves, traces
+from ..figures.style import AFTER, ALARM, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.trajectory import triangle
@@ -35,11 +36,6 @@ def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
     return norm
 
 
-def distance(points, curve) -> float:
-    """Smallest distance in m between points (k, 2) and points (j, 2)."""
-    return float(np.linalg.norm(points[:, None] - curve[None], axis=-1).min())
-
-
 def computed_torque(robot: Manipulator | None = None) -> Explorer:
     """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves."""
     robot = frictionless(robot)
@@ -58,6 +54,13 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             return CTC(*gains, fixed[word])
         return SwitchedCTC(*gains) if word == "switched pair" else RedundantCTC(*gains)
 
+    @lru_cache(maxsize=64)
+    def distance(law: str, side: int) -> str:
+        """How near the path comes to the points on which the pair is singular."""
+        points = np.concatenate(curves[fixed[law]])
+        gap = cdist(coarse(side).x, points).min()
+        return "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
+
     norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side)))
 
     def draw(picture, law, side, rate, **offsets):
@@ -65,22 +68,18 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.line("plane", *t.x.T, color=AFTER, linewidth=2, zorder=3)
         numbers = {}
         if law in fixed:
-            curve = curves[fixed[law]]
-            for line in curve:
+            for line in curves[fixed[law]]:
                 picture.line("plane", *line.T, color=pair_line(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
-            if curve:
-                gap = distance(t.x, np.concatenate(curve))
-                numbers["distance from its singular curve"] = "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
+            if curves[fixed[law]]:
+                numbers["distance from its singular curve"] = distance(law, side)
         norm = norms(law, side)
         picture.line("map", t.t, norms("redundant coordinates", side), color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", t.t, np.minimum(norm, 1e6), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
-        torque, error = 1e3 * run.c, 1e3 * run.error
-        for i in range(N):
-            picture.trace("torque", run.t, torque[:, i], **arm_line(i))
-            picture.trace("error", run.t, error[:, i], **arm_line(i))
+        torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         for panel, values, least in (("torque", torque, 300.0), ("error", error, 20.0)):
+            traces(picture, panel, run.t, values)
             picture.fit(panel, values, least=least, most=MOST[panel])
             if np.abs(values).max() > picture.ylim(panel)[1]:
                 words = f"goes on to {np.abs(values).max():.0f}"
@@ -90,7 +89,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         return numbers | {
             "largest torque": f"{np.abs(torque).max():.0f} mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
-            "energy": per_drive(run.energy, 2) + f" J, in all {run.energy.sum():.2f} J",
+            "energy": per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J",
         }
 
     def setup(picture):
@@ -98,18 +97,15 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         for pair, lines in curves.items():
             for line in lines:
                 picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
-        pair_legend(picture, "plane", robot)
-        picture.legend("map", [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})])
-        drive_legend(picture, "torque", robot)
-        drive_legend(picture, "error", robot)
 
     low, high = robot.base.min(axis=0) - [0, 0.06], robot.base.max(axis=0) + [0, 0.02]
-    plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal"}
-    time = {"xlabel": TIME, "xlim": (0, 5)}
+    plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
+    time = {"xlabel": TIME, "xlim": (0, 5), "legend": drive_lines(robot)}
+    laws = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
     feedback = {"ylabel": "norm in N m s²/rad", "yscale": "log", "ylim": (1e-3, 1e2)}
     panels = {
         "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1]), "title": "Path"},
-        "map": {"title": "Feedback", **feedback, **time},
+        "map": {"title": "Feedback", **time, **feedback, "legend": laws},
         "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
         "error": {"title": "Error", "ylabel": "angle error in mrad", **time},
     }
@@ -119,8 +115,4 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         "rate": slider("poles at −1/s times", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
     layout = [["plane", "map"], ["torque", "error"]]
-    about = (
-        "A path beside the curves on which a pair of drives is singular, and what computed torque control makes of it: "
-        "the norm of its feedback map, torques and errors."
-    )
-    return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=setup, about=about)
+    return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=setup)

@@ -36,7 +36,7 @@ def guarded(names: dict[str, Any]) -> dict[str, Any]:
     return {
         name: _guard(thing) if inspect.isfunction(thing) and not name.startswith("_") else thing
         for name, thing in names.items()
-        if getattr(thing, "__module__", "").startswith(__package__.split(".")[0])  # type: ignore
+        if getattr(thing, "__module__", "").startswith(__name__.split(".")[0])
     }
 
 

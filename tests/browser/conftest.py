@@ -4,9 +4,10 @@ They are skipped where playwright or a Chromium is missing, unless the environme
 """
 
 import os
+import shutil
 
 import pytest
-from lab import ARGUMENTS, find_browser
+from lab import ARGUMENTS, NOTEBOOKS, find_browser, server
 
 DEMANDED = os.environ.get("RAPKM_LITE_BROWSER") == "1"
 
@@ -14,6 +15,15 @@ DEMANDED = os.environ.get("RAPKM_LITE_BROWSER") == "1"
 def missing(what: str):
     """Skip with the reason, or fail where the browser tests are demanded."""
     (pytest.fail if DEMANDED else pytest.skip)(f"{what}; the browser tests need playwright and a Chromium")
+
+
+@pytest.fixture(scope="session")
+def laboratory(tmp_path_factory):
+    """One JupyterLab for all tests, on a copy of the notebooks: (its folder, url, token)."""
+    folder = tmp_path_factory.mktemp("lab")
+    shutil.copytree(NOTEBOOKS, folder / "root", ignore=shutil.ignore_patterns(".ipynb_checkpoints"))
+    with server(folder / "root", folder) as (url, token):
+        yield folder / "root", url, token
 
 
 # No longer than a module: playwright's event loop would stand in the way of the tests that run notebooks.

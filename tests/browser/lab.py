@@ -15,6 +15,7 @@ import time
 import urllib.request
 from pathlib import Path
 
+NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -43,6 +44,13 @@ window.lab = {
   idle: () => panel().sessionContext.session?.kernel?.status === 'idle',
   runAll: () => jupyterapp.commands.execute('notebook:run-all-cells'),
   restartAndRunAll: async () => { await panel().sessionContext.restartKernel(); await window.lab.runAll(); },
+  // Run one cell and empty the others.
+  runOnly: async i => {
+    const all = panel().content;
+    all.widgets.forEach(cell => cell.model.type === 'code' && cell.model.clearExecution());
+    all.activeCellIndex = i;
+    await jupyterapp.commands.execute('notebook:run-cell');
+  },
   cells: () => panel().content.widgets.filter(c => c.model.type === 'code').map(c => c.model.toJSON()),
   unrun: () => lab.cells().filter(c => c.source && !c.execution_count).length,
   tracebacks: () => [

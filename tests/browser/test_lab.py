@@ -3,26 +3,12 @@
 Skipped where playwright or a Chromium is missing, unless the environment variable RAPKM_LITE_BROWSER is 1.
 """
 
-import shutil
-from pathlib import Path
-
 import pytest
-from lab import Notebook, server
-
-NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
-
-
-@pytest.fixture(scope="module")
-def site(browser, tmp_path_factory):
-    """JupyterLab on a copy of the notebooks."""
-    folder = tmp_path_factory.mktemp("lab")
-    shutil.copytree(NOTEBOOKS, folder / "root", ignore=shutil.ignore_patterns(".ipynb_checkpoints"))
-    with server(folder / "root", folder) as address:
-        yield address
+from lab import NOTEBOOKS, Notebook
 
 
 @pytest.fixture
-def open_notebook(browser, site):
+def open_notebook(browser, laboratory):
     """A function that opens a notebook by the beginning of its name."""
     pages = []
 
@@ -31,7 +17,7 @@ def open_notebook(browser, site):
         if path is None:
             pytest.fail(f"there is no notebook {start}*.ipynb")
         pages.append(browser.new_page(viewport={"width": 1280, "height": 1000}))
-        return Notebook(pages[-1], *site, path.name)
+        return Notebook(pages[-1], *laboratory[1:], path.name)
 
     yield opened
     for page in pages:

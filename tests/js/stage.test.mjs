@@ -5,7 +5,7 @@ import test from "node:test";
 import { pathToFileURL } from "node:url";
 
 const [stage, golden] = [process.env.RAPKM_STAGE, process.env.RAPKM_MESSAGE];
-const { decode, layout, minus, pieces, steps, ticks, wish, wrap } = await import(pathToFileURL(stage));
+const { decode, layout, minus, pieces, steps, ticks, wish } = await import(pathToFileURL(stage));
 const width = (words, size) => 0.6 * size * String(words).length;
 
 test("ticks are round, inside the limits, in equal steps, and few", () => {
@@ -40,33 +40,33 @@ test("subscripts, powers and minus signs are found, hyphens are left", () => {
   assert.deepEqual(pieces("10^−3"), [{ text: "10", shift: 0 }, { text: "−3", shift: 1 }]);
   assert.deepEqual(pieces("σ_min").map((p) => p.text), ["σ", "min"]);
   assert.equal(minus("end-effector at (-60, -69) mm"), "end-effector at (−60, −69) mm");
-  assert.deepEqual(wrap("electric energy in J", 80, (w) => 8 * w.length), ["electric", "energy in", "J"]);
 });
 
 const covers = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
 
 /** The rectangle of words that layout has placed. */
-function rectangle({ words, x, y, size, ha, va, upright }) {
+function rectangle({ words, x, y, size, ha, va }) {
   const wide = width(words, size);
-  const left = -wide * { left: 0, center: 0.5, right: 1 }[ha];
-  const foot = size * { baseline: 0, bottom: -0.25, center: 0.36, top: 0.85 }[va];
-  const [a, b, c, d] = [left, foot - 0.75 * size, left + wide, foot + 0.1 * size];
-  return upright ? [x + b, y - c, x + d, y - a] : [x + a, y + b, x + c, y + d];
+  const left = x - wide * { left: 0, center: 0.5, right: 1 }[ha];
+  const foot = y + size * { center: 0.36, top: 1.05 }[va];
+  return [left, foot - 0.75 * size, left + wide, foot + 0.1 * size];
 }
 
-test("no words of a panel lie on others or are cut, wide or narrow", () => {
-  const legend = ["drive 1", "2", "3", "4"].map((words) => [words, { width: 2, color: "#004488" }]);
-  const scale = [{ levels: [0, 0.5, 1.5, 2.5, 3.5] }, "σ_min in rad/m"];
-  const specs = [
-    { spec: { title: "Torque", xlabel: "time in s", ylabel: "torque in mN m" }, legend },
-    { spec: { title: "Machine and map", xlabel: "x in m", ylabel: "y in m", aspect: "equal" }, scale },
-    { spec: { xlabel: "principal direction, cheapest first", ylabel: "electric energy in J" }, legend: legend.slice(0, 2) },
+test("no numbers around a panel lie on others or are cut, wide or narrow", () => {
+  const scale = { levels: [0, 0.5, 1.5, 2.5, 3.5] };
+  const panels = [
+    [{ xlabel: "time in s", ylabel: "torque in mN m" }],
+    [{ xlabel: "x in m", ylabel: "y in m", aspect: "equal" }, scale],
+    [{ xlabel: "principal direction, cheapest first", xticks: [1, 2, 3] }],
+    [{ yscale: "log" }],
   ];
-  for (const panel of specs)
-    for (const size of [[520, 320], [300, 230], [274, 250]])
-      for (const frame of [[0, 5, -100, 100], [-0.4, 0.4, -0.3, 0.5], [0.4, 3.6, 0, 2.5]].slice(panel.scale ? 1 : 0)) {
-        const plan = layout(panel, frame, size, 14, width);
+  const frames = [[0, 5, -100, 100], [-0.4, 0.4, -0.3, 0.5], [0.4, 3.6, 0.5, 2.5], [0, 5, 1e-3, 1e2]];
+  panels.forEach(([spec, palette], n) => {
+    for (const size of [[480, 260], [260, 200], [220, 190]])
+      for (const frame of [frames.slice(0, 3), frames.slice(1, 3), frames.slice(2, 3), frames.slice(3)][n]) {
+        const plan = layout(spec, palette, frame, size, 13, (words) => width(words, 13));
         const all = plan.texts.map((t) => [t.words, rectangle(t)]);
+        assert.ok(all.length >= 4);
         for (const [words, [a, b, c, d]] of all)
           assert.ok(a >= -1 && b >= -1 && c <= size[0] + 1 && d <= size[1] + 1, `${words} is cut at ${size}: ${[a, b, c, d]}`);
         all.forEach(([words, one], k) =>
@@ -74,16 +74,17 @@ test("no words of a panel lie on others or are cut, wide or narrow", () => {
         );
         assert.ok(plan.box.width > 25 && plan.box.height > 25, `${size}: ${plan.box.width} x ${plan.box.height}`);
       }
+  });
 });
 
 test("a handle wishes the values of its place, and stays on its curve", () => {
   assert.deepEqual(wish({ set: { x: [1e3, 0, 0], y: [0, 1e3, 5] } }, 0.02, 0.03), { x: 20, y: 35 });
   assert.deepEqual(wish({ set: { time: [1e3, 0, 0] }, at: [1, null] }, 0.5, NaN), { time: 500 });
-  const track = Float32Array.from([0, 0, 1, 0, 1, 1]);
-  const set = { place: Float32Array.from([0, 50, 100]) };
-  assert.deepEqual(wish({ track, set }, 0.5, -3), { place: 25 });
-  assert.deepEqual(wish({ track, set }, 9, 0.5), { place: 75 });
-  assert.deepEqual(wish({ track, set }, 9, 9), { place: 100 });
+  const along = [0, 0, 1, 0, 1, 1];
+  const set = { place: [0, 50, 100] };
+  assert.deepEqual(wish({ along, set }, 0.5, -3), { place: 25 });
+  assert.deepEqual(wish({ along, set }, 9, 0.5), { place: 75 });
+  assert.deepEqual(wish({ along, set }, 9, 9), { place: 100 });
 });
 
 test("arrow keys are steps of the controls that a direction moves", () => {
@@ -106,16 +107,16 @@ test("a message from Python is read back number by number", () => {
   });
   const known = { styles: {}, images: {} };
   const read = decode(header, views, known);
-  assert.equal(read.marks.length, marks.length);
-  read.marks.forEach((mark, k) => {
+  assert.equal(read.length, marks.length);
+  read.forEach((mark, k) => {
     assert.equal(mark.kind, marks[k].kind);
     assert.deepEqual(Array.from(mark.points, (v) => (Number.isFinite(v) ? v : null)), marks[k].points);
   });
-  const image = read.marks.find((m) => m.kind === "image");
+  const image = read.find((m) => m.kind === "image");
   const { rows, columns, values } = image.images[image.words[0]];
   assert.equal(values.length, rows * columns);
-  assert.ok(read.handles.length > 0 && read.handles.every((h) => Object.keys(h.set).length > 0));
+  assert.ok(header.handles.length > 0 && header.handles.every((h) => Object.keys(h.set).length > 0));
   // What was sent once is not needed again.
   const later = decode({ ...header, styles: {}, images: {} }, views.slice(0, 1), known);
-  assert.equal(later.marks.find((m) => m.kind === "image").images[image.words[0]].values, values);
+  assert.equal(later.find((m) => m.kind === "image").images[image.words[0]].values, values);
 });

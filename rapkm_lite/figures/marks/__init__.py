@@ -8,7 +8,20 @@
 
 from .encode import decode, encode, scene
 from .palette import Palette
-from .parts import bars, draw_machine, draw_workspace, drive_legend, offset_values, pair_legend, per_drive
+from .parts import (
+    bars,
+    draw_machine,
+    draw_workspace,
+    drive_axis,
+    drive_legend,
+    drive_lines,
+    offset_values,
+    pair_legend,
+    pair_lines,
+    per_drive,
+    traces,
+    zero_line,
+)
 from .picture import Picture
 from .plane import clamped, singular_curves, workspace_outline
 from .stored import bundle, figure, png

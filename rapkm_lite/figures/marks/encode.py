@@ -62,8 +62,8 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
         if handle["along"] is None:
             entry["set"] = {k: [float(v) for v in (*values, 0.0)[:3]] for k, values in handle["set"].items()}
         else:
-            entry["set"], entry["along"] = dict.fromkeys(handle["set"]), len(handle["along"])
-            parts += [np.ravel(handle["along"]), *map(np.ravel, handle["set"].values())]
+            entry["set"] = {k: np.asarray(values).tolist() for k, values in handle["set"].items()}
+            entry["along"] = np.round(handle["along"], 6).ravel().tolist()
         if handle["grip"] is not None:
             entry["grip"] = np.asarray(handle["grip"], dtype=float).tolist()
         handles.append(entry)

@@ -33,20 +33,46 @@ def draw_workspace(picture, panel: str, robot, colour: str = "#EEF2F6") -> None:
     picture.polygon(panel, workspace_outline(robot), zorder=0.2, **look)
 
 
-def drive_legend(picture, panel: str, robot, words: str = "drive") -> None:
-    """A legend of the arms' colours."""
-    names = [f"{words} {i + 1}" if i == 0 else str(i + 1) for i in range(robot.n_arms)]
-    picture.legend(panel, [(name, arm_line(i)) for i, name in enumerate(names)])
+def drive_lines(robot) -> list:
+    """Entries of a legend: the arms' lines."""
+    return [("drive " * (i == 0) + str(i + 1), arm_line(i)) for i in range(robot.n_arms)]
+
+
+def pair_lines(robot) -> list:
+    """Entries of a legend: the first pairs' lines."""
+    pairs = drive_pairs(robot)[:4]
+    return [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)]
+
+
+def drive_legend(picture, panel: str, robot) -> None:
+    """A legend of the arms' lines."""
+    picture.legend(panel, drive_lines(robot))
 
 
 def pair_legend(picture, panel: str, robot) -> None:
     """A legend of the first pairs' lines."""
-    pairs = drive_pairs(robot)[:4]
-    picture.legend(panel, [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)])
+    picture.legend(panel, pair_lines(robot))
+
+
+def traces(picture, panel: str, t, values) -> None:
+    """A curve over time for each drive; values (k, N)."""
+    for i, column in enumerate(values.T):
+        picture.trace(panel, t, column, **arm_line(i))
+
+
+def zero_line(picture, panel: str) -> None:
+    """A thin line where the values are zero."""
+    picture.line(panel, picture.xlim(panel), [0, 0], color=NEUTRAL, linewidth=0.8, zorder=1.5)
+
+
+def drive_axis(n: int) -> dict:
+    """Keywords of a panel with one place for each of n drives."""
+    return {"xlabel": "drive", "xticks": range(1, n + 1), "xlim": (0.4, n + 0.6)}
 
 
 def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") -> None:
-    """Two or more bars per drive with their numbers; groups are (values per drive, keywords of the bar)."""
+    """One or more bars per drive with their numbers; groups are (values per drive, keywords of the bar)."""
+    zero_line(picture, panel)
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
             at = i + 1 + (k - (len(groups) - 1) / 2) * width

@@ -10,7 +10,7 @@ from ...machine.arguments import bounded, exact_array, function, of_kind, short
 from .palette import Palette, checked
 
 # Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
-PANEL = {"title", "xlabel", "ylabel", "xlim", "ylim", "aspect", "xticks", "yticks", "yscale", "small"}
+PANEL = {"title", "xlabel", "ylabel", "xlim", "ylim", "aspect", "xticks", "yticks", "yscale", "small", "legend"}
 
 
 class Mark(NamedTuple):
@@ -26,7 +26,8 @@ class Mark(NamedTuple):
 class Picture:
     """Named panels and the marks that a draw function puts into them at every step.
 
-    panels : name -> keywords of ``Axes.set``: xlabel, ylabel, title, xlim, ylim, aspect, xticks, yticks, yscale.
+    panels : name -> keywords of ``Axes.set``: xlabel, ylabel, title, xlim, ylim, aspect, xticks, yticks, yscale; and
+        legend, the entries of `legend`.
     layout : rows of panel names as in ``Figure.subplot_mosaic``; default one row.
     widths : relative widths of the columns.  size : inches, their ratio is that of the picture.
     setup : function of the picture that draws once what never changes (workspace, legend).
@@ -44,7 +45,7 @@ class Picture:
             unknown = sorted(set(settings) - PANEL)
             if unknown:
                 raise ValueError(f"panel {name!r} has no {unknown[0]!r}; allowed: {', '.join(sorted(PANEL))}")
-        self.panels = {name: dict(settings) for name, settings in panels.items()}
+        self.panels = {name: {k: v for k, v in panel.items() if k != "legend"} for name, panel in panels.items()}
         self.layout = [list(panels)] if layout is None else _rows(layout, list(panels))
         columns = len(self.layout[0])
         self.widths = [1] * columns if widths is None else exact_array("widths", widths, columns).tolist()
@@ -53,6 +54,9 @@ class Picture:
         self.begin()
         if setup is not None:
             function("setup", setup)(self)
+        for name, panel in panels.items():
+            if "legend" in panel:
+                self.legend(name, panel["legend"])
         self.fixed = self.marks
         self.begin()
 
@@ -118,16 +122,16 @@ class Picture:
         same array is given.
         """
         outline = np.empty((0, 2)) if clip is None else np.asarray(clip, dtype=float)
-        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))  # type: ignore
+        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))
 
     def legend(self, panel: str, entries) -> None:
         """A legend above the panel; entries are (words, keywords of a line)."""
         words = [(words, checked("line", {"linewidth": 2, **style})) for words, style in entries]
-        self._add("legend", panel, np.empty((0, 2)), {}, words)  # type: ignore
+        self._add("legend", panel, np.empty((0, 2)), {}, words)
 
     def scale(self, panel: str, palette: Palette, label: str) -> None:
         """The colours of a map with their levels, beside the panel."""
-        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))  # type: ignore
+        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))
 
     def handle(self, panel: str, x, y, /, along=None, grip=None, **controls) -> None:
         """A point of the picture that can be taken by hand and moves controls.
@@ -182,7 +186,7 @@ class Picture:
         if panel not in self.panels:
             raise KeyError(f"there is no panel {panel!r}; allowed: {', '.join(self.panels)}")
 
-    def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words="") -> None:
+    def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words: Any = "") -> None:
         self._check(panel)
         self.marks.append(Mark(kind, panel, data, style, words))
 
