@@ -45,7 +45,7 @@ def result(code=RUN, before="", cwd="/", **environment):
     variables = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg", **environment}
     variables = {name: value for name, value in variables.items() if value is not None}
     done = subprocess.run(
-        [sys.executable, "-c", before + code], env=variables, capture_output=True, text=True, cwd=cwd, timeout=300
+        [sys.executable, "-c", before + code], env=variables, capture_output=True, text=True, cwd=cwd
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr

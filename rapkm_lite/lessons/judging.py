@@ -33,6 +33,8 @@ def _unwrapped(answer: Any) -> Any:
         answer = answer.own
     if answer is None or answer is Ellipsis or answer is NotImplemented:
         raise Ended("todo", "not yet")
+    if inspect.iscoroutinefunction(answer):  # a run would call it and leave what it gets unawaited
+        raise Ended("wrong", "the answer is a coroutine: write def, not async def", "not numeric")
     return answer
 
 
