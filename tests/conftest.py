@@ -26,6 +26,7 @@ GROUPS = {
         "test_locked_down",
         "test_grader",
         "test_lanes",
+        "test_long_runs",
         "test_nbgrader",
         "test_package",
         "test_reach",

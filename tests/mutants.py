@@ -1,4 +1,4 @@
-"""Does a test notice when the code is wrong?  ``python -m tests.mutants [--count 200] [--seed 1] [--rooms ...]``
+"""Does a test notice when the code is wrong?  ``python -m tests.mutants [--count 200] [--seed 1] [--modules ...]``
 
 Draws places in the rooms mechanics, control and simulation, changes one thing at each (an operator, a comparison, a
 number, a sign, a truth value) in a copy of the package, and runs the fast tests that come by that line: which ones
@@ -93,11 +93,13 @@ def changed(node: ast.AST) -> str:
     return f"{before}  ->  {ast.unparse(node)}"
 
 
-def draw(count: int, seed: int, rooms) -> list[Mutant]:
-    """Mutants at random, the same for the same seed."""
+def draw(count: int, seed: int, modules) -> list[Mutant]:
+    """Mutants at random, the same for the same seed; of all modules of the rooms, or of some."""
     every = []
-    for room in rooms:
+    for room in ROOMS:
         for module in sorted((ROOT / "rapkm_lite" / room).glob("[!_]*.py")):
+            if modules and module.stem not in modules:
+                continue
             tree = ast.parse(module.read_text(encoding="utf-8"))
             every += [(module, tree, k) for k in range(len(places(tree)))]
     mutants = []
@@ -180,11 +182,12 @@ def inside(folder: Path, seconds: float, work) -> int | None:
     return None
 
 
-def tests_by_line(folder: Path) -> dict:
+def tests_by_line(folder: Path, names) -> dict:
     """Trace the fast tests once: their seconds and lines, without those that fail in an unchanged tree."""
     place = folder / "seen.json"
     files = [str(p) for p in sorted((folder / "tests").glob("test_*.py")) if p.stem not in LEFT_OUT]
     files += [str(folder / "rapkm_lite" / room) for room in ROOMS]
+    files = [str(folder / "tests" / f"{name}.py") for name in names] or files
 
     def work():
         import pytest
@@ -242,7 +245,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=120.0, help="patience with one mutant")
     parser.add_argument("--minutes", type=float, default=1e6, help="draw no more mutants after that time")
-    parser.add_argument("--rooms", nargs="*", default=ROOMS, choices=ROOMS)
+    parser.add_argument("--modules", nargs="*", default=[], help="change these only, such as calibration")
+    parser.add_argument("--tests", nargs="*", default=[], help="run these files only, such as test_calibration")
     given = parser.parse_args()
     end = time.monotonic() + 60.0 * given.minutes
     survivors, equal, judged, reasons = [], [], 0, equivalents()
@@ -266,10 +270,10 @@ def main() -> None:
             import numba  # noqa: F401
         except ImportError:
             print(f"without Numba; pytest {pytest.__version__}, hypothesis {hypothesis.__version__}")
-        found = tests_by_line(folder)
+        found = tests_by_line(folder, given.tests)
         print(f"{len(found['seen'])} tests, {sum(found['seconds'].values()):.0f} s traced; failed and left out:")
         print("\n".join(found["failed"]) or "none", flush=True)
-        for mutant in draw(given.count, given.seed, given.rooms):
+        for mutant in draw(given.count, given.seed, given.modules):
             if time.monotonic() > end:
                 break
             judged += 1

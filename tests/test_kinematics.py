@@ -138,6 +138,15 @@ def test_close_loops_from_half_a_radian_off():
         assert np.abs(rk.loop_constraints(TESTBED, rk.close_loops(TESTBED, start))).max() < 1e-13
 
 
+def test_close_loops_stays_near_from_far_away():
+    """The pose that was shaken lies in V, so that the nearest one is not further off: steps of turns would lose it."""
+    rng, pose = np.random.default_rng(0), rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    for start, shaken in enumerate(pose + rng.normal(0, 0.6, (59, 6))):
+        if start in (15, 58):
+            distance = np.linalg.norm(rk.close_loops(TESTBED, shaken) - shaken)
+            assert distance <= np.linalg.norm(pose - shaken)
+
+
 def test_close_loops_says_where_it_gave_up():
     with pytest.raises(rk.ConvergenceError, match=r"closure error is .* m"):
         rk.close_loops(TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]))

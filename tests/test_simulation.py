@@ -137,3 +137,12 @@ def test_a_lost_fixed_pair_names_its_singularity():
         rk.simulate(robot, rk.CTC(900.0, 60.0, (1, 2)), rk.triangle(robot), offset=[4e-3, -2e-3, 5e-3])
     # The path crosses the curve of this pair at 2.96 s and 3.53 s.
     assert 2.7 < caught.value.time < 3.0
+
+
+def test_gains_too_weak_for_the_load_are_named():
+    """Without gravity they would do: a hanging machine falls away from its desired pose."""
+    hanging = ROBOT.replace(gravity=[0.0, -9.81])
+    with pytest.raises(
+        rk.SimulationError, match=r"the gains do not hold it: .* grows by the factor 1\.0\d+ per sample"
+    ):
+        rk.simulate(hanging, rk.PD(0.1, 0.01), rk.hold(hanging, [0.0, 0.0], 0.5))

@@ -178,19 +178,20 @@ def add_work(lanes, arms, w):
 
 
 @kernel
-def closed_loops(kind, study, modelled, user, sensor, law, dt, table, faults, w, history, buffer):
+def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, history, buffer):
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled.
     study : None for a single run.  modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
+    clock : a long run is made in parts, whose state is in w; table and history hold those of one part.
     """
+    dt = clock.dt
     lanes, drives, arms, faulty, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
-    samples = len(table) // columns
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
-    for k in range(samples):
-        o = k * columns
+    for row in range(len(table) // columns):
+        k, o = clock.first + row, row * columns
 
         # Sense: the machine as it is, and what the hold will start from.
         if study is not None:
@@ -214,7 +215,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, dt, table, faults, w,
             else:
                 true_pose(lanes, drives, arms, law, w)
         if study is not None:
-            if k + 1 == samples:
+            if k + 1 == clock.samples:
                 return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
@@ -239,8 +240,8 @@ def closed_loops(kind, study, modelled, user, sensor, law, dt, table, faults, w,
         if study is not None:
             add_up(lanes, drives, arms, w)
         else:
-            record(drives, arms, history, w, k)
-        if k + 1 == samples:
+            record(drives, arms, history, w, row)
+        if k + 1 == clock.samples:
             last_torque(drives, arms, w, k)
             return
 

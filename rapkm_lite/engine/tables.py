@@ -22,6 +22,8 @@ JUMP, HELD, ALIVE, LIMITED = range(4)
 # Sizes as `sizes` makes them: runs, drives, arms of a row; an entry for faults; `extra`.
 Kind = namedtuple("Kind", "lanes drives arms faulty extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
+# The sample with which a table begins, the samples of the whole run, and the sampling time.
+Clock = namedtuple("Clock", "first samples dt")
 Law = namedtuple("Law", "form filter posed pose same switched asks")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
@@ -62,10 +64,10 @@ def environment(robot) -> np.ndarray:
 FEW, ALL = 4, 10
 
 
-def motion_table(trajectory, width: int, count: int = ALL) -> np.ndarray:
+def motion_table(trajectory, width: int, count: int = ALL, rows: slice = slice(None)) -> np.ndarray:
     """Desired motion per sample, (k, 6 + count width); arms beyond the machine's are copies of its first one."""
     N = trajectory.n_arms
-    q, qd, qdd = trajectory.q, trajectory.qd, trajectory.qdd
+    x, xd, xdd, q, qd, qdd = (getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd"))
     blocks = [
         q[:, :N],
         qd[:, :N],
@@ -79,7 +81,7 @@ def motion_table(trajectory, width: int, count: int = ALL) -> np.ndarray:
         q[:, N:],
     ]
     arms = _filled(N, width)
-    return np.column_stack([trajectory.x, trajectory.xd, trajectory.xdd, *(block[:, arms] for block in blocks[:count])])
+    return np.column_stack([x, xd, xdd, *(block[:, arms] for block in blocks[:count])])
 
 
 def _filled(N: int, width: int) -> np.ndarray:

@@ -1,13 +1,23 @@
-"""Times and rates of a sampled motion, checked before a path is made of them."""
+"""Times and rates of a sampled motion, checked before a path is made of them; the joint motion of its samples."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
-from ..machine.arguments import positive_number, real_array
+from ..machine.arguments import matvec, positive_number, real_array, short
+from ..machine.manipulator import Manipulator
+from . import cores
+from .kinematics import inverse_kinematics
 
+Motion: TypeAlias = Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""x, xd, xdd (k, 2) of some samples."""
 MOST = 10_000_000
 """Samples of a path: nearly three hours at 1 kHz."""
+PART = 16384
+"""Samples of a path that are looked at together: their matrices fit into a cache, those of minutes not into memory."""
 
 
 def sample_times(duration: float, dt: float) -> np.ndarray:
@@ -44,3 +54,27 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
             f"x moves by {moved[k].round(9).tolist()} m, xd means {meant[k].round(9).tolist()} m; "
             "allowed: the time derivative of x"
         )
+
+
+def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, qd = F xd and qdd = F xdd + Fdot xd, each (k, 2N), for some samples of a path; `before` is the row of q
+    from which the base angles go on, if there is one."""
+    tree, q, N = robot.tree, inverse_kinematics(robot, x), robot.n_arms
+    base = np.concatenate([before[:, :N], q[:, :N]])
+    if np.abs(np.diff(base, axis=0)).max(initial=0.0) >= np.pi:
+        q[:, :N] = np.unwrap(base, axis=0)[len(base) - len(q) :]
+    v = cores.link_vectors(tree, q)
+    lever = cores.inner_levers(tree, v)
+    over = v / lever
+    F = cores.complement(tree, over)
+    qd = matvec(F, xd)
+    F_dot = cores.complement(tree, cores.over_lever_dot(tree, v, lever, over, cores.link_rates(tree, qd), qd))
+    return q, qd, matvec(F, xdd) + matvec(F_dot, xd)
+
+
+def refuse(robot: Manipulator, x, given: dict) -> None:
+    """Raise the error of a path that leaves the workspace, with what the caller was asked for."""
+    try:
+        inverse_kinematics(robot, x)
+    except ValueError as error:
+        raise ValueError(f"{error} (a path with {', '.join(f'{k} = {short(v)}' for k, v in given.items())})") from None

@@ -7,11 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..machine.arguments import check_leading, exact_array, matvec, positive_number, real_array, short, whole_number
+from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
-from ..machine.values import Value, frozen
-from .kinematics import ee_complement, ee_complement_dot, inverse_kinematics
-from .sampling import check_rates, equidistant, sample_times
+from ..machine.values import Value, all_frozen, frozen
+from .sampling import PART, Motion, check_rates, equidistant, joint_motion, refuse, sample_times
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,7 +111,7 @@ class Trajectory(Desired):
         """The same end-effector motion for another machine (other joint angles)."""
         if manipulator(robot).same_kinematics(self.robot):
             return self
-        return _follow(robot, self.t, self.x, self.xd, self.xdd, {"machine": robot})
+        return _follow(robot, self.t, lambda rows: (self.x[rows], self.xd[rows], self.xdd[rows]), {"machine": robot})
 
     def with_set_points(self, q_a, qd_a=None) -> Trajectory:
         """The same path with other set-points for the drives, which need not close the loops (fig. 3).
@@ -157,20 +156,24 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
                 f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
             )
     check_rates(t, x, xd)
-    return _follow(robot, t, x, xd, xdd, {"samples": len(t)})
+    return _follow(robot, t, lambda rows: (x[rows], xd[rows], xdd[rows]), {"samples": len(t)})
 
 
-def _follow(robot: Manipulator, t, x, xd, xdd, given: dict) -> Trajectory:
-    """`follow` without its checks; `given` is what the caller was asked for."""
-    try:
-        q = inverse_kinematics(robot, x)
-    except ValueError as error:
-        raise ValueError(f"{error} (a path with {', '.join(f'{k} = {short(v)}' for k, v in given.items())})") from None
-    q[:, : robot.n_arms] = np.unwrap(q[:, : robot.n_arms], axis=0)
-    F = ee_complement(robot, q)
-    qd = matvec(F, xd)
-    qdd = matvec(F, xdd) + matvec(ee_complement_dot(robot, q, qd), xd)
-    return Trajectory(robot.n_arms, x, xd, xdd, q, qd, qdd, t, robot)
+def _follow(robot: Manipulator, t, motion: Motion, given: dict) -> Trajectory:
+    """`follow` without its checks; `motion` gives x, xd, xdd of some rows, `given` is what the caller was asked for."""
+    columns = [np.empty((len(t), size)) for size in [2, 2, 2, *[robot.n_joints] * 3]]
+    for first in range(0, len(t), PART):
+        rows, before = slice(first, first + PART), columns[3][first - 1 : first]
+        path = motion(rows)
+        try:
+            parts = *path, *joint_motion(robot, *path, before)
+        except ValueError:
+            refuse(robot, motion(slice(None))[0], given)
+            raise
+        for column, part in zip(columns, parts, strict=True):
+            column[rows] = part
+    del column
+    return Trajectory(robot.n_arms, *all_frozen(columns), t=t, robot=robot)
 
 
 def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3, rest: float = 0.0) -> Trajectory:
@@ -197,14 +200,17 @@ def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given:
         raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
     edges = len(corners)
     edge_time = (duration - 2 * rest) / edges
-    phase = np.clip((t - rest) / edge_time, 0.0, edges)
-    edge = np.minimum(np.floor(phase).astype(int), edges - 1)
-    s = phase - edge
     ends = np.roll(corners, -1, axis=0)
-    way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
-    step = (ends - corners)[edge]
-    x = corners[edge] + way[:, None] * step
-    return _follow(robot, t, x, rate[:, None] * step / edge_time, rate_dot[:, None] * step / edge_time**2, given)
+
+    def motion(rows: slice):
+        phase = np.clip((t[rows] - rest) / edge_time, 0.0, edges)
+        edge = np.minimum(np.floor(phase).astype(int), edges - 1)
+        s = (phase - edge)[:, None]
+        way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+        step = (ends - corners)[edge]
+        return corners[edge] + way * step, rate * step / edge_time, rate_dot * step / edge_time**2
+
+    return _follow(robot, t, motion, given)
 
 
 def triangle(
@@ -243,16 +249,18 @@ def circle(
     manipulator(robot)
     radius = positive_number("radius", radius)
     t = sample_times(duration, dt)
-    s = t / duration
-    full = 2 * np.pi * positive_number("turns", turns)
-    angle = full * s**3 * (10 - 15 * s + 6 * s * s)
-    rate = full / duration * 30 * (s * (1 - s)) ** 2
-    rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
-    u = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
-    x = exact_array("centre", centre, 2) + radius * u
-    xdd = radius * (rate_dot[:, None] * v - rate[:, None] ** 2 * u)
-    return _follow(robot, t, x, radius * rate[:, None] * v, xdd, {"radius": radius, "centre": centre})
+    full, middle = 2 * np.pi * positive_number("turns", turns), exact_array("centre", centre, 2)
+
+    def motion(rows: slice):
+        s = t[rows, None] / duration
+        angle = full * s**3 * (10 - 15 * s + 6 * s * s)
+        rate = full / duration * 30 * (s * (1 - s)) ** 2
+        rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
+        u = np.concatenate([np.cos(angle), np.sin(angle)], axis=-1)
+        v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
+        return middle + radius * u, radius * rate * v, radius * (rate_dot * v - rate**2 * u)
+
+    return _follow(robot, t, motion, {"radius": radius, "centre": centre})
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
@@ -264,5 +272,5 @@ def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Traj
     """
     manipulator(robot)
     t = sample_times(duration, dt)
-    still = np.zeros((len(t), 2))
-    return _follow(robot, t, still + exact_array("x", x, 2), still, still, {"x": x})
+    still, point = np.zeros((len(t), 2)), exact_array("x", x, 2)
+    return _follow(robot, t, lambda rows: (still[rows] + point, still[rows], still[rows]), {"x": x})

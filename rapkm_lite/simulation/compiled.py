@@ -10,6 +10,8 @@ import numpy as np
 from ..control.compiled_law import CompiledLaw
 from ..engine import COMPILED, compiled, tables, without_compiler
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
+from ..machine.values import all_frozen
+from ..mechanics.sampling import PART
 from .codes import Code, code_of
 from .patience import patience
 from .setup import Outcome, Setup
@@ -31,10 +33,9 @@ def encode(law: Any, model) -> Code | None:
 def single(setup: Setup, code: Code) -> Outcome:
     """One run with its history."""
     samples, N = len(setup.trajectory), setup.robot.n_arms
-    log = np.zeros((samples, 6 + 3 * N))
-    w = _run(setup, [code], setup.sensors.offset[None], log)
-    states, q_a, qd_a, c, pairs = np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1)
-    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), states, q_a, qd_a, c, pairs.astype(int))
+    history = [np.zeros((samples, size)) for size in (4, N, N, N)] + [np.zeros((samples, 2), np.int32)]
+    w = _run(setup, [code], setup.sensors.offset[None], history)
+    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *all_frozen(history))
 
 
 def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -75,7 +76,10 @@ def _sums(setup: Setup, w) -> tuple:
 
 
 def _run(setup: Setup, codes: list[Code], offsets, history):
-    """Run as many runs as there are codes side by side; returns a function that gives the rows of the work table."""
+    """Run as many runs as there are codes side by side; returns a function that gives the rows of the work table.
+
+    history : None for a study; the columns of an `Outcome` for a single run.
+    """
     from ..engine import rows
     from ..engine.loop import closed_loops
 
@@ -112,31 +116,27 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
     modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < form < tables.USER else None
-    desired = _short_motion if modelled is None and user is None else _motion
-    w, log = tables.plain(work), tables.plain(np.empty(0) if history is None else history.reshape(-1))
+    count = tables.FEW if modelled is None and user is None else tables.ALL
+    sensor, faulty = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
+    samples, w = len(trajectory), tables.plain(work)
     with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
-        try:
-            closed_loops(
-                kind,
-                study,
-                modelled,
-                user,
-                tables.sensor(setup.sensors, trajectory.dt),
-                law,
-                trajectory.dt,
-                _made_for(trajectory, W, desired),
-                tables.faults(setup.faults, W),
-                w,
-                log,
-                buffer,
-            )
-        except (ArithmeticError, ValueError):
-            # Without a compiler a division by zero or an infinite angle ends the run here.
-            w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
-    if not compiled():
-        work[:] = w
-        if history is not None:
-            history[:] = np.reshape(log, history.shape)
+        for first in range(0, samples, PART):
+            part = slice(first, min(first + PART, samples))
+            table = _motion(trajectory, W, count, part)
+            clock = tables.Clock(first, samples, trajectory.dt)
+            log = tables.plain(np.zeros(0 if history is None else (part.stop - first) * (6 + 3 * N)))
+            try:
+                closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
+            except (ArithmeticError, ValueError):
+                # Without a compiler a division by zero or an infinite angle ends the run here.
+                w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
+            work[:] = w
+            if history is not None:
+                log = np.reshape(log, (part.stop - first, -1))
+                for i, values in enumerate(np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1)):
+                    history[i][part] = values
+            if not np.any(runs[rows.STATUS] == DONE):
+                break
 
     def row(name: str) -> np.ndarray:
         index = getattr(rows, name)
@@ -157,24 +157,25 @@ def _user(law: CompiledLaw | None, N: int):
     return pointer(law.function, N, matrices, law.memory), buffer, asks
 
 
-def _made_for(value, width: int, make):
-    """The table of a machine or path, made once: values do not change."""
+def _made_for(value, width: int, make, count: int = 0):
+    """The table of a machine or path, made once for a width and a count of blocks: values do not change."""
     made = _made.setdefault(value, {})
-    if (make, width) not in made:
-        made[make, width] = make(value, width)
-    return made[make, width]
+    if (width, count) not in made:
+        made[width, count] = make(value, width)
+    return made[width, count]
 
 
 def _arms(robot, width: int) -> tuple[np.ndarray, np.ndarray]:
     return tables.arm_table(robot, width), tables.environment(robot)
 
 
-def _short_motion(trajectory, width: int):
-    return tables.plain(tables.motion_table(trajectory, width, tables.FEW).ravel())
+def _motion(trajectory, width: int, count: int, part: slice):
+    """The desired motion of a part of the run; only that of short runs is kept."""
 
+    def made(path, W):
+        return tables.plain(tables.motion_table(path, W, count, part).ravel())
 
-def _motion(trajectory, width: int):
-    return tables.plain(tables.motion_table(trajectory, width).ravel())
+    return _made_for(trajectory, width, made, count) if len(trajectory) <= PART else made(trajectory, width)
 
 
 class Plant:
@@ -192,7 +193,7 @@ class Plant:
         start = rows.BLOCKS * W + rows.GRAVITY_X
         work[start : start + rows.ENVIRONMENT] = environment
         self._w, self._arms = tables.plain(work), tables.sizes(W)
-        self._extra, table = tables.extra(robot), _made_for(trajectory, W, _short_motion)
+        self._extra, table = tables.extra(robot), _motion(trajectory, W, tables.FEW, slice(0, len(trajectory)))
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
         self.status = DONE

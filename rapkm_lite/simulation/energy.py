@@ -37,7 +37,7 @@ def mechanical_work(run) -> np.ndarray:
     >>> np.allclose(run.energy, rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
     True
     """
-    _run(run)
+    _run(run, "q_a", "c", "dt")
     return np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=0)
 
 
@@ -93,5 +93,6 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     return np.einsum("kij,i,kil->jl", K_0[:-1], weight, K_0[:-1]) * trajectory.dt
 
 
-def _run(run) -> None:
-    having("run", run, "a Run, such as simulate returns", "robot", "q", "q_a", "c", "dt")
+def _run(run, *names: str) -> None:
+    """What a function reads of a run; its joint angles `q` are computed when they are asked for."""
+    having("run", run, "a Run, such as simulate returns", "robot", *(names or ("q", "q_a", "c", "dt")))

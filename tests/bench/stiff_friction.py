@@ -10,7 +10,7 @@ from ..reference import reference
 from .kernels import OFFSET, PD
 
 FRICTION = (0.0, 4.2e-3, 0.03, 0.1, 0.3, 1.0)
-VELOCITY = (1e-3, 3e-3, 0.01, 0.03, 0.1)
+VELOCITY = (1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1)
 
 
 def distance(robot, path, samples: int | None = None) -> tuple[float, float]:
