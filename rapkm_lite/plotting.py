@@ -123,6 +123,12 @@ from .lessons.lesson07.figures import (
     plot_five_bar_curves,
     plot_spacing,
 )
+from .lessons.lesson12.figures import (
+    plot_apex,
+    plot_four_legs,
+    plot_length_choice,
+    plot_swing,
+)
 
 __all__ = [
     "AFTER",
@@ -157,6 +163,7 @@ __all__ = [
     "plane_axes",
     "plane_limits",
     "plot_antagonism",
+    "plot_apex",
     "plot_available_forces",
     "plot_bands",
     "plot_chatter",
@@ -175,12 +182,14 @@ __all__ = [
     "plot_fight_map",
     "plot_filter_share",
     "plot_five_bar_curves",
+    "plot_four_legs",
     "plot_gain_curve",
     "plot_gain_ratio",
     "plot_guaranteed_force",
     "plot_joint_angles",
     "plot_joint_moves",
     "plot_landscape",
+    "plot_length_choice",
     "plot_log",
     "plot_loop_gaps",
     "plot_lyapunov",
@@ -203,6 +212,7 @@ __all__ = [
     "plot_singular_poses",
     "plot_spacing",
     "plot_step_response",
+    "plot_swing",
     "plot_synchronization",
     "plot_table1",
     "plot_topology",

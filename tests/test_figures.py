@@ -28,6 +28,7 @@ PURE_NUMBERS = {
     "σ_min(Ã₁)",
     "σ_min(Ã), all drives",
     "share of the edge",
+    "condition number of A",
     "share |η_i| of the prestress",
 }
 
