@@ -19,12 +19,9 @@ from ..figures.marks import (
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress
-from .landscape import landscape
-from .motion import animation
 from .own import own_machine
 from .rest import landscape, steady_state, three_opinions
 from .runs import animation, decentralized_run, via_points
-from .synchronization import via_points
 from .torque import computed_torque
 
 # `explorer` checks for itself: what a reader's own draw function raises stays what it is.
