@@ -17,7 +17,6 @@ from ..mechanics.trajectory import polygon, triangle
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
-from ..simulation.sweeps import sweep
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import TIME, frictionless
@@ -51,8 +50,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         picture.fit("energy", *(1.15 * v for v, _ in groups), symmetric=False, least=0.5)
         numbers = {"energy": marks.per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J"}
         if filter != "off":
-            # Energies alone, for which no history of the run is kept.
-            before = sweep(machines[friction], PD(K_P, K_D), paths[path], [offset], encoder or None).energies.sum()
+            before = simulate(machines[friction], PD(K_P, K_D), paths[path], offset, encoder or None).energy.sum()
             numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
         return numbers | {
             "torque at the end": marks.per_drive(torque[-1], 1) + " mN m",
