@@ -123,6 +123,12 @@ from .lessons.lesson07.figures import (
     plot_five_bar_curves,
     plot_spacing,
 )
+from .lessons.lesson09.figures import (
+    plot_accelerations,
+    plot_clipping,
+    plot_one_sign,
+    plot_room,
+)
 from .lessons.lesson12.figures import (
     plot_apex,
     plot_four_legs,
@@ -162,11 +168,13 @@ __all__ = [
     "pair_name",
     "plane_axes",
     "plane_limits",
+    "plot_accelerations",
     "plot_antagonism",
     "plot_apex",
     "plot_available_forces",
     "plot_bands",
     "plot_chatter",
+    "plot_clipping",
     "plot_complement_size",
     "plot_configuration_space",
     "plot_crossed_linkage",
@@ -198,6 +206,7 @@ __all__ = [
     "plot_mirror",
     "plot_mode_maps",
     "plot_modes_and_forces",
+    "plot_one_sign",
     "plot_pair_curves",
     "plot_pair_measures",
     "plot_pairs",
@@ -209,6 +218,7 @@ __all__ = [
     "plot_prestress_maps",
     "plot_readings",
     "plot_rest_torques",
+    "plot_room",
     "plot_singular_poses",
     "plot_spacing",
     "plot_step_response",

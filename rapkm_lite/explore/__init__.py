@@ -20,6 +20,7 @@ from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress
 from .own import own_machine
+from .redundancy import allocation
 from .rest import landscape, steady_state, three_opinions
 from .runs import animation, decentralized_run, via_points
 from .torque import computed_torque
