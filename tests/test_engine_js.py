@@ -102,6 +102,8 @@ def test_statics_agree_with_the_package(robot):
         assert np.allclose(page["A"], A[k], atol=1e-13 * scale)
         assert np.allclose(page["polygon"], rk.force_polygon(A[k], 0.1), atol=1e-13 * scale)
         assert np.allclose(page["moving"], rk.antagonism_filter(A[k]) @ offset, atol=1e-15)
+        if robot.n_arms == 3:
+            assert np.allclose(page["null"], rk.null_vector(robot, q[k]), atol=1e-13)
         desired = q[k, : robot.n_arms]
         # Springs of equal stiffness rest in the least-squares pose of the angles that they want.
         rest = rk.estimate_pose(robot, desired - offset, points[k])

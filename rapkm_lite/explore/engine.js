@@ -83,6 +83,11 @@ export class Pose {
     for (let i = 0; i < c.length; i++) c[i] = this.bx[i] * gx + this.by[i] * gy;
     return c;
   }
+  /** The direction of torques that move nothing, of length one, for three arms: the cross product of A's columns. */
+  nullVector() {
+    const { bx, by } = this, cross = [1, 2, 0].map((j, i) => bx[j] * by[(i + 2) % 3] - bx[(i + 2) % 3] * by[j]);
+    return cross.map((n) => n / Math.hypot(...cross));
+  }
   /** Corners of all end-effector forces that torques of at most `torque` make, counter-clockwise. */
   forcePolygon(torque) {
     const edges = Array.from(this.bx, (bx, i) => [2 * torque * bx, 2 * torque * this.by[i]])

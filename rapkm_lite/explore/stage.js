@@ -2,8 +2,7 @@
 // mount(el, scene, link) shows a picture in `el`.  scene = {panels, layout, widths, size, name, about, labels};
 // link = {send(message), receive(callback(message, buffers))} reaches whoever computes, a kernel or a script.
 //   to it:   {kind: "hello"} | {kind: "grab", from, seq, to: {control: value}, by: {control: steps}}
-//   from it: {kind: "fixed" | "picture", from?, seq?, marks, styles, images, frames, handles, numbers, places, ...}
-//            {kind: "lost", from, seq}: a question that has no answer
+//   from it: {kind: "fixed" | "picture" | "lost", from?, seq?, marks, styles, images, frames, handles, numbers, ...}
 // A mark is [kind, panel, style, points, words?]: style a number in `styles` or an object, points how many pairs of the
 // first buffer, or an array of numbers.  Lengths in styles are points (1/72 inch), colours "#rrggbb" for white paper.
 
@@ -129,8 +128,7 @@ class Panel {
     this.el.style.gridArea = name;
     for (const part of ["head", "ylabel", "plot", "scale", "xlabel"])
       this[part] = rich(make("div", { className: `rapkm-${part}` }, this.el), spec[part]);
-    const ariaLabel = [spec.title, spec.ylabel, spec.xlabel].filter(Boolean).join(", ") || name;
-    this.canvas = make("canvas", { role: "img", ariaLabel }, this.plot);
+    this.canvas = make("canvas", { role: "img", ariaLabel: spec.title?.trim() || spec.ylabel || name }, this.plot);
     this.ctx = this.canvas.getContext("2d");
   }
 

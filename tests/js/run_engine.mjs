@@ -12,7 +12,7 @@ const answers = JSON.parse(readFileSync(0, "utf8")).map(({ robot, corners, point
       const settled = rest(m, x, y, how.K_P, how.offset);
       return {
         angle: how.offset.map((_, i) => pose.angle(i)), A: Array.from(pose.bx, (bx, i) => [bx, pose.by[i]]),
-        polygon: pose.forcePolygon(0.1),
+        null: m.N === 3 ? pose.nullVector() : null, polygon: pose.forcePolygon(0.1),
         moving: pose.filter([...how.offset]), rest: [settled.pose.x, settled.pose.y], torque: settled.torque,
       };
     });
