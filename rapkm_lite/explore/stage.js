@@ -182,12 +182,11 @@ class Panel {
     this.size = (points) => Math.max((points / 10.5) * look.base, look.floor);
     const font = 0.92 * this.size(10.5);
     const plan = layout(this.spec, palette, frame, [wide, high], font, (words) => this.pieces(words, font));
-    const { box } = Object.assign(this, { box: plan.box, at: plan.at });
+    const { box, bar: [x, y, w, h] } = Object.assign(this, plan);
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     ctx.clearRect(0, 0, wide, high);
     for (const [style, points] of plan.strokes) stroke(this, points, style);
     for (const text of plan.texts) this.write(text);
-    const [x, y, w, h] = plan.bar;
     (palette?.[theme.dark ? "dark" : "light"] ?? []).forEach((colour, k) => {
       ctx.fillStyle = colour;
       ctx.fillRect(x, y - (k + 1) * h, w, h + 0.5);
@@ -387,9 +386,8 @@ export function mount(el, scene, link) {
     knob.style.translate = `${x}px ${y}px`;
     knob.onkeydown = (event) => {
       const by = steps(handle, event.key, event.shiftKey);
-      if (!by) return;
-      event.preventDefault();
-      ask({}, by);
+      if (by) event.preventDefault();
+      if (by) ask({}, by);
     };
   }
 
