@@ -123,6 +123,11 @@ from .lessons.lesson07.figures import (
     plot_five_bar_curves,
     plot_spacing,
 )
+from .lessons.lesson08.figures import (
+    plot_bias,
+    plot_counted,
+    plot_places,
+)
 from .lessons.lesson09.figures import (
     plot_accelerations,
     plot_clipping,
@@ -173,10 +178,12 @@ __all__ = [
     "plot_apex",
     "plot_available_forces",
     "plot_bands",
+    "plot_bias",
     "plot_chatter",
     "plot_clipping",
     "plot_complement_size",
     "plot_configuration_space",
+    "plot_counted",
     "plot_crossed_linkage",
     "plot_cut_tree",
     "plot_demand",
@@ -215,6 +222,7 @@ __all__ = [
     "plot_path",
     "plot_pin_forces",
     "plot_placement",
+    "plot_places",
     "plot_prestress_maps",
     "plot_readings",
     "plot_rest_torques",

@@ -30,6 +30,8 @@ PURE_NUMBERS = {
     "share of the edge",
     "condition number of A",
     "share |η_i| of the prestress",
+    "component of drive 1",
+    "component of drive 2",
 }
 
 

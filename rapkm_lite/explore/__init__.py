@@ -16,6 +16,7 @@ from ..figures.marks import (
     drive_legend,
     pair_legend,
 )
+from .calibration import calibration
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress

@@ -1,0 +1,81 @@
+"""Exercises of lesson 08: offsets from readings alone, six places, and a drive that calibrates coarse encoders."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...mechanics.kinematics import inverse_kinematics
+from ..checker import Exercise
+from . import tasks
+
+EXERCISES = {
+    "08.self_calibrate": Exercise(
+        tasks.self_calibrate,
+        hints=(
+            "Each reading gives one equation for the offsets. What is its left side, and what its right side?",
+            "rk.estimate_pose(robot, q_a - offset, guess) gives poses, rk.null_basis(A) their null vectors n; solve "
+            "n^T offset = n^T (q_a - q) for all readings together with np.linalg.lstsq, and begin again with the new "
+            "offset.",
+            "rows = rk.null_basis(A).mT; gap = rows @ (q_a - q[:, :N])[..., None]; "
+            "offset = np.linalg.lstsq(rows.reshape(-1, N), gap.ravel(), rcond=None)[0]",
+        ),
+        unit="rad",
+        cases=tasks.reading_cases,
+        invariant=tasks.still_contradicts,
+        tolerance=1e-9,
+        close=0.03,
+        improve="take the poses anew from the readings less the offsets found, and repeat until nothing changes",
+        mistakes={
+            "what is left at each place is averaged, but it holds only the part along its own null vector; "
+            "solve the equations of all places together": lambda robot, q_a, guess: tasks.left_over(
+                robot, q_a, guess
+            ).mean(axis=0),
+            "what is left is added up over the places; solve their equations together": lambda robot, q_a, guess: (
+                tasks.left_over(robot, q_a, guess).sum(axis=0)
+            ),
+            "the guess is taken for the true place; the best poses come from the readings": lambda robot, q_a, guess: (
+                q_a - inverse_kinematics(robot, guess)[:, : robot.n_arms]
+            ).mean(axis=0),
+            "only the first place is used, and the smallest offsets that explain it: one place knows one combination": (
+                tasks.of_one_place
+            ),
+            "these are the gaps of the places, not the offsets behind them": lambda robot, q_a, guess: tasks.equations(
+                robot, q_a, 0.0, guess
+            )[1].ravel(),
+        },
+    ),
+    "08.places": Exercise(
+        tasks.best_places,
+        hints=(
+            "When is one combination of the offsets badly known? When all null vectors nearly lie in one plane.",
+            "The explorer above shows the null vectors: on a circle of 0.12 m, turn three places until they lie as far "
+            "apart as they can.",
+            "Three pairs of places on the edge of the disc, 10 degrees apart, about 60, 180 and 300 degrees.",
+        ),
+        unit="m",
+        judge=tasks.known,
+        close=0.1,
+        improve="move every place to the edge of the disc, towards a direction in which one component of n vanishes",
+        points=10.0,
+        mistakes={
+            "these are six places evenly on a circle, three of which show what is known already: compare the "
+            "null vectors of three places while you turn them": tasks.is_hexagon,
+            "the places are given in mm; the unit is m": lambda answer: bool(
+                1.0 < np.abs(tasks.chosen(answer)).max() <= 120.0
+            ),
+        },
+    ),
+    "08.calibration_drive": Exercise(
+        tasks.calibration_drive,
+        hints=(
+            "Which places told most in the last exercise, and how many counts does the machine pass on its way?",
+            "Far out and through many counts, but not so fast that the drives need more than 200 mN m.",
+            "rk.circle(robot, 0.12, 4.0)",
+        ),
+        unit="",
+        judge=tasks.shown,
+        close=0.1,
+        improve="reach further out, where the null vectors differ most, and pass as many counts as the time allows",
+        points=10.0,
+    ),
+}
