@@ -134,6 +134,13 @@ from .lessons.lesson09.figures import (
     plot_one_sign,
     plot_room,
 )
+from .lessons.lesson10.figures import (
+    plot_faulty_runs,
+    plot_geometry_maps,
+    plot_hunting_maps,
+    plot_model_share,
+    plot_saturation,
+)
 from .lessons.lesson12.figures import (
     plot_apex,
     plot_four_legs,
@@ -192,6 +199,7 @@ __all__ = [
     "plot_effective_gain",
     "plot_energies",
     "plot_errors",
+    "plot_faulty_runs",
     "plot_feedback_along",
     "plot_feedback_map",
     "plot_fight_map",
@@ -200,7 +208,9 @@ __all__ = [
     "plot_four_legs",
     "plot_gain_curve",
     "plot_gain_ratio",
+    "plot_geometry_maps",
     "plot_guaranteed_force",
+    "plot_hunting_maps",
     "plot_joint_angles",
     "plot_joint_moves",
     "plot_landscape",
@@ -212,6 +222,7 @@ __all__ = [
     "plot_map",
     "plot_mirror",
     "plot_mode_maps",
+    "plot_model_share",
     "plot_modes_and_forces",
     "plot_one_sign",
     "plot_pair_curves",
@@ -227,6 +238,7 @@ __all__ = [
     "plot_readings",
     "plot_rest_torques",
     "plot_room",
+    "plot_saturation",
     "plot_singular_poses",
     "plot_spacing",
     "plot_step_response",

@@ -18,7 +18,7 @@ import rapkm_lite as rk
 
 HERE = Path(__file__).resolve().parent
 NOTEBOOKS = HERE.parent / "notebooks"
-LESSONS = {path.stem for path in NOTEBOOKS.glob("0*.ipynb")}
+LESSONS = {path.stem for path in NOTEBOOKS.glob("[0-9][0-9]_*.ipynb")}
 
 
 def rows(page, heading):

@@ -53,7 +53,7 @@ def test_lessons_are_copied_without_outputs_and_solutions(tmp_path):
     target = tmp_path / "my lessons"
     assert command("lessons", str(target)).returncode == 0
     names = {path.name for path in target.iterdir()}
-    sources = {path.name for path in lesson_folder().glob("0*.ipynb")}
+    sources = {path.name for path in lesson_folder().glob("[0-9][0-9]_*.ipynb")}
     assert sources <= names and {"dashboard.ipynb", "equations.md", "errata.md"} <= names
     for path in target.glob("*.ipynb"):
         text = path.read_text(encoding="utf-8")

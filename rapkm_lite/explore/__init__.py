@@ -20,6 +20,7 @@ from .calibration import calibration
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress
+from .imperfections import imperfections
 from .own import own_machine
 from .redundancy import allocation
 from .rest import landscape, steady_state, three_opinions

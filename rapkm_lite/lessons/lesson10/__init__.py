@@ -1,0 +1,1 @@
+"""Lesson 10: wrong geometry, coarse encoders, weak and broken drives."""
