@@ -141,6 +141,11 @@ from .lessons.lesson10.figures import (
     plot_model_share,
     plot_saturation,
 )
+from .lessons.lesson11.figures import (
+    plot_law_bands,
+    plot_loop_frequencies,
+    plot_slow_error,
+)
 from .lessons.lesson12.figures import (
     plot_apex,
     plot_four_legs,
@@ -214,8 +219,10 @@ __all__ = [
     "plot_joint_angles",
     "plot_joint_moves",
     "plot_landscape",
+    "plot_law_bands",
     "plot_length_choice",
     "plot_log",
+    "plot_loop_frequencies",
     "plot_loop_gaps",
     "plot_lyapunov",
     "plot_machine",
@@ -240,6 +247,7 @@ __all__ = [
     "plot_room",
     "plot_saturation",
     "plot_singular_poses",
+    "plot_slow_error",
     "plot_spacing",
     "plot_step_response",
     "plot_swing",

@@ -17,6 +17,7 @@ from ..figures.marks import (
     pair_legend,
 )
 from .calibration import calibration
+from .choosing import controller_choice
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress

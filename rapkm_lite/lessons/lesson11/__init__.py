@@ -1,0 +1,1 @@
+"""Lesson 11: laws of all kinds on one machine, made equally fast."""

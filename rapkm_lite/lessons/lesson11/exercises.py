@@ -1,0 +1,157 @@
+"""Exercises of lesson 11: how fast springs make the machine, what a wrong model costs, one law for three duties."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...control.computed_torque import CTC
+from ...mechanics.actuation import control_matrix
+from ...mechanics.dynamics import mass_matrix, minimal_dynamics
+from ..checker import Exercise
+from . import tasks
+
+
+def _frequencies(robot, q, matrix) -> np.ndarray:
+    """Frequencies in Hz from the eigenvalues of a matrix (2, 2)."""
+    return np.sqrt(np.abs(np.sort(np.linalg.eigvals(matrix).real))) / (2 * np.pi)
+
+
+def _terms(robot, q):
+    return minimal_dynamics(robot, q, 0 * q, None)[0], control_matrix(robot, q)
+
+
+def _one_model(plant: str):
+    """The error where both force terms come from one of the two machines, so that only Q or nothing is left."""
+
+    def made(robot, model, q, qd, xd, xdd, K_P):
+        inverse = {"robot": robot, "model": model}[plant]
+        G, C, Q = minimal_dynamics(robot, q, qd, None)
+        G_model, C_model, Q_model = minimal_dynamics(model, q, qd, None)
+        missed = np.einsum("kij,kj->ki", G_model - G, xdd) + np.einsum("kij,kj->ki", C_model - C, xd) + Q_model - Q
+        return np.linalg.solve(minimal_dynamics(inverse, q, qd, None)[0], missed[..., None])[..., 0] / K_P
+
+    return made
+
+
+def _without(part: str):
+    """The error where the acceleration, the velocity or the other forces are left out of what the model misses."""
+
+    def made(robot, model, q, qd, xd, xdd, K_P):
+        xdd = 0 * xdd if part == "G" else xdd
+        xd = 0 * xd if part == "C" else xd
+        whole = tasks.model_error(robot, model, q, qd, xd, xdd, K_P)
+        if part == "Q":
+            whole = whole - tasks.model_error(robot, model, q, qd, 0 * xd, 0 * xdd, K_P)
+        return whole
+
+    return made
+
+
+def _force(robot, model, q, qd, xd, xdd, K_P):
+    G = minimal_dynamics(model, q, qd, None)[0]
+    return np.einsum("kij,kj->ki", G, tasks.model_error(robot, model, q, qd, xd, xdd, K_P)) * K_P
+
+
+EXERCISES = {
+    "11.pd_frequencies": Exercise(
+        tasks.pd_frequencies,
+        hints=(
+            "Springs at the drives, a mass: how stiff is that at the end-effector, and how heavy is the machine there?",
+            "The drives turn by A dx, so the stiffness is A^T diag(K_P) A; the inertia in these coordinates is Gbar, "
+            "from rk.minimal_dynamics(robot, q, 0 * q, None).",
+            "w2 = np.linalg.eigvals(np.linalg.solve(G, A.T @ np.diag(K_P) @ A)).real; "
+            "np.sqrt(np.sort(w2)) / (2 * np.pi)",
+        ),
+        unit="Hz",
+        cases=tasks.frequency_cases,
+        invariant=tasks.no_determinant,
+        tolerance=1e-6,
+        close=0.02,
+        improve="solve the eigenvalue problem instead of timing a simulation",
+        mistakes={
+            "these are squares of frequencies: the root is missing": (
+                lambda robot, q, K_P: (2 * np.pi * tasks.pd_frequencies(robot, q, K_P)) ** 2
+            ),
+            "these are the squares in Hz^2: the root is missing": (
+                lambda robot, q, K_P: tasks.pd_frequencies(robot, q, K_P) ** 2
+            ),
+            "this is in rad/s; the factor 2 pi is missing (units)": (
+                lambda robot, q, K_P: 2 * np.pi * tasks.pd_frequencies(robot, q, K_P)
+            ),
+            "the higher one comes first: wrong order": lambda robot, q, K_P: tasks.pd_frequencies(robot, q, K_P)[::-1],
+            "the inertia is missing: these are roots of stiffnesses": (
+                lambda robot, q, K_P: _frequencies(
+                    robot, q, _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
+                )
+            ),
+            "the gains are averaged: unequal gains turn and split the two modes": (
+                lambda robot, q, K_P: tasks.pd_frequencies(robot, q, np.full(robot.n_arms, np.mean(K_P)))
+            ),
+            "A is missing: each drive moves only its own proximal link then": (
+                lambda robot, q, K_P: (
+                    np.sqrt(np.sort(K_P / np.diag(mass_matrix(robot, q))[: robot.n_arms])[:2]) / (2 * np.pi)
+                )
+            ),
+            "A is missing: these are the drives' own frequencies, each with the inertia of its arm": (
+                lambda robot, q, K_P: np.sqrt(K_P / np.diag(mass_matrix(robot, q))[: robot.n_arms]) / (2 * np.pi)
+            ),
+            "the inertia is multiplied instead of divided: it should be inverted": (
+                lambda robot, q, K_P: _frequencies(
+                    robot, q, _terms(robot, q)[0] @ _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
+                )
+            ),
+        },
+    ),
+    "11.model_error": Exercise(
+        tasks.model_error,
+        hints=(
+            "Write the force that the law gives, with its model, and the force that the motion takes. In a slow motion "
+            "both are equal, and the only unknown is the error.",
+            "The law asks its model for the acceleration xdd - K_P e; the machine takes G xdd + C xd + Q. What differs "
+            "between the two has to be paid by K_P e, in accelerations of the model.",
+            "G, C, Q and hats from rk.minimal_dynamics(..., None); e = solve(G_hat, (G_hat - G) xdd + (C_hat - C) xd + "
+            "Q_hat - Q) / K_P, pose by pose.",
+        ),
+        unit="m",
+        cases=tasks.error_cases,
+        invariant=tasks.balance,
+        tolerance=1e-9,
+        close=0.02,
+        improve="take the terms of both machines from rk.minimal_dynamics at the wanted motion, without differences",
+        mistakes={
+            "robot and model are exchanged (the order of the arguments)": (
+                lambda robot, model, *rest: tasks.model_error(model, robot, *rest)
+            ),
+            "the sign: with too little force the machine stays behind, true minus wanted is wanted": (
+                lambda *case: -tasks.model_error(*case)
+            ),
+            "the gain K_P is missing: these are accelerations": lambda *case: case[-1] * tasks.model_error(*case),
+            "the machine's own inertia is inverted; the law multiplies with that of its model": _one_model("robot"),
+            "the velocity terms C xd are missing": _without("C"),
+            "friction and gravity (Q) are missing": _without("Q"),
+            "the acceleration is missing: an unknown mass matters where the motion accelerates": _without("G"),
+            "these are forces in N, before the inertia is divided out": _force,
+        },
+    ),
+    "11.one_law": Exercise(
+        lambda robot: CTC(*(2 * np.pi * 2.2) ** np.array([2, 1]) * [1, 2], None),
+        hints=(
+            "Which of the four numbers falls when the loop gets faster, and which rises? Which kind of law misses one "
+            "of them at every speed?",
+            "The payload asks for speed, the coarse encoders for a slow loop: look between 1.5 and 3 Hz. Jumps rule "
+            "out one kind of law, the missing feed-forward another.",
+            "w = 2 * np.pi * 2.2; return rk.CTC(w**2, 2 * w, None)",
+        ),
+        judge=tasks.three_duties,
+        close=0.04,
+        improve="change the frequency of the loop by a tenth, up where the payload's error is short and down otherwise",
+        points=10.0,
+        mistakes={
+            "a law that switches its pair: its torques jump at every switch, whatever the gains": (
+                lambda answer: tasks.is_kind(answer, "SwitchedCTC")
+            ),
+            "PD alone knows nothing of the inertia: what is fast enough for the error is too fast for these encoders; "
+            "a feed-forward of the torques is missing": lambda answer: tasks.is_kind(answer, "PD"),
+        },
+    ),
+}

@@ -1,0 +1,65 @@
+"""Figures of lesson 11: how fast each loop is along the path, and what laws cost over many machines."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+
+_LOOKS = (
+    {"color": NEUTRAL, "ls": "-", "marker": "o"},
+    {"color": BEFORE, "ls": "--", "marker": "s"},
+    {"color": ALARM, "ls": (0, (1, 1)), "marker": "^"},
+    {"color": AFTER, "ls": (0, (5, 1.2, 1, 1.2)), "marker": "D"},
+)
+
+
+def plot_loop_frequencies(t, frequencies, nominal, ax=None):
+    """Natural frequencies (k, 2) in Hz of each loop along a path over time t (k,) in s: a band between two modes.
+
+    frequencies : dict of label -> (k, 2); at most four.  nominal : frequency in Hz that all were designed for.
+    """
+    ax = axes_or_new(ax, figsize=(8.4, 3.6))
+    for (label, both), look in zip(frequencies.items(), _LOOKS, strict=False):
+        low, high = np.sort(both, axis=-1).T
+        ax.fill_between(t, low, high, color=look["color"], alpha=0.22, lw=0)
+        ax.plot(t, low, color=look["color"], ls=look["ls"], label=label)
+        ax.plot(t, high, color=look["color"], ls=look["ls"])
+    ax.axhline(nominal, color="#222222", lw=0.8, zorder=0)
+    ax.set(xlabel="time in s", ylabel="natural frequency in Hz", xlim=(t[0], t[-1]), ylim=(0, None))
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    return ax
+
+
+def plot_law_bands(names, columns, axes=None):
+    """Medians and the middle 80 % of many runs, one row for each law.
+
+    names : of the laws.  columns : dict of axis label -> list of samples, one array for each law; the axes are
+    logarithmic where the samples spread over more than a factor of ten.  Returns the axes.
+    """
+    if axes is None:
+        axes = plt.subplots(1, len(columns), figsize=(9.6, 0.42 * len(names) + 1.1), sharey=True)[1]
+    rows = -np.arange(len(names))
+    for ax, (label, samples) in zip(np.atleast_1d(axes), columns.items(), strict=True):
+        low, middle, high = (np.array([np.percentile(s, share) for s in samples]) for share in (10, 50, 90))
+        ax.hlines(rows, low, high, color=AFTER, lw=5, alpha=0.4)
+        ax.plot(middle, rows, "o", color=AFTER, ms=6)
+        ax.set(xlabel=label, yticks=rows, yticklabels=names, ylim=(rows[-1] - 0.6, 0.6))
+        if high.max() > 10 * low.min():
+            ax.set_xscale("log")
+        else:
+            ax.set_xlim(0, 1.08 * high.max())
+    return axes
+
+
+def plot_slow_error(t, error, predicted, ax=None):
+    """Errors (k, 2) in m of a run over time t (k,) in s, and what the slow theory predicts (dashed)."""
+    ax = axes_or_new(ax, figsize=(8.4, 3.2))
+    for axis, (word, colour) in enumerate((("x", AFTER), ("y", BEFORE))):
+        ax.plot(t, 1e3 * error[:, axis], color=colour, label=f"run, {word}")
+        ax.plot(t, 1e3 * predicted[:, axis], color=colour, ls="--", lw=1.2, label=f"theory, {word}")
+    ax.axhline(0, color="#BBBBBB", lw=0.8)
+    ax.set(xlabel="time in s", ylabel="true − wanted place in mm", xlim=(t[0], t[-1]))
+    ax.legend(loc="upper right", ncols=2)
+    return ax
