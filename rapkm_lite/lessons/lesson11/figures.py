@@ -23,7 +23,7 @@ def plot_loop_frequencies(t, frequencies, nominal, ax=None):
     ax = axes_or_new(ax, figsize=(8.4, 3.6))
     for (label, both), look in zip(frequencies.items(), _LOOKS, strict=False):
         low, high = np.sort(both, axis=-1).T
-        ax.fill_between(t, low, high, color=look["color"], alpha=0.22, lw=0)
+        ax.fill_between(t, low, high, color=look["color"], alpha=0.1, lw=0)
         ax.plot(t, low, color=look["color"], ls=look["ls"], label=label)
         ax.plot(t, high, color=look["color"], ls=look["ls"])
     ax.axhline(nominal, color="#222222", lw=0.8, zorder=0)
@@ -61,5 +61,5 @@ def plot_slow_error(t, error, predicted, ax=None):
         ax.plot(t, 1e3 * predicted[:, axis], color=colour, ls="--", lw=1.2, label=f"theory, {word}")
     ax.axhline(0, color="#BBBBBB", lw=0.8)
     ax.set(xlabel="time in s", ylabel="true − wanted place in mm", xlim=(t[0], t[-1]))
-    ax.legend(loc="upper right", ncols=2)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4)
     return ax
