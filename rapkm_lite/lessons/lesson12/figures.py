@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 from . import four_rrr
 
-_LAWS = ({"color": BEFORE, "lw": 4}, {"color": AFTER}, {"color": ALARM}, {"color": NEUTRAL, "ls": "--"})
+_LAWS: tuple[dict[str, Any], ...] = (
+    {"color": BEFORE, "lw": 4},
+    {"color": AFTER},
+    {"color": ALARM},
+    {"color": NEUTRAL, "ls": "--"},
+)
 
 
 def plot_four_legs(pose, ax=None, *, lines=False):
@@ -47,7 +54,8 @@ def plot_four_legs(pose, ax=None, *, lines=False):
 def plot_apex(angle, sigma, pose, axes=None):
     """Left: smallest singular value of A~ (k,) over the platform angle (k,) in rad.  Right: the machine at a pose.
 
-    >>> axes = plot_apex(np.linspace(0, 0.7, 8), np.linspace(0.35, 0.0, 8), [0.0, 0.0, 0.59])
+    >>> import numpy as np
+    >>> ax = plot_apex(np.linspace(0, 0.7, 8), np.linspace(0.35, 0.0, 8), [0.0, 0.0, 0.59])
     """
     axes = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained")[1] if axes is None else axes
     axes[0].plot(angle, sigma, color=AFTER)
@@ -78,6 +86,7 @@ def plot_length_choice(lengths, conditions, marked, ax=None):
 def plot_swing(motion, pose, labels, ax=None):
     """Distance of the platform's centre from the circle over time, in mm: poses (runs, k, 3) of runs with `labels`.
 
+    >>> import numpy as np; from rapkm_lite.lessons.lesson12 import four_rrr
     >>> motion = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
     >>> ax = plot_swing(motion, np.ones((1, 3, 3)), ["PD"])
     """
