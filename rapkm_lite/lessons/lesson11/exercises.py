@@ -134,7 +134,7 @@ EXERCISES = {
         },
     ),
     "11.one_law": Exercise(
-        lambda robot: CTC(*(2 * np.pi * 2.2) ** np.array([2, 1]) * [1, 2], None),
+        lambda robot: CTC((4.4 * np.pi) ** 2, 8.8 * np.pi, None),
         hints=(
             "Which of the four numbers falls when the loop gets faster, and which rises? Which kind of law misses one "
             "of them at every speed?",
