@@ -21,7 +21,7 @@ def plot_clipping(free, clipped, limit, axes=None):
     >>> import rapkm_lite as rk
     >>> path = rk.circle(rk.load(), 0.05, 1.0)
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), path)
-    >>> axes = plot_clipping(run, rk.simulate(rk.load(), run.law, path, faults=[rk.TorqueLimit(0.1)]), 0.1)
+    >>> ax = plot_clipping(run, rk.simulate(rk.load(), run.law, path, faults=[rk.TorqueLimit(0.1)]), 0.1)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.3))[1] if axes is None else axes
     for i, torque in enumerate(1e3 * free.c.T):
@@ -44,6 +44,7 @@ def plot_room(c, n, limit, room, marks, ax=None):
 
     c : the torques of least size, N m.  limit : N m.  room : (2,) N m.  marks : dict of label -> mu in N m.
 
+    >>> import numpy as np
     >>> c, n = np.array([0.11, -0.06, -0.05]), np.full(3, 0.577)
     >>> ax = plot_room(c, n, 0.085, (-0.04, -0.045), {"least size": 0.0})
     """
@@ -85,7 +86,7 @@ def plot_accelerations(robot, places, limit: float, axes=None):
     """Accelerations at rest with torques up to `limit` N m at places (k, 2) in m: all drives, least size, each pair.
 
     >>> import rapkm_lite as rk
-    >>> axes = plot_accelerations(rk.load(), [[0.0, 0.0], [-0.05, 0.0]], 0.085)
+    >>> ax = plot_accelerations(rk.load(), [[0.0, 0.0], [-0.05, 0.0]], 0.085)
     """
     places = np.asarray(places, dtype=float)
     if axes is None:
