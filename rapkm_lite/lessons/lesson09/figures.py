@@ -49,6 +49,7 @@ def plot_room(c, n, limit, room, marks, ax=None):
     >>> ax = plot_room(c, n, 0.085, (-0.04, -0.045), {"least size": 0.0})
     """
     ax = axes_or_new(ax, figsize=(7.2, 3.7))
+    c, n = np.asarray(c, dtype=float), np.asarray(n, dtype=float)
     reach = 1.5 * max(np.abs(room).max(), np.abs(list(marks.values())).max(), 1e-6)
     mu = np.array([-reach, reach])
     for i in range(len(c)):
@@ -118,20 +119,20 @@ def plot_accelerations(robot, places, limit: float, axes=None):
     return axes
 
 
-def plot_one_sign(path, ax=None, n: int = 201):
+def plot_one_sign(trajectory, ax=None, n: int = 201):
     """Where in the workspace a prestress can load all drives with one sign, the curves of the pairs, and a path.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_one_sign(rk.triangle(rk.load()), n=41)
     """
     ax = axes_or_new(ax, figsize=(6.4, 4.2))
-    robot = path.robot
+    robot = trajectory.robot
     x, y, inside, points = grid_points(robot, n)
     possible = on_grid(inside, common_sign(control_matrix(robot, inverse_kinematics(robot, points))))
     colours = ListedColormap(["#E8E4DC", "#B9CDE0"])
     ax.pcolormesh(x, y, possible, cmap=colours, vmin=0, vmax=1, shading="nearest", rasterized=True)
     plot_pair_curves(robot, ax, n=max(n, 81))
-    plot_path(path, ax)
+    plot_path(trajectory, ax)
     ax.fill([], [], color="#B9CDE0", label="one sign possible")
     ax.fill([], [], color="#E8E4DC", label="impossible")
     room = [(float(v[0]), float(v[-1])) for v in (x, y)]
