@@ -76,7 +76,7 @@ def frozen(array) -> np.ndarray:
 def all_frozen(arrays: list[np.ndarray]) -> list[np.ndarray]:
     """`frozen` copies of arrays; the list is emptied on the way, so that of minutes no two columns stand twice.
 
-    >>> [array.sum() for array in all_frozen([np.zeros(3), np.ones(3)])]
+    >>> [float(array.sum()) for array in all_frozen([np.zeros(3), np.ones(3)])]
     [0.0, 3.0]
     """
     arrays.reverse()
