@@ -23,7 +23,7 @@ def listed():
 FILES = list(listed())
 BOOKS = [path for path in FILES if path.suffix == ".ipynb"]
 PAGES = [path for path in FILES if path.suffix == ".md" and "pages" not in path.parts]
-LESSONS = sorted((ROOT / "notebooks").glob("0*.ipynb"))
+LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
 # A folder of a person or of a machine, in any system's way to write it.
 PLACES = re.compile(r"(?<![\w.~/])/(?:home|root|Users|work|private/var)/\w|\b[A-Z]:\\+Users\b")
 
