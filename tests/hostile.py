@@ -32,6 +32,7 @@ import numpy as np
 
 import rapkm_lite as rk
 from rapkm_lite import explore
+from rapkm_lite.lessons.lesson12 import four_rrr
 
 ROBOT = rk.load()
 PATH = rk.triangle(ROBOT, duration=0.3, dt=0.01)
@@ -65,6 +66,8 @@ class Case(NamedTuple):
     value: Any
     call: Any
 
+
+SWING = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
 
 # A value that works, by the name of the parameter: one word, one thing.
 GOOD: dict[str, Any] = {
@@ -127,6 +130,24 @@ OTHER: dict[tuple[str, str], Any] = {
     **{("Desired", n): getattr(PATH[3], n) for n in ("x", "xd", "xdd", "q", "qd", "qdd")},
     **{("Run", n): getattr(RUN, n) for n in RUN._fields()},
     **{("Log", n): RUN.q_a for n in ("q_a", "q_a_desired", "c")},
+    ("plot_apex", "angle"): [0.0, 0.3, 0.7], ("plot_apex", "sigma"): [0.35, 0.2, 0.0],
+    ("plot_apex", "pose"): [0.0, 0.0, 0.59], ("plot_four_legs", "pose"): [0.0, 0.0, 0.1],
+    ("plot_length_choice", "lengths"): [0.1, 1.0], ("plot_length_choice", "conditions"): {"centre": [1.0, 7.0]},
+    ("plot_length_choice", "marked"): ("platform", 0.14),
+    ("plot_places", "groups"): {"three": [[0.1, 0.0], [0.0, 0.1], [-0.1, 0.0]]},
+    **{("plot_counted", n): ALONG for n in ("t", "gap", "exact")}, ("plot_bias", "names"): ["a"],
+    **{("plot_bias", n): [[1e-5, 2e-5]] for n in ("residual", "bias")},
+    ("plot_geometry_maps", "models"): {"longer": ROBOT.replace(lengths=0.2002)}, ("plot_geometry_maps", "n"): 9,
+    ("plot_model_share", "eps"): ALONG, ("plot_model_share", "share"): ALONG, ("plot_model_share", "t"): ALONG,
+    ("plot_model_share", "leak"): ALONG, ("plot_hunting_maps", "gains"): [1.0, 7.0],
+    ("plot_hunting_maps", "counts"): [500.0, 2000.0], ("plot_hunting_maps", "jumps"): {"slow": np.ones((2, 2))},
+    ("plot_saturation", "limit"): ALONG, ("plot_saturation", "shifts"): {"PD": ALONG},
+    ("plot_loop_frequencies", "t"): ALONG, ("plot_loop_frequencies", "frequencies"): {"PD": np.ones((len(ALONG), 2))},
+    ("plot_loop_frequencies", "nominal"): 5.0, ("plot_law_bands", "names"): ["PD"],
+    ("plot_law_bands", "columns"): {"energy in J": [ALONG], "error in mm": [ALONG]},
+    ("plot_slow_error", "t"): ALONG, ("plot_slow_error", "error"): np.ones((len(ALONG), 2)),
+    ("plot_slow_error", "predicted"): np.ones((len(ALONG), 2)), ("plot_swing", "motion"): SWING,
+    ("plot_swing", "pose"): np.ones((1, 3, 3)), ("plot_swing", "labels"): ["PD"],
     ("plot_clipping", "free"): RUN, ("plot_clipping", "clipped"): RUN, ("plot_clipping", "limit"): 0.1,
     ("plot_accelerations", "places"): [[0.0, 0.0], [-0.05, 0.0]], ("plot_accelerations", "limit"): 0.085,
     ("plot_room", "c"): [0.11, -0.06, -0.05], ("plot_room", "n"): [0.577, 0.577, 0.577], ("plot_room", "limit"): 0.085,

@@ -71,6 +71,7 @@ def plot_bias(residual, bias, names, ax=None):
     >>> ax = plot_bias(np.array([[1e-5, 2e-5]]), np.array([[1e-3, 2e-3]]), ["a"])
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.6))
+    residual, bias = np.asarray(residual), np.asarray(bias)
     for left, off, name, look in zip(residual, bias, names, _LOOKS, strict=False):
         ax.loglog(1e3 * left, 1e3 * off, linestyle="none", ms=5, mfc="none", label=name, **look)
     low, high = 1e3 * np.min(residual) / 2, 1e3 * np.max(bias) * 2
