@@ -46,7 +46,6 @@ SLOW = {
     "test_runs_below_the_threshold_come_to_rest",
     "test_runs_without_a_place_of_rest_keep_moving",
 }
-DEALT_OUT = {"test_answers", "test_hostile", "test_causes", "test_explore"}
 NOTEBOOK = {"test_solved_lesson_passes_every_check_in_strict_mode"}
 _GROUP = {stem: group for group, stems in GROUPS.items() for stem in stems}
 
@@ -63,6 +62,3 @@ def group(item) -> str:
 def pytest_collection_modifyitems(items):
     for item in items:
         item.add_marker(getattr(pytest.mark, group(item)))
-        # Cells share a kernel and the tests of a file their fixtures; only long tables are dealt out (``pytest -n 2``).
-        if item.path.stem not in DEALT_OUT:
-            item.add_marker(pytest.mark.xdist_group(str(item.path)))

@@ -19,6 +19,9 @@ def plot_loop_frequencies(t, frequencies, nominal, ax=None):
     """Natural frequencies (k, 2) in Hz of each loop along a path over time t (k,) in s: a band between two modes.
 
     frequencies : dict of label -> (k, 2); at most four.  nominal : frequency in Hz that all were designed for.
+
+    >>> import numpy as np
+    >>> ax = plot_loop_frequencies(np.linspace(0, 1, 5), {"PD": np.full((5, 2), [4.0, 6.0])}, 5.0)
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.6))
     for (label, both), look in zip(frequencies.items(), _LOOKS, strict=False):
@@ -37,6 +40,8 @@ def plot_law_bands(names, columns, axes=None):
 
     names : of the laws.  columns : dict of axis label -> list of samples, one array for each law; the axes are
     logarithmic where the samples spread over more than a factor of ten.  Returns the axes.
+
+    >>> ax = plot_law_bands(["PD"], {"energy in J": [[4.0, 5.0]], "error in mm": [[0.5, 1.0]]})
     """
     if axes is None:
         axes = plt.subplots(1, len(columns), figsize=(9.6, 0.42 * len(names) + 1.1), sharey=True)[1]
@@ -54,7 +59,11 @@ def plot_law_bands(names, columns, axes=None):
 
 
 def plot_slow_error(t, error, predicted, ax=None):
-    """Errors (k, 2) in m of a run over time t (k,) in s, and what the slow theory predicts (dashed)."""
+    """Errors (k, 2) in m of a run over time t (k,) in s, and what the slow theory predicts (dashed).
+
+    >>> import numpy as np
+    >>> ax = plot_slow_error(np.linspace(0, 1, 5), np.zeros((5, 2)), np.full((5, 2), 1e-4))
+    """
     ax = axes_or_new(ax, figsize=(8.4, 3.2))
     for axis, (word, colour) in enumerate((("x", AFTER), ("y", BEFORE))):
         ax.plot(t, 1e3 * error[:, axis], color=colour, label=f"run, {word}")
