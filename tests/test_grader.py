@@ -125,6 +125,14 @@ def test_only_what_the_answers_need_is_run():
     assert {"1.0", "2.0", "3.0"} <= chosen and not {"1.1", "1.2"} & chosen
 
 
+def test_names_of_a_function_are_its_own():
+    texts = [
+        "scale = 2\nrows = 1 / 0\nprint(rows)\nx = 3\n",
+        "def answer(q):\n    rows = [x * q for x in range(3)]\n    return (lambda x: x)(scale), x, rows\nprint(answer(1))\n",
+    ]
+    assert [s.key for s in needed(statements(texts)[0], {"answer"})] == ["0.0", "0.3", "1.0"]
+
+
 def test_folders_without_submissions_are_refused(tmp_path, capsys):
     with pytest.raises(ValueError, match="allowed: a folder that exists"):
         found(tmp_path / "nowhere", {"04"})

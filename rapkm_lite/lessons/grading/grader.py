@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,10 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..checker import exercises
-from .submission import Submission, found
+from .submission import Submission, bound, found
 
 # Starts of one submission at most, each without what the one before hung in.
 _STARTS = 8
+_MISSING = re.compile(r"name '(\w+)' is not defined")
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ def grade(
 def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     """Grades of one notebook, for every exercise of its lesson."""
     results = _results(submission, seconds, whole=False)
-    if any(word == "wrong" and "NameError" in sentence for word, sentence, _ in results.values()):
+    missing = {name for _, sentence, _ in results.values() for name in _MISSING.findall(sentence)}
+    if missing and missing & bound(submission.path):
         # Something that an answer uses was not among the statements chosen for it.
         results = _results(submission, seconds, whole=True)
     grades = []

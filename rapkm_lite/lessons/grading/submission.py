@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import json
 import re
+import symtable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from ..exercise import Exercise
 
 _EXERCISE = re.compile(r"\d\d\.\w+")
 _NUMBER = re.compile(r"(?<!\d)(\d\d)_")
+_BUILT_IN = {*dir(builtins), "display"}
 
 
 @dataclass(frozen=True)
@@ -112,11 +115,28 @@ def _changes(node: ast.stmt) -> set[str]:
             names.add(_base(part.value))
         elif isinstance(part, ast.FunctionDef | ast.ClassDef):
             names.add(part.name)
-    return names
+    return names - _BUILT_IN  # print(...) does not change print
+
+
+def bound(path: Path) -> set[str]:
+    """Names that a notebook binds or changes at the top level of its cells; none when it cannot be read."""
+    try:
+        read, _ = statements(sources(path))
+    except ValueError:
+        return set()
+    imported = {name for s in read for name in _imported([s])}
+    return imported.union(*(_changes(s.node) for s in read))
 
 
 def _uses(node: ast.stmt) -> set[str]:
-    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load)}
+    """Names that a statement takes from outside itself; the arguments and variables of a function are its own."""
+    names, tables = set(), [symtable.symtable(ast.unparse(node), "cell", "exec")]
+    while tables:
+        table = tables.pop()
+        top = table.get_type() == "module"
+        names |= {s.get_name() for s in table.get_symbols() if s.is_referenced() and (top or s.is_global())}
+        tables += table.get_children()
+    return names
 
 
 def _only_calls(node: ast.stmt) -> bool:
