@@ -94,6 +94,7 @@ from .simulation.energy import (
 )
 from .simulation.experiments import Experiment, experiment, measured_energies, table1
 from .simulation.faults import DeadDrive, EncoderDropout, OffsetJump, TorqueLimit
+from .simulation.patience import progress
 from .simulation.runs import Run, SimulationError, simulate
 from .simulation.sensors import Sensors
 from .simulation.sweeps import Sweep, sweep
@@ -116,11 +117,11 @@ __all__ = [
     "kinetic_energy", "load", "loop_constraints", "lyapunov_function", "mass_matrix", "measured_energies",
     "mechanical_work", "minimal_dynamics", "minimal_terms", "minimax_torques", "mystery_run", "null_basis",
     "null_vector", "nullspace_projector", "nullspace_projector_dot", "orthogonal_complement",
-    "orthogonal_complement_dot", "polygon", "potential_energy", "prestress_projector", "projector", "projector_dot",
-    "reachable", "read_log", "redundant_control_matrix", "redundant_dynamics", "redundant_terms", "required_wrench",
-    "rest_exists", "sampling_box", "select_independent", "simulate", "singular_values", "steady_state_error",
-    "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf", "triangle", "weighted_pseudoinverse",
-    "working_mode", "working_modes", "workspace_grid",
+    "orthogonal_complement_dot", "polygon", "potential_energy", "prestress_projector", "progress", "projector",
+    "projector_dot", "reachable", "read_log", "redundant_control_matrix", "redundant_dynamics", "redundant_terms",
+    "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate", "singular_values",
+    "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf", "triangle",
+    "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",
 ]  # fmt: skip
 
 

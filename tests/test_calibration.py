@@ -169,6 +169,42 @@ def test_under_the_filter_torques_are_mute_and_angles_are_not():
     assert "mute" in rk.calibrate(FRICTIONLESS, log, use="torques", K_P=7.05).note
 
 
+def log_behind_friction(sides, f_c=4.2e-3, K_P=7.05, records=20):
+    """A log of PD drives at 12 places, each approached from the given sides; the sensor reads c + side f_c."""
+    x = np.repeat(random_points(FRICTIONLESS, 12, seed=6, bend=0.5), len(sides), axis=0)
+    side = np.tile(sides, 12)[:, None] * np.array([1.0, -1.0, 1.0])
+    rest = rk.inverse_kinematics(FRICTIONLESS, x)[:, :3] + OFFSET[:3]
+    # Desired angles that differ from rest to rest, as the errors of PD drives do.
+    desired = rest - np.random.default_rng(7).normal(0, 3e-3, rest.shape)
+    c = -K_P * (rest - desired) + side * f_c
+    rows = [np.repeat(column, records, axis=0) for column in (rest, desired, c)]
+    noise = np.random.default_rng(8).normal(0, 1e-5, rows[2].shape)
+    return rk.Log("friction", 1e-2 * np.arange(len(rows[0])), rows[0], rows[1], rows[2] + noise)
+
+
+def test_friction_before_a_torque_sensor_biases_one_sided_rests_by_fc_over_KP():
+    """Each reading q_desired - c / K_P is off by the same side f_c / K_P, and so is the offset; 0.6 mrad (reference).
+
+    Tolerance: 1e-5 N m of noise in the mean of 10 records and 12 rests, times a condition below ten.
+    """
+    bias = -np.array([1.0, -1.0, 1.0]) * 4.2e-3 / 7.05
+    noise = 10 * 1e-5 / 7.05 / np.sqrt(10)
+    found = rk.calibrate(FRICTIONLESS, log_behind_friction([1.0]), use="torques", K_P=7.05)
+    assert_allclose(found.offset - OFFSET[:3], bias, rtol=0, atol=noise)
+    assert found.note.count("both sides") == 3 and "-0.6 mrad" in found.note and "+0.6 mrad" in found.note
+    both = rk.calibrate(FRICTIONLESS, log_behind_friction([1.0, -1.0]), use="torques", K_P=7.05)
+    # To first order the sides cancel; the second order is a product of 5 mrad and 0.6 mrad.
+    assert_allclose(both.offset, OFFSET[:3], rtol=0, atol=noise + 10 * 5e-3 * 0.6e-3)
+    assert "both sides" not in both.note
+    # The angles feel no friction.
+    assert_allclose(rk.calibrate(FRICTIONLESS, log_behind_friction([1.0])).offset, OFFSET[:3], rtol=0, atol=1e-13)
+
+
+def test_healthy_torques_are_not_accused_of_friction():
+    for name in ("offset_a", "offset_b", "gain"):
+        assert "both sides" not in rk.calibrate(TESTBED, rk.mystery_run(name), use="torques").note
+
+
 @pytest.mark.parametrize(("radius", "reference"), [(0.03, 27.0), (0.08, 8.4), (0.12, 4.5)])
 def test_small_discs_are_ill_conditioned_and_a_small_residual_certifies_nothing(radius, reference):
     """24 places in a disc: the median condition of 20 draws; lengths wrong by 1e-3 hide in the offsets."""

@@ -15,7 +15,7 @@ OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
 PD = rk.PD(7.05, 0.225)
 MACHINE = MACHINES["testbed"].replace(gravity=(0.3, -1.0), load=0.05)
 MODEL = MACHINE.replace(lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]], load=0.02, friction=3e-3)
-COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_path_error", "largest_path_error")
 
 
 class Textbook(rk.Law):

@@ -14,7 +14,7 @@ ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 PD = rk.PD(7.05, 0.225)
-COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_path_error", "largest_path_error")
 
 
 class PI:

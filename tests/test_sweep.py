@@ -12,7 +12,7 @@ ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.4)
 PD = rk.PD(7.05, 0.225)
 OFFSETS = np.random.default_rng(1).normal(0.0, 5e-3, (37, 3))
-COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final")
+COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_path_error", "largest_path_error")
 
 
 def same(a, b):
@@ -39,6 +39,10 @@ def test_rows_are_single_runs(law, sensors):
         np.testing.assert_allclose(study.energies[i], run.energy, rtol=0, atol=1e-11)
         np.testing.assert_allclose(study.antagonistic_energy[i], rk.antagonistic_energy(run), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(study.x_final[i], run.x[-1], rtol=0, atol=1e-12)
+        off = np.linalg.norm(run.x - PATH.x, axis=1)
+        np.testing.assert_allclose(study.rms_path_error[i], np.sqrt(np.mean(off**2)), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(study.largest_path_error[i], off.max(), rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(run.path_error, off)
         mean_square = np.mean(np.sum(run.c[:-1] ** 2, axis=1))
         np.testing.assert_allclose(study.torque_norm[i], np.sqrt(mean_square), rtol=1e-10)
 

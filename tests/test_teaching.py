@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import nbformat
 import numpy as np
@@ -12,6 +13,11 @@ import pytest
 
 import rapkm_lite as rk
 from rapkm_lite.checks import exercises
+from rapkm_lite.lessons.lesson07 import tasks as lesson07
+from rapkm_lite.lessons.lesson09 import tasks as lesson09
+from rapkm_lite.lessons.lesson10 import tasks as lesson10
+from rapkm_lite.lessons.lesson11 import tasks as lesson11
+from rapkm_lite.lessons.lesson12 import tasks as lesson12
 
 ROOT = Path(__file__).parents[1]
 TEACHING = ROOT / "docs" / "teaching"
@@ -29,10 +35,10 @@ def test_generated_pages_are_up_to_date(name):
     assert kept == teaching.PAGES[name]().rstrip() + "\n", "run: python notebooks/build.py teaching"
 
 
-def test_exam_has_24_items_with_answers_and_marks():
-    assert list(ITEMS) == list(range(1, 25))
+def test_exam_has_39_items_with_answers_and_marks():
+    assert list(ITEMS) == list(range(1, 40))
     marks = [int(re.search(r"\((\d+) marks\)", body)[1]) for body in ITEMS.values()]
-    assert f"24 items, {sum(marks)} marks" in EXAM
+    assert f"39 items, {sum(marks)} marks" in EXAM
     assert all("**Answer.**" in body for body in ITEMS.values())
 
 
@@ -90,6 +96,80 @@ def test_numbers_of_the_exam():
     said(20, "4.5605", "2.2385", "51 %")
     assert (2e-3) ** 2 * (30e3 + 20e3 + 4e3) == pytest.approx(0.22, abs=0.005)
     said(24, "0.22 J", "7.5")
+
+
+def test_numbers_of_items_on_contradictions():
+    """Items 25 to 30: via points, delays, ranks, room and one sign."""
+    robot, line = rk.load(), lesson07.START + np.linspace(0, 1, 2001)[:, None] * (lesson07.END - lesson07.START)
+    gaps = []
+    for legs in (16, 32, 64):
+        shares = np.linspace(0, 1, legs + 1)
+        told = lesson07.set_points(robot, SimpleNamespace(x=line), lesson07.START, lesson07.END, shares)
+        gaps.append(1e3 * lesson07.contradiction(robot, told, line).max())
+    np.testing.assert_allclose(gaps, [1.7, 0.43, 0.11], atol=0.015)
+    said(25, "1.7", "0.43", "0.11", "2.6 mm")
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+    np.testing.assert_allclose(-7.05 * rk.prestress_projector(A) @ [2e-3, 0, 0], -4.7e-3)
+    said(26, "−4.7 mN m")
+    for name, ranks in (("testbed", [1, 2, 3]), ("four_arms", [2, 4])):
+        machine = rk.load(name)
+        places = rk.inverse_kinematics(machine, [[0.05, 0.0], [-0.02, 0.06], [-0.03, -0.05]])
+        rows = rk.null_basis(rk.control_matrix(machine, places)).mT
+        found = [np.linalg.matrix_rank(rows[: k + 1].reshape(-1, machine.n_arms), tol=1e-6) for k in range(len(ranks))]
+        assert found == ranks
+    c, n = 1e-3 * np.array([90.0, -40, -50]), np.full(3, 3**-0.5)
+    np.testing.assert_allclose(1e3 * lesson09.room(c, n, 0.08), [-52.0, -17.3], atol=0.05)
+    np.testing.assert_allclose(rk.allocate_torques(A, A.T @ c, 0.08), [0.08, -0.05, -0.06], atol=1e-9)
+    assert np.abs(rk.minimax_torques(A, A.T @ c)).max() == pytest.approx(0.07)
+    said(29, "(80, −50, −60) mN m", "70 mN m", "−52 ≤ μ ≤ −17")
+    c = 1e-3 * np.array([-12.0, 5, 7])
+    tight = lesson09.one_sign(A, A.T @ c, 4e-3)
+    np.testing.assert_allclose(1e3 * tight, [4, 21, 23])
+    assert n @ tight == pytest.approx(28e-3, abs=5e-4) and tight @ tight / (c @ c) == pytest.approx(4.5, abs=0.05)
+    said(30, "(4, 21, 23)", "28 mN m", "4.5 times")
+
+
+def test_numbers_of_items_on_imperfect_machines():
+    """Items 31 to 36: wrong lengths, counts, the speed of a loop, an unknown load."""
+    robot = rk.load()
+    drawing = robot.replace(friction=0.0)
+    fights = [
+        1e3 * np.linalg.norm(lesson10.geometry_fight(drawing.replace(lengths=long), drawing, [0.03, 0.02], k))
+        for long, k in ((0.2002, 7.05), (0.202, 7.05), (0.2002, 14.1))
+    ]
+    np.testing.assert_allclose(fights, [8.64, 85.4, 17.3], rtol=2e-3)
+    said(31, "8.64", "85.4", "17.3")
+    step, band = 7.05 * 2 * np.pi / 2000, 2 * robot.friction[0]
+    assert 1e3 * step == pytest.approx(22.1, abs=0.06) and 7.05 * band / step == pytest.approx(2.67, abs=0.005)
+    said(32, "22.1 mN m", "8.4 mN m", "2.67 N m/rad")
+    speed = lesson11.pd_frequencies(robot, rk.inverse_kinematics(robot, [0.0, 0.0]), np.full(3, 7.05))
+    np.testing.assert_allclose(speed, 4.63, atol=0.005)
+    np.testing.assert_allclose([7.05 * (5 / 4.63) ** 2, 20 / (2 * np.pi)], [8.22, 3.18], atol=0.005)
+    said(34, "3.18 Hz", "8.22", "987")
+    assert -0.1 / 0.25 * 0.5 / (10 * np.pi) ** 2 == pytest.approx(-2.0e-4, rel=0.02)
+    said(35, "−0.20 mm")
+    laws = [rk.CTC((2 * np.pi * f) ** 2, 4 * np.pi * f, None) for f in (1.5, 3, 5, 8)]
+    path, offset = rk.triangle(robot, 0.12, 2.5), 1e-3 * np.array([4, -2, 5])
+    study = rk.sweep(robot.replace(load=0.1), laws, path, offset, encoder=2000, model=robot, velocity_filter=5e-3)
+    np.testing.assert_allclose(study.energies.sum(axis=1), [9.2, 18.3, 44.8, 121.2], atol=0.06)
+    np.testing.assert_allclose(1e3 * study.largest_path_error, [2.7, 1.2, 1.2, 1.2], atol=0.06)
+    said(36, "9.2, 18.3, 44.8 and 121.2 J", "2.7, 1.2, 1.2 and 1.2 mm")
+
+
+def test_numbers_of_items_on_other_machines():
+    """Items 37 to 39: a length, units, and signs of the null vector."""
+    A = np.array([[0, 2.5, -0.25], [-2.5, 0, -0.25], [0, -2.5, -0.25], [2.5, 0, -0.25]])
+    assert np.linalg.cond(A) == pytest.approx(7.1, abs=0.05)
+    assert np.linalg.cond(A / [1, 1, 0.141]) == pytest.approx(1, abs=0.005)
+    said(37, "7.1", "0.141 m")
+    robot = rk.load()
+    J = rk.constraint_jacobian(robot, rk.inverse_kinematics(robot, [0.02, 0.03]))
+    theirs = lesson12.in_units(J, np.array([1.0, 2.0, 0.5, 3.0, 1.0, 7.0]))
+    tangent = rk.projector(J) @ np.arange(6.0)
+    np.testing.assert_allclose(theirs @ tangent, tangent, atol=1e-12)
+    assert np.abs((theirs - rk.projector(J)) @ np.eye(6)[0]).max() > 0.1
+    assert (3 / 7) ** 2 == pytest.approx(0.18, abs=0.005)
+    said(39, "18 %", "(4, −2, −5)")
 
 
 def test_the_arm_of_item_six():

@@ -208,11 +208,16 @@ def test_no_singularity_up_to_045_and_one_in_the_other_mode():
 
 
 def test_default_cut_off_blows_up_and_the_rank_does_not():
-    """The fourth singular value is rounding, of the size of the default cut-off: no number, but far from rare."""
+    """The fourth singular value is rounding, of the size of the default cut-off: where it lies above, it is inverted.
+
+    How often that is, 60 % of the poses in the reference, is a matter of the libraries; that it happens is enough.
+    """
     J = MACHINE.J(four_rrr.angles(poses(2000)))
     printed = (np.eye(9) - np.linalg.pinv(J) @ J)[:, :4]
     wild = np.abs(np.linalg.pinv(printed.mT)).max(axis=(1, 2)) > 1e6
-    assert 0.3 < wild.mean() < 1.0
+    sigma = np.linalg.svd(printed.mT, full_matrices=False)[1]
+    assert wild.any()
+    np.testing.assert_array_equal(wild, sigma[:, 3] > 1e-15 * sigma[:, 0])
     A = rk.projector(J)[:, :4]
     truth = np.linalg.pinv(A.mT, rcond=1e-9)
     assert_allclose(rk.explicit_pseudoinverse(A, rk.select_independent(A, delta=3)), truth, atol=1e-11)

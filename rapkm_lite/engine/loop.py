@@ -168,6 +168,18 @@ def add_up(lanes, drives, arms, w):
 
 
 @outlined
+def add_miss(lanes, arms, table, o, w):
+    """Squared distance of the end-effector from the path at a sample: the sum of all, and the largest."""
+    L, W = len(lanes), len(arms)
+    x, y = table[o], table[o + 1]
+    for j in range(L):
+        dx, dy = w[of(X, j, W, L)] - x, w[of(Y, j, W, L)] - y
+        square = dx * dx + dy * dy
+        w[of(MISS2, j, W, L)] += square
+        w[of(FARTHEST, j, W, L)] = max(w[of(FARTHEST, j, W, L)], square)
+
+
+@outlined
 def add_work(lanes, arms, w):
     """Work of the hold that ends at this sample."""
     P = len(arms) * len(lanes)
@@ -202,6 +214,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
             plant.mend(lanes, arms, table, o, w)
         if study is not None:
             add_work(lanes, arms, w)
+            add_miss(lanes, arms, table, o, w)
 
         # Measure: ideal encoders have their errors from `sense`.
         if real:

@@ -100,15 +100,17 @@ BLOCKS = UY + 1
     NOW,
     TORQUE2,
     ANTAGONISM,
+    MISS2,
+    FARTHEST,
     STATUS,
     SAMPLE,
     GRAVITY_X,
     GRAVITY_Y,
     SHARPNESS,
     MASS,
-) = range(54)
+) = range(56)
 # The environment of the machine as in `tables.environment`, and after it that of the model.
-ENVIRONMENT, SINGLES = 4, 58
+ENVIRONMENT, SINGLES = 4, 60
 
 
 @leaf

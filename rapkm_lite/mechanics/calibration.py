@@ -21,7 +21,7 @@ from ..machine.manipulator import Manipulator
 from ..machine.values import Array, Value
 from .at import at
 from .encoders import changed, closure, equations, gauge, poses, rounding, unknown_names
-from .rests import Rests, fitted_gain, rests
+from .rests import Rests, fitted_gain, one_sided, rests
 
 UNKNOWNS = ("offsets", "offsets+lengths", "all")
 GAUGE = ("scale", "rotation", "translation x", "translation y")
@@ -107,7 +107,8 @@ def calibrate(
     unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these four motions stay unseen,
     scale, rotation and two translations of the whole machine.
     use : "angles", every sample, moving or not; or "torques", those of the rests of PD drives under a known gain, of
-    which each says where its encoder stood, q_desired - c / K_P.
+    which each says where its encoder stood, q_desired - c / K_P; friction before a torque sensor shifts that, and the
+    offset, by f_c / K_P where all rests are approached from one side, and `note` says so.
     K_P : number or (N,) N m/rad, for torques; default: fitted to the rests of the log.
     noise : rad, standard deviation of a reading; default: from the residual and the steps of the readings.
     Raises `CalibrationError` where the samples do not determine the unknowns, with the combinations that they do, and
@@ -174,6 +175,7 @@ def _angles_of_torques(
         K_P = gain.K_P
     K_P = bounded("K_P", _per_drive(robot.n_arms, K_P), 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
+    notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     felt, seen = (np.abs(closure(robot, poses(robot, a), a)).max() for a in (angles, stand.q_a))
     if felt < 0.1 * seen and seen > 5 * spread:

@@ -55,6 +55,29 @@ def rests(logs: list[Log], shortest: int = 10) -> Rests | None:
     return Rests(*map(np.array, zip(*found, strict=True))) if found else None
 
 
+def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
+    """A sentence for each drive whose torques lie aside of -K_P e at all rests, by a line with slope and intercept.
+
+    Friction between motor and torque sensor does that where all rests are approached from one side: the sensor reads
+    c -+ f_c, and the offset comes out wrong by f_c / K_P.
+    """
+    e, said = stand.q_a - stand.desired, []
+    for i in range(e.shape[1]):
+        weight = 1.0 / np.maximum(stand.c_error[:, i], 1e-12)
+        design = np.stack([e[:, i], np.ones(len(e))], axis=-1) * weight[:, None]
+        information = design.T @ design
+        if np.linalg.cond(information / np.sqrt(np.outer(*2 * [np.diagonal(information)]))) > 1e10:
+            continue
+        aside = np.linalg.solve(information, design.T @ (weight * stand.c[:, i]))[1]
+        if abs(aside) > 5 * np.sqrt(np.linalg.inv(information)[1, 1]) and abs(aside) > 1e-4 * K_P[i]:
+            said.append(
+                f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m aside of -K_P times the error, as with "
+                f"friction before a sensor: that shifts its offset by {-1e3 * aside / K_P[i]:+.2g} mrad; approach each "
+                "place from both sides"
+            )
+    return said
+
+
 def fitted_gain(stand: Rests) -> Gain | None:
     """K_P of c = -K_P (q_a - q_desired) over the rests, drive by drive; None where a drive shows no error."""
     e = stand.q_a - stand.desired

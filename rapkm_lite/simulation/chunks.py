@@ -23,12 +23,15 @@ class Columns(NamedTuple):
     torque_norm: np.ndarray
     antagonistic_energy: np.ndarray
     x_final: np.ndarray
+    rms_path_error: np.ndarray
+    largest_path_error: np.ndarray
     failure_time: np.ndarray
     status: np.ndarray
 
     @classmethod
     def blank(cls, k: int, N: int) -> Columns:
-        return cls(np.zeros((k, N)), np.zeros(k), np.zeros(k), np.zeros((k, 2)), np.zeros(k), np.full(k, NOT_RUN))
+        sizes = (k, N), k, k, (k, 2), k, k, k
+        return cls(*map(np.zeros, sizes), np.full(k, NOT_RUN))
 
     @property
     def failed(self) -> np.ndarray:
@@ -63,7 +66,9 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
             if not errors:
                 errors[i] = error
         else:
-            values = run.energy, root_mean_square_torque(run), antagonistic_energy(run), run.x[-1], 0.0, DONE
+            off = run.path_error
+            torques = run.energy, root_mean_square_torque(run), antagonistic_energy(run)
+            values = *torques, run.x[-1], np.sqrt(np.mean(off**2)), off.max(), 0.0, DONE
             for column, value in zip(rows, values, strict=True):
                 column[i] = value
     return rows, errors

@@ -40,9 +40,11 @@ def single(setup: Setup, code: Code) -> Outcome:
 
 def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
     """One run per code and row of offsets (k, N): energies (k, N), torque norm, antagonistic energy, final position
-    (k, 2), failure time and status; zeros where a run failed, and failure time zero where it did not."""
+    (k, 2), path error, rms and largest, (k,) each, failure time and status; zeros where a run failed, and failure time
+    zero where it did not."""
     k, N = offsets.shape
-    columns = np.zeros((k, N)), np.zeros(k), np.zeros(k), np.zeros((k, 2)), np.zeros(k), np.zeros(k, int)
+    sizes = (k, N), k, k, (k, 2), k, k, k
+    columns = *map(np.zeros, sizes), np.zeros(k, int)
     kinds: dict = {}
     for i, code in enumerate(codes):
         kinds.setdefault(code.kind, []).append(i)
@@ -70,6 +72,8 @@ def _sums(setup: Setup, w) -> tuple:
         np.sqrt(np.where(done, w("TORQUE2"), 0.0) / holds),
         np.where(done, w("ANTAGONISM") * dt, 0.0),
         np.where(done[:, None], final, 0.0),
+        np.sqrt(np.where(done, w("MISS2"), 0.0) / len(t)),
+        np.sqrt(np.where(done, w("FARTHEST"), 0.0)),
         np.where(done, 0.0, t[sample]),
         status,
     )

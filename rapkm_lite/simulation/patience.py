@@ -5,6 +5,9 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
+from collections.abc import Iterator
+
+from ..machine.arguments import short
 
 _known = set()
 _TEXT = "rapkm_lite compiles its engine for this kind of run; once, some seconds ..."
@@ -77,6 +80,30 @@ def _show():
     return lambda: None
 
 
+def progress(items) -> Iterator:
+    """The items one by one, with the bar of `sweep`, for studies of your own that no sweep can make.
+
+    items : a list, tuple, array, dict or range.
+    The bar is seen in a notebook or a terminal and leaves nothing behind.
+
+    >>> import rapkm_lite as rk
+    >>> [k**2 for k in rk.progress([1, 2, 3])]
+    [1, 4, 9]
+    """
+    try:
+        total = len(items)
+    except TypeError:
+        raise ValueError(f"items = {short(items)}; allowed: a list, tuple, array, dict or range") from None
+    return _counted(items, total)
+
+
+def _counted(items, total: int) -> Iterator:
+    with progress_bar(total) as advance:
+        for item in items:
+            yield item
+            advance()
+
+
 @contextlib.contextmanager
 def progress_bar(total: int):
     """A bar over `total` chunks (0: none) that goes away at its end; yields the function that advances it."""
@@ -91,6 +118,8 @@ def progress_bar(total: int):
     def advance():
         nonlocal done
         done += 1
+        if not total or 100 * done // total == 100 * (done - 1) // total:
+            return  # nobody sees more than a hundred steps
         if notebook:
             bar.value = done
         elif terminal:

@@ -126,6 +126,11 @@ class Run(Value):
         return self.q_a - self.trajectory.q_a[: len(self)]
 
     @property
+    def path_error(self) -> np.ndarray:
+        """Distance (k,) of the end-effector from the path at each sample, m."""
+        return np.linalg.norm(self.x - self.trajectory.x[: len(self)], axis=-1)
+
+    @property
     def switches(self) -> int:
         """How often the pair of independent joints was changed."""
         return int(np.count_nonzero(np.any(np.diff(self.pairs, axis=0) != 0, axis=-1)))

@@ -36,6 +36,7 @@ class Sweep(Value):
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.
     antagonistic_energy : (k,) J, (R_el / k_t^2) times the integral of ||c_null||^2 at the true pose.
     x_final : (k, 2) end-effector position at the end, m.
+    rms_path_error, largest_path_error : (k,) of `Run.path_error` over the samples, root mean square and maximum, m.
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
 
     >>> import rapkm_lite as rk
@@ -52,6 +53,8 @@ class Sweep(Value):
     torque_norm: np.ndarray
     antagonistic_energy: np.ndarray
     x_final: np.ndarray
+    rms_path_error: np.ndarray
+    largest_path_error: np.ndarray
     failed: np.ndarray
     failure_time: np.ndarray
 
@@ -263,6 +266,8 @@ def _result(table: Columns, robot, law, trajectory, offsets, mask: bool) -> Swee
         column(table.torque_norm),
         column(table.antagonistic_energy),
         column(table.x_final),
+        column(table.rms_path_error),
+        column(table.largest_path_error),
         failed,
         np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN)),
     )

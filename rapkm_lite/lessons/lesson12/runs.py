@@ -8,6 +8,7 @@ import numpy as np
 
 from ...machine.arguments import matvec
 from ...mechanics import cores
+from ...simulation.patience import progress
 from .mechanism import Mechanism, accelerations
 
 
@@ -41,7 +42,8 @@ def run(mechanism: Mechanism, laws: list, motion, offset) -> tuple[np.ndarray, n
     q = np.tile(motion.q[0], (len(laws), 1))
     qd, fit = np.zeros_like(q), q
     all_q, all_c = [], []
-    for wanted in zip(motion.q, motion.qd, motion.qdd, strict=True):
+    for k in progress(range(len(motion.t))):
+        wanted = motion.q[k], motion.qd[k], motion.qdd[k]
         measured = q.copy()
         measured[:, :m] += offset
         fit = _fit(mechanism, measured[:, :m], fit)
