@@ -14,12 +14,12 @@ import copy
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import sys
 import tempfile
 import time
-from collections import defaultdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -108,14 +108,22 @@ def draw(count: int, seed: int, modules) -> list[Mutant]:
         node, statement = places(other)[k]
         line: int = getattr(node, "lineno", 0)
         source = module.read_text(encoding="utf-8").splitlines()[line - 1].strip()
-        # A compound statement ends where its body begins.
-        body = getattr(statement, "body", None)
-        end = body[0].lineno - 1 if isinstance(body, list) and body else statement.end_lineno or statement.lineno
-        lines = range(statement.lineno, max(end, line) + 1)
+        lines = extent(statement, line)
         what = changed(node)
         text = ast.unparse(ast.fix_missing_locations(other))
         mutants.append(Mutant(module, lines, line, source, what, text))
     return mutants
+
+
+def extent(statement: ast.stmt, line: int) -> range:
+    """The lines by which a test comes by a change in a statement: a compound one ends where its body begins, and
+    what stands in the head of a function is used where its body runs."""
+    body = getattr(statement, "body", None)
+    if not isinstance(body, list) or not body:
+        return range(statement.lineno, (statement.end_lineno or statement.lineno) + 1)
+    if isinstance(statement, ast.FunctionDef):
+        return range(body[0].lineno, (statement.end_lineno or line) + 1)
+    return range(statement.lineno, max(body[0].lineno - 1, line) + 1)
 
 
 # Tests.
@@ -123,46 +131,48 @@ class Tracer:
     """A plugin for pytest that notes which lines of the rooms each test runs, and for how long it runs."""
 
     def __init__(self, folder: Path):
-        self.rooms = tuple(f"{folder / 'rapkm_lite' / room}{os.sep}" for room in ROOMS)
-        self.seen: dict[str, dict[str, list]] = {}
+        import coverage
+
+        rooms = [str(folder / "rapkm_lite" / room) for room in ROOMS]
+        self.coverage = coverage.Coverage(data_file=None, source=rooms, config_file=False, messages=False)
+        self.coverage.start()
         self.seconds: dict[str, float] = {}
         self.failed: list[str] = []
-        self.lines: defaultdict[str, set] = defaultdict(set)
-
-    def trace(self, frame, event, argument):
-        name = frame.f_code.co_filename
-        if not name.startswith(self.rooms):
-            return None
-        lines = self.lines[name]
-        lines.add(frame.f_lineno)
-
-        def local(frame, event, argument):
-            lines.add(frame.f_lineno)
-            return local
-
-        return local
 
     def pytest_runtest_logstart(self, nodeid, location):
-        self.lines = defaultdict(set)
+        self.coverage.switch_context(nodeid)
         self.start = time.perf_counter()
-        sys.settrace(self.trace)
 
     def pytest_runtest_logreport(self, report):
         if report.failed:
             self.failed.append(report.nodeid)
 
     def pytest_runtest_logfinish(self, nodeid, location):
-        sys.settrace(None)
         self.seconds[nodeid] = time.perf_counter() - self.start
-        self.seen[nodeid] = {Path(name).stem: sorted(lines) for name, lines in self.lines.items()}
+        self.coverage.switch_context("")
+
+    def seen(self, folder: Path) -> dict[str, dict[int, list[str]]]:
+        """Tests by line, by module; without those that fail in an unchanged tree."""
+        self.coverage.stop()
+        data, seen = self.coverage.get_data(), {}
+        for file in data.measured_files():
+            lines = data.contexts_by_lineno(file)
+            good = {line: sorted(set(tests) - {"", *self.failed}) for line, tests in lines.items()}
+            seen[Path(file).relative_to(folder).as_posix()] = good
+        return seen
 
 
-def inside(folder: Path, seconds: float, work) -> int | None:
-    """What a piece of work returns in a process of its own, silently; None when it takes too long."""
+def inside(folder: Path, seconds: float, work) -> int:
+    """What a piece of work returns in a process of its own, silently; not 0 when it takes too long.
+
+    Its processor time is limited, so that other work on the cores kills nothing, and ten times that by the clock.
+    """
     child = os.fork()
     if child == 0:
         code = 1
         try:
+            resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+            signal.setitimer(signal.ITIMER_REAL, 10.0 * seconds)
             os.chdir(folder)
             sys.path.insert(0, str(folder))
             quiet = os.open(os.devnull, os.O_WRONLY)
@@ -171,15 +181,7 @@ def inside(folder: Path, seconds: float, work) -> int | None:
             code = int(work())
         finally:
             os._exit(code)
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.02)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return None
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 def tests_by_line(folder: Path, names) -> dict:
@@ -194,8 +196,8 @@ def tests_by_line(folder: Path, names) -> dict:
 
         tracer = Tracer(folder)
         pytest.main(["-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
-        good = {name: seen for name, seen in tracer.seen.items() if name not in tracer.failed}
-        place.write_text(json.dumps({"seen": good, "seconds": tracer.seconds, "failed": tracer.failed}))
+        found = {"seen": tracer.seen(folder), "seconds": tracer.seconds, "failed": tracer.failed}
+        place.write_text(json.dumps(found))
         return 0
 
     if inside(folder, 3600.0, work) != 0:
@@ -203,13 +205,12 @@ def tests_by_line(folder: Path, names) -> dict:
     return json.loads(place.read_text())
 
 
-def killed(mutant: Mutant, folder: Path, found: dict, seconds: float) -> bool:
+def killed(mutant: Mutant, folder: Path, found: dict) -> bool:
     """Does a test notice?  The quick tests of the line first, then all of them; too long a run counts as noticed."""
-    stem, wanted = mutant.module.stem, set(mutant.lines)
-    near = [name for name, seen in found["seen"].items() if wanted & set(seen.get(stem, ()))]
+    lines = found["seen"].get(mutant.module.relative_to(ROOT).as_posix(), {})
+    near = {test for line in mutant.lines for test in lines.get(str(line), ())}
     # What runs on import belongs to every test that comes by the module.
-    near = near or [name for name, seen in found["seen"].items() if stem in seen]
-    near.sort(key=lambda name: found["seconds"][name])
+    near = sorted(near or {test for tests in lines.values() for test in tests}, key=found["seconds"].get)
     if not near:
         return False
     quick = near[:40]
@@ -226,7 +227,7 @@ def killed(mutant: Mutant, folder: Path, found: dict, seconds: float) -> bool:
     original = place.read_text(encoding="utf-8")
     place.write_text(mutant.text, encoding="utf-8")
     try:
-        return inside(folder, seconds, work) != 0
+        return inside(folder, 60.0 + 3.0 * sum(found["seconds"][name] for name in near), work) != 0
     finally:
         place.write_text(original, encoding="utf-8")
 
@@ -243,7 +244,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=120.0, help="patience with one mutant")
     parser.add_argument("--minutes", type=float, default=1e6, help="draw no more mutants after that time")
     parser.add_argument("--modules", nargs="*", default=[], help="change these only, such as calibration")
     parser.add_argument("--tests", nargs="*", default=[], help="run these files only, such as test_calibration")
@@ -255,12 +255,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for part in ("rapkm_lite", "tests", "data", "docs", "notebooks"):
-            shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc"))
         for part in ROOT.glob("*.*"):
             if part.is_file():
                 shutil.copy2(part, folder / part.name)
         os.environ["PYTHONPATH"] = str(folder)
         # What every child needs, read once; nothing of the package, which changes.
+        import coverage  # noqa: F401
         import hypothesis
         import pytest
         import scipy.integrate
@@ -270,10 +271,11 @@ def main() -> None:
             import numba  # noqa: F401
         except ImportError:
             print(f"without Numba; pytest {pytest.__version__}, hypothesis {hypothesis.__version__}")
+        mutants = draw(given.count, given.seed, given.modules)
         found = tests_by_line(folder, given.tests)
-        print(f"{len(found['seen'])} tests, {sum(found['seconds'].values()):.0f} s traced; failed and left out:")
+        print(f"{len(found['seconds'])} tests, {sum(found['seconds'].values()):.0f} s traced; failed and left out:")
         print("\n".join(found["failed"]) or "none", flush=True)
-        for mutant in draw(given.count, given.seed, given.modules):
+        for mutant in mutants:
             if time.monotonic() > end:
                 break
             judged += 1
@@ -282,7 +284,7 @@ def main() -> None:
                 equal.append(f"{line}  ({reasons[mutant.name]})")
                 print(f"{judged:4} nothing  {line}", flush=True)
                 continue
-            dead = killed(mutant, folder, found, given.seconds)
+            dead = killed(mutant, folder, found)
             print(f"{judged:4} {'killed  ' if dead else 'SURVIVES'} {line}", flush=True)
             survivors += [] if dead else [f"{line}\n    {mutant.name}"]
     real = judged - len(equal)

@@ -215,7 +215,8 @@ MOTIONS = {
 
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize(
-    ("friction", "velocity"), [(4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3), (1.0, 0.03), (1.0, 1e-4)]
+    ("friction", "velocity"),
+    [(0.0, 0.01), (4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3), (1.0, 0.03), (1.0, 1e-4)],
 )
 def test_friction_as_a_stiff_solver_has_it(friction, velocity, motion):
     """LSODA at its tightest in every hold."""

@@ -41,6 +41,16 @@ def test_rates_are_the_derivatives_of_what_they_belong_to(path):
 
 
 @every_path
+def test_joint_rates_are_those_of_the_complement(path):
+    """qd = F xd and qdd = F xdd + Fdot xd, (5): a path finds them arm by arm, without F."""
+    pose = rk.at(path.robot, path.q, path.qd)
+    qd = np.einsum("kij,kj->ki", pose.F, path.xd)
+    qdd = np.einsum("kij,kj->ki", pose.F, path.xdd) + np.einsum("kij,kj->ki", pose.F_dot, path.xd)
+    assert_allclose(path.qd, qd, rtol=0, atol=1e-14 * np.abs(qd).max())
+    assert_allclose(path.qdd, qdd, rtol=0, atol=1e-13 * np.abs(qdd).max())
+
+
+@every_path
 def test_paths_are_closed_and_run_from_rest_to_rest(path):
     assert_allclose(path.x[0], path.x[-1], atol=1e-15)
     for rate in (path.xd, path.xdd, path.qd, path.qdd):

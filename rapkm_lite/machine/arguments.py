@@ -35,7 +35,8 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
         array = _converted(name, value, last)
     # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
     # for a large one it would wake the threads of the linear algebra library.
-    if array.size > 1000 or not np.vdot(array, array) < 1e200:
+    small = array.size <= 1000
+    if not (np.vdot(array, array) < 1e200 if small else -1e100 < array.min() and array.max() < 1e100):
         fine = np.abs(array) < 1e100
         if not np.all(fine):
             bad = np.argwhere(~fine)[0]

@@ -32,7 +32,7 @@ class Manipulator(Value):
     resistance : winding resistance R, ohm.
     torque_constant : k_t, N m/A.
     friction : Coulomb friction f_c of each drive, N m; zero switches it off.
-    friction_velocity : v0 of f_c tanh(qd / v0), rad/s.
+    friction_velocity : v0 of f_c tanh(qd / v0), rad/s; runs take time in proportion to f_c / v0 where it is stiff.
     gravity : (2,) gravity vector in the plane, m/s^2; default zero (horizontal plane).
     load : point mass at the end-effector, kg, carried by arm 2 of the cut tree.
     mode : (N,) working mode, s_i = sign(sin(elbow angle i)).

@@ -25,12 +25,13 @@ def wrap(angle: np.ndarray) -> np.ndarray:
 def joint_angles(robot, x: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """q (..., 2N) of the end-effector at x, and the cosines of the elbow angles, beyond 1 where x is out of reach."""
     l1, l2 = robot.lengths.T
-    D = x[..., None, :] - robot.base
-    dx, dy = D[..., 0], D[..., 1]
+    # Along the poses in memory: NumPy's loops over the few arms of a pose would cost more than the arithmetic.
+    dx, dy = (np.add.outer(-base, point.T).T for base, point in zip(robot.base.T, (x[..., 0], x[..., 1]), strict=True))
     cosine = (np.sqrt(dx * dx + dy * dy) ** 2 - l1**2 - l2**2) / (2 * l1 * l2)
     elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
     base = np.arctan2(dy, dx) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
-    return np.concatenate([wrap(base), elbow], axis=-1), cosine
+    q = np.empty((*base.shape[:-1], 2 * len(l1)))
+    return np.concatenate([wrap(base), elbow], axis=-1, out=q), cosine
 
 
 def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:

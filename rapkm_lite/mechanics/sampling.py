@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..machine.arguments import matvec, positive_number, real_array, short
+from ..machine.arguments import positive_number, real_array, short
 from ..machine.manipulator import Manipulator
 from . import cores
 from .kinematics import inverse_kinematics
@@ -58,18 +58,32 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
 
 def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q, qd = F xd and qdd = F xdd + Fdot xd, each (k, 2N), for some samples of a path; `before` is the row of q
-    from which the base angles go on, if there is one."""
+    from which the base angles go on, if there is one.
+
+    Without F: the tip of an arm moves with xd = w1 E a + w2 E d, w1 and w2 the rates of its links, so that
+    w1 = d . xd / (a x d) and w2 = -a . xd / (a x d); their derivatives come likewise from xdd + w1^2 a + w2^2 d.
+    """
     tree, q, N = robot.tree, inverse_kinematics(robot, x), robot.n_arms
     base = np.concatenate([before[:, :N], q[:, :N]])
     if np.abs(np.diff(base, axis=0)).max(initial=0.0) >= np.pi:
         q[:, :N] = np.unwrap(base, axis=0)[len(base) - len(q) :]
-    v = cores.link_vectors(tree, q)
-    lever = cores.inner_levers(tree, v)
-    over = v / lever
-    F = cores.complement(tree, over)
-    qd = matvec(F, xd)
-    F_dot = cores.complement(tree, cores.over_lever_dot(tree, v, lever, over, cores.link_rates(tree, qd), qd))
-    return q, qd, matvec(F, xdd) + matvec(F_dot, xd)
+    # Arms first, as in memory loops run along the samples.
+    angle, l1 = np.ascontiguousarray(q[:, :N].T), robot.lengths[:, :1]
+    a = l1 * np.cos(angle), l1 * np.sin(angle)
+    d = [np.add.outer(-robot.base[:, i], x[:, i]) - a[i] for i in range(2)]
+    lever = a[0] * d[1] - a[1] * d[0]
+    if np.any(np.abs(lever) < tree.edge[:, None]):
+        cores.inner_levers(tree, cores.link_vectors(tree, q))
+
+    def rates(u0, u1) -> np.ndarray:
+        """Base and elbow joints, (2N, k), when the tips move at the rate (u0, u1)."""
+        first = (d[0] * u0 + d[1] * u1) / lever
+        return np.concatenate([first, -(a[0] * u0 + a[1] * u1) / lever - first])
+
+    qd = rates(*xd.T)
+    links = qd[:N] ** 2, (qd[:N] + qd[N:]) ** 2
+    qdd = rates(*(xdd[:, i] + a[i] * links[0] + d[i] * links[1] for i in range(2)))
+    return q, qd.T, qdd.T
 
 
 def refuse(robot: Manipulator, x, given: dict) -> None:

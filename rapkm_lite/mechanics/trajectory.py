@@ -205,10 +205,10 @@ def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given:
     def motion(rows: slice):
         phase = np.clip((t[rows] - rest) / edge_time, 0.0, edges)
         edge = np.minimum(np.floor(phase).astype(int), edges - 1)
-        s = (phase - edge)[:, None]
+        s = phase - edge
         way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
-        step = (ends - corners)[edge]
-        return corners[edge] + way * step, rate * step / edge_time, rate_dot * step / edge_time**2
+        first, step = corners.T[:, edge], (ends - corners).T[:, edge]
+        return (first + way * step).T, (rate * step / edge_time).T, (rate_dot * step / edge_time**2).T
 
     return _follow(robot, t, motion, given)
 
@@ -249,16 +249,16 @@ def circle(
     manipulator(robot)
     radius = positive_number("radius", radius)
     t = sample_times(duration, dt)
-    full, middle = 2 * np.pi * positive_number("turns", turns), exact_array("centre", centre, 2)
+    full, middle = 2 * np.pi * positive_number("turns", turns), exact_array("centre", centre, 2)[:, None]
 
     def motion(rows: slice):
-        s = t[rows, None] / duration
+        s = t[rows] / duration
         angle = full * s**3 * (10 - 15 * s + 6 * s * s)
         rate = full / duration * 30 * (s * (1 - s)) ** 2
         rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
-        u = np.concatenate([np.cos(angle), np.sin(angle)], axis=-1)
-        v = np.stack([-u[:, 1], u[:, 0]], axis=-1)
-        return middle + radius * u, radius * rate * v, radius * (rate_dot * v - rate**2 * u)
+        u = np.stack([np.cos(angle), np.sin(angle)])
+        v = np.stack([-u[1], u[0]])
+        return (middle + radius * u).T, (radius * rate * v).T, (radius * (rate_dot * v - rate**2 * u)).T
 
     return _follow(robot, t, motion, {"radius": radius, "centre": centre})
 

@@ -14,8 +14,10 @@ _TEXT = "rapkm_lite compiles its engine for this kind of run; once, some seconds
 
 
 @contextlib.contextmanager
-def patience(*kind, after: float = 0.7):
+def patience(*kind, after: float = 0.7, text: str = _TEXT):
     """Show one line if the first call of this kind takes longer than `after` seconds, and take it away at its end.
+
+    Without a kind, if this call does.
 
     In a terminal the line is overwritten; in a notebook it is a widget that is closed, which leaves no text behind;
     anywhere else nothing is shown.
@@ -24,7 +26,7 @@ def patience(*kind, after: float = 0.7):
         yield
         return
     clear = []
-    timer = threading.Timer(after, lambda: clear.append(_show()))
+    timer = threading.Timer(after, lambda: clear.append(_show(text)))
     timer.daemon = True
     try:
         timer.start()
@@ -33,7 +35,7 @@ def patience(*kind, after: float = 0.7):
         return
     try:
         yield
-        _known.add(kind)
+        _known.update([kind] if kind else [])
     finally:
         timer.cancel()
         timer.join()
@@ -66,17 +68,17 @@ def _terminal(text: str) -> None:
     sys.stderr.flush()
 
 
-def _show():
+def _show(text: str):
     """Show the line and return the function that takes it away."""
     if _notebook():
         from ipywidgets import Label
 
-        label = Label(_TEXT)
+        label = Label(text)
         _display(label)
         return label.close
     if _in_terminal():
-        _terminal(_TEXT)
-        return lambda: _terminal(" " * len(_TEXT) + "\r")
+        _terminal(text)
+        return lambda: _terminal(" " * len(text) + "\r")
     return lambda: None
 
 
