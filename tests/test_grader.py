@@ -128,7 +128,8 @@ def test_only_what_the_answers_need_is_run():
 def test_names_of_a_function_are_its_own():
     texts = [
         "scale = 2\nrows = 1 / 0\nprint(rows)\nx = 3\n",
-        "def answer(q):\n    rows = [x * q for x in range(3)]\n    return (lambda x: x)(scale), x, rows\nprint(answer(1))\n",
+        "def answer(q):\n    rows = [x * q for x in range(3)]\n    return (lambda x: x)(scale), x, rows\n"
+        "print(answer(1))\n",
     ]
     assert [s.key for s in needed(statements(texts)[0], {"answer"})] == ["0.0", "0.3", "1.0"]
 
