@@ -1,12 +1,11 @@
 """Rest under PD control with offsets and stepped angles, and the logs made for the exercises."""
 
 import importlib.util
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
+from scipy.optimize import Bounds, LinearConstraint, milp
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import K_P, hidden
@@ -34,30 +33,32 @@ def test_rest_always_exists_below_the_threshold():
         assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
 
 
-def rest_by_linear_programming(robot, q, K_P, offset, quantum, friction, reach=2):
-    """Some counts near the ideal ones, read by a displacement x, whose torques are a prestress up to friction?"""
+def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction, reach=2):
+    """Some counts near the ideal ones, read by a displacement x, whose torques are a prestress up to friction?
+
+    Unknowns are the counts (N, whole), x scaled, and the prestress along the null basis; both strips are rows.
+    """
     N = robot.n_arms
     A, Z = (f(rk.control_matrix(robot, q)) for f in (lambda A: A, rk.null_basis))
-    ideal = q[:N] + rk.steady_state_error(A, K_P, offset) + offset
-    middle, scale = np.rint(ideal / quantum), np.abs(A).max()
-    for step in itertools.product(range(-reach, reach + 1), repeat=N):
-        counts = quantum * (middle + step)
-        c = -K_P * (counts - q[:N])
-        slabs = ((A / scale, (counts - q[:N] - offset) / quantum, 0.5), (Z, c / friction, 1.0))
-        if all(
-            linprog(
-                np.zeros(M.shape[1]), np.vstack([M, -M]), np.concatenate([b + h, h - b]), bounds=(None, None)
-            ).status
-            == 0
-            for M, b, h in slabs
-        ):
-            return True
-    return False
+    middle = np.rint((q[:N] + rk.steady_state_error(A, K_P, offset) + offset) / quantum)
+    one, stiff = np.eye(N), K_P * quantum / friction
+    rows = np.block([[-one, A / np.abs(A).max(), 0 * Z], [stiff * one, 0 * A, Z]])
+    about = np.concatenate([middle - (q[:N] + offset) / quantum, -K_P * (quantum * middle - q[:N]) / friction])
+    half = np.repeat([0.5, 1.0], N)
+    free = rows.shape[1] - N
+    limits = np.repeat([reach, np.inf], [N, free])
+    found = milp(
+        np.zeros(N + free),
+        constraints=LinearConstraint(rows, about - half, about + half),
+        integrality=np.repeat([1, 0], [N, free]),
+        bounds=Bounds(-limits, limits),
+    )
+    return found.status == 0
 
 
 @pytest.mark.parametrize("name", ["testbed", "four_arms"])
-def test_places_of_rest_against_linear_programming(name):
-    """Counts by brute force, strips and friction by linear programming: below the threshold, near it, far above."""
+def test_places_of_rest_against_integer_programming(name):
+    """Counts, strips and friction as one integer programme: below the threshold, near it, far above."""
     robot, rng = rk.load(name), np.random.default_rng(6)
     seen = set()
     for _ in range(4):
@@ -67,7 +68,7 @@ def test_places_of_rest_against_linear_programming(name):
             gain = factor * 2 * 4.2e-3 / QUANTUM
             ours = rk.rest_exists(robot, q, gain, offset, QUANTUM, 4.2e-3)
             # Counts further off than two would ask for torques beyond all friction here.
-            assert ours == rest_by_linear_programming(robot, q, gain, offset, QUANTUM, 4.2e-3)
+            assert ours == rest_by_integer_programming(robot, q, gain, offset, QUANTUM, 4.2e-3)
             seen.add(ours)
     assert seen == {True, False}
 
