@@ -56,11 +56,21 @@ def test_torque_lines_of_24_rests(radius, condition, line):
 
 
 def test_three_best_places():
-    """Reference: 1.01 in the workspace; in the disc of 0.12 m the same three directions, turned to 60 degrees."""
+    """Reference: 1.01 in the workspace, and 1.55 in the disc of 0.12 m, from a search among scattered places.
+
+    The optimum is lower: on the edge of the disc, evenly, at 61.3 degrees, no neighbour of theirs is better.
+    """
     best = min(np.linalg.cond(tasks.null_vectors(tasks.ring([60, 180, 300], r))) for r in np.linspace(0.12, 0.15, 25))
     assert best < 1.01
     turned = {a: np.linalg.cond(tasks.null_vectors(tasks.ring(np.array([0, 120, 240]) + a, 0.12))) for a in (0, 60)}
     assert turned[0] > 8 and turned[60] < 1.55
+    corners = tasks.ring(np.array([61.3, 181.3, 301.3]), 0.12)
+    least, rng = np.linalg.cond(tasks.null_vectors(corners)), np.random.default_rng(0)
+    for size in (1e-3, 5e-3, 2e-2):
+        near = corners + rng.uniform(-size, size, (300, 3, 2))
+        near *= np.minimum(1.0, 0.12 / np.linalg.norm(near, axis=-1, keepdims=True))
+        found = np.linalg.cond([tasks.null_vectors(places) for places in near])
+        assert found.min() > least * (1 - 1e-5)  # the angle is given to a tenth of a degree
 
 
 @pytest.mark.parametrize("radius", [0.03, 0.08, 0.12])
@@ -80,14 +90,23 @@ def test_one_rounding_per_place_is_worth_what_the_covariance_says(radius):
 
 
 def test_rests_with_counts_are_no_rests_and_no_better_than_their_rounding():
-    """24 rests in the disc of 0.08 m, averaged over half a second each: still some tenths of a milliradian or more."""
-    x = tasks.scattered(np.random.default_rng(3), 24, 0.08)
-    c = np.array([rest_torques(TESTBED, place, OFFSET, 2000, 1.0) for place in x])
-    n = tasks.null_vectors(x)
-    sign = np.sign(n @ np.ones(3))[:, None]
-    off = np.linalg.lstsq(sign * n, -np.sum(sign * n * c, axis=1) / 7.05, rcond=None)[0] - OFFSET
-    variance = (2 * np.pi / 2000) ** 2 / 12
-    assert 0.05 < off @ n.T @ n @ off / variance < 16
+    """24 rests in the disc of 0.08 m: 575 of 576 cycle, and averaging them gains 20 to 30 % (reference).
+
+    One rounding a rest would make errors over their covariance chi squared with three degrees of freedom, mean 3; that
+    gain leaves 3 * 0.7^2 to 3 * 0.8^2, and the mean over 24 draws has a relative error of sqrt(2 / 72).  500
+    independent readings a rest would leave 0.006.
+    """
+    variance, worth, moved = (2 * np.pi / 2000) ** 2 / 12, [], 0
+    for seed in range(24):
+        x = tasks.scattered(np.random.default_rng(seed), 24, 0.08)
+        runs = [rk.simulate(TESTBED, PD, rk.hold(TESTBED, place, 1.0), OFFSET, 2000) for place in x]
+        moved += sum(np.abs(np.diff(run.c[500:], axis=0)).max() > 7.05 * np.pi / 2000 for run in runs)
+        n, c = tasks.null_vectors(x), np.array([run.c[500:].mean(axis=0) for run in runs])
+        off = np.linalg.lstsq(n, -np.sum(n * c, axis=1) / 7.05, rcond=None)[0] - OFFSET
+        worth.append(off @ n.T @ n @ off / variance)
+    assert moved > 0.98 * 24 * 24
+    spread = 4 * np.sqrt(2 / 72)
+    assert 3 * 0.7**2 * (1 - spread) < np.mean(worth) < 3 * 0.8**2 * (1 + spread)
 
 
 @pytest.mark.parametrize("offset", [OFFSET, [-6e-3, 3e-3, 2e-3], [1e-3, 7e-3, -4e-3]])
@@ -146,10 +165,16 @@ def test_a_log_of_one_place_is_refused_though_its_smallest_answer_fits():
 
 
 def test_afterwards_the_filter_has_nothing_left_to_save():
+    """1.4 and 21.8 % (reference, with 0.11 % at no offset; here 0.15 % with friction in the bearings, 0.10 % without).
+
+    At no offset what the filter saves is the antagonism of the lag, by Pythagoras, but for the way that the filtered
+    run goes otherwise: a lag of 1 mm on links of 200 mm, and A changes up to ten times as fast near the corners.
+    """
     left = 1e-3 * np.array([[0, 0, 0], [0.5, -0.5, 0.5], [1, 1, 1]])
     path = rk.triangle(TESTBED)
-    plain, calm = (rk.sweep(TESTBED, law, path, left).energies.sum(axis=1) for law in (PD, rk.AntagonismFilter(PD)))
+    fighting, filtered = (rk.sweep(TESTBED, law, path, left) for law in (PD, rk.AntagonismFilter(PD)))
+    plain, calm = fighting.energies.sum(axis=1), filtered.energies.sum(axis=1)
     share = 100 * (plain / calm - 1)
     # n . offset decides, squared: the same size costs sixteen times as much with other signs.
-    assert 0.05 < share[0] < 0.2
+    assert share[0] == pytest.approx(100 * fighting.antagonistic_energy[0] / calm[0], rel=0.05)
     assert_allclose(share[1:], [1.4, 21.8], rtol=0.05)

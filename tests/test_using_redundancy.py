@@ -119,7 +119,16 @@ def test_three_drives_are_not_better_conditioned_than_the_best_pair(workspace):
 
 
 def test_share_where_one_sign_is_possible(workspace):
-    assert_allclose(rk.common_sign(workspace).mean(), 0.565, atol=0.005)
+    """The grid against random places, within four standard deviations; 56.5 and 65 % (reference, to half a per cent).
+
+    The share settles at 56.2 % on finer grids (0.5617 to 0.5619 from 101 to 801 lines a side).
+    """
+    share = rk.common_sign(workspace).mean()
+    places = np.random.default_rng(0).uniform([-0.2, -0.25], [0.2, 0.25], (60_000, 2))
+    places = places[rk.reachable(ROBOT, places)]
+    drawn = rk.common_sign(rk.control_matrix(ROBOT, rk.inverse_kinematics(ROBOT, places))).mean()
+    assert abs(drawn - share) < 4 * np.sqrt(share * (1 - share) / len(places))
+    assert_allclose(share, 0.565, atol=0.005)
     assert_allclose(rk.common_sign(rk.control_matrix(ROBOT, TRIANGLE.q)).mean(), 0.65, atol=0.005)
 
 
