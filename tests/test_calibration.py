@@ -256,6 +256,10 @@ HEADER = ",".join(
         (HEADER + "\n0,1,2,,1,2,3,0,0,0\n", "line 2, column 4"),
         (HEADER + "\n0,1,2,nan,1,2,3,0,0,0\n", "line 2, column 4"),
         (HEADER + "\n" + 2 * "0,1,2,3,1,2,3,0,0,0\n", "line 3, column 1: time does not increase"),
+        (
+            HEADER + "".join(f"\n{t},1,2,3,1,2,3,0,0,0" for t in (0.0, 0.1, 0.2, 0.5, 0.6)) + "\n",
+            r"line 5, column 1: after 0.2 s comes 0.5 s, though records come every 0.1 s; allowed: a log without gaps",
+        ),
     ],
 )
 def test_bad_files_are_refused_by_line_and_column(tmp_path, text, sentence):
@@ -263,6 +267,14 @@ def test_bad_files_are_refused_by_line_and_column(tmp_path, text, sentence):
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=sentence):
         rk.calibrate(TESTBED, file)
+
+
+def test_a_log_with_masked_readings_is_refused_by_their_number():
+    log = rk.mystery_run("offset_a")
+    holes = np.ma.array(log.q_a, mask=np.zeros(log.q_a.shape, bool))
+    holes[5:8, 1] = np.ma.masked
+    with pytest.raises(ValueError, match="q_a is a masked array with 3 masked entries; allowed: numbers"):
+        rk.Log("run", log.t, holes, log.q_a_desired, log.c)
 
 
 def test_what_cannot_be_read_is_refused(tmp_path):

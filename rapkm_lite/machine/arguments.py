@@ -46,13 +46,11 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
 
 
 def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        holes = np.ma.count_masked(value)
+        raise ValueError(f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)")
     try:
         array = np.asarray(value)
-        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-            holes = np.ma.count_masked(value)
-            raise ValueError(
-                f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)"
-            )
         # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
         if value is None or array.dtype.kind not in "iufO":
             raise TypeError

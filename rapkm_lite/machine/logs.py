@@ -68,7 +68,7 @@ def read_log(source: str | Path) -> Log:
 
     The header is ``t in s, q1 measured in rad, ..., q1 desired in rad, ..., c1 in N m, ...``; a line is a record.
     Raises ValueError with file, line and column for a file that cannot be read so, also where a number is missing or
-    not finite, or where time does not increase.
+    not finite, where time does not increase, or where a step in time is over 1.5 times the usual one.
 
     >>> import rapkm_lite as rk
     >>> rk.read_log(rk.data_path("mystery_runs/gain.csv"))
@@ -100,7 +100,20 @@ def read_log(source: str | Path) -> Log:
     if len(late):
         number = late[0] + 3
         raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
+    _without_gaps(path, t[:, 0])
     return Log(path.stem, t[:, 0], q_a, q_a_desired, c)
+
+
+def _without_gaps(path: Path, t: np.ndarray) -> None:
+    """Records come evenly, but for jitter: a rest with a hole in it may be two."""
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) if len(steps) else steps
+    if len(gaps):
+        k = gaps[0]
+        raise ValueError(
+            f"the log {path.name!r}, line {k + 3}, column 1: after {t[k]:g} s comes {t[k + 1]:g} s, though records "
+            f"come every {np.median(steps):g} s; allowed: a log without gaps, or one file for each part"
+        )
 
 
 def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> list[float]:

@@ -270,8 +270,8 @@ def _refusal(names, basis, sigma, Vt, explained, rank: int) -> CalibrationError:
         terms = " ".join(f"{c:+.3f} {name}" for c, name in zip(row, names, strict=True) if abs(c) > 5e-4)
         sums.append(f"{terms} = {number:.4g}")
     return CalibrationError(
-        f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so places further apart, "
-        f"or fewer unknowns. Known to first order, in rad and m: {'; '.join(sums)}",
+        f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so more places and "
+        f"further apart, or fewer unknowns. Known to first order, in rad and m: {'; '.join(sums)}",
         rank,
         needed,
         known,
