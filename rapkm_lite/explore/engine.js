@@ -6,6 +6,7 @@
 
 const each = (value, i) => (Array.isArray(value) ? value[i] : value);
 const zeros = (count) => new Float64Array(count);
+const smoothSign = (z) => (z > 20 ? 1 : z < -20 ? -1 : Math.tanh(z)); // beyond 20 the same to the last bit
 const wrap = (angle) => angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 
 /** A machine from the values of a data file: per-link values are one number or [[proximal, distal], ...]. */
@@ -65,10 +66,12 @@ export class Pose {
         n11 += g * bx * bx + h * lx * lx, n12 += g * bx * by + h * lx * ly, n22 += g * by * by + h * ly * ly;
       }
       // Far away the curvature n may spoil the step: then Gauss-Newton.
-      if (m11 - n11 > 0 && (m11 - n11) * (m22 - n22) > (m12 - n12) ** 2) m11 -= n11, m12 -= n12, m22 -= n22;
+      const whole = m11 - n11 > 0 && (m11 - n11) * (m22 - n22) > (m12 - n12) ** 2;
+      if (whole) m11 -= n11, m12 -= n12, m22 -= n22;
       const det = m11 * m22 - m12 * m12, sx = (m22 * fx - m12 * fy) / det, sy = (m11 * fy - m12 * fx) / det;
-      if (Math.max(Math.abs(sx), Math.abs(sy)) < 1e-13 * arms[0].longest) return true;
       if (!this.at(this.x + sx, this.y + sy)) return false;
+      // What a Newton step leaves is of its square.
+      if (Math.max(Math.abs(sx), Math.abs(sy)) < (whole ? 3e-8 : 1e-13) * arms[0].longest) return true;
     }
     return false;
   }
@@ -149,17 +152,15 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
       const pb = base2 * ad + back2 * arm.l2sq, pl = base2 * arm.l1sq + back2 * ad;
       let drive = c[i] - arm.s1 * pb, distal = -arm.s2 * pl;
       if (drag) {
-        drive -= arm.w1 * (gx * pose.ay[i] - gy * pose.ax[i]) + arm.friction * Math.tanh(base * sharpness);
+        drive -= arm.w1 * (gx * pose.ay[i] - gy * pose.ax[i]) + arm.friction * smoothSign(base * sharpness);
         distal += arm.w2 * (gx * pose.dy[i] - gy * pose.dx[i]);
       }
       m11 += arm.s1 * bx * bx + arm.s2 * lx * lx, m12 += arm.s1 * bx * by + arm.s2 * lx * ly;
       m22 += arm.s1 * by * by + arm.s2 * ly * ly, fx += bx * drive + lx * distal, fy += by * drive + ly * distal;
-      rates[i] = base, bend[i] = pb;
-      inside = inside && h * ad * inv * (base + back) < 1;
+      rates[i] = base, bend[i] = pb, inside = inside && h * ad * inv * (base + back) < 1;
     }
     const det = m11 * m22 - m12 * m12;
-    acc[0] = (m22 * fx - m12 * fy) / det, acc[1] = (m11 * fy - m12 * fx) / det;
-    M[0] = m11, M[1] = m12, M[2] = m22;
+    acc[0] = (m22 * fx - m12 * fy) / det, acc[1] = (m11 * fy - m12 * fx) / det, M[0] = m11, M[1] = m12, M[2] = m22;
     return inside;
   }
   /** Steps that friction asks of a hold: a drive that can pass zero is stiff there. */
@@ -179,8 +180,7 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
   let x = path.x[0], y = path.x[1], vx = 0, vy = 0, x1 = x, y1 = y, x2 = x, y2 = y;
   thought.at(x, y);
   for (let k = 0, o = 0; k < samples; k++, o += N) {
-    pose.at(x, y);
-    run.x[2 * k] = x, run.x[2 * k + 1] = y;
+    pose.at(x, y), run.x[2 * k] = x, run.x[2 * k + 1] = y;
     // What the drives read, and what they ask for.
     for (let i = 0; i < N; i++) {
       const wanted = path.angle[o + i], angle = (run.angle[o + i] = wanted + wrap(pose.angle(i) - wanted));
