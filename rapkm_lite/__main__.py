@@ -10,12 +10,13 @@ from pathlib import Path
 
 
 def _summary(options) -> None:
+    from . import __version__
     from .simulation.compiled import without_compiler
     from .simulation.summary import as_text, summary
 
     # Two runs are sooner done than compiled.
     without_compiler()
-    values = summary()
+    values = {"version": __version__} | summary()
     print(json.dumps(values, indent=2) if options.json else as_text(values))
 
 

@@ -50,9 +50,9 @@ ARROWS = {name: imported(name) - {name} for name in MODULES}
 def test_imports_point_downward(name):
     for other in ARROWS[name]:
         own, target = room(name), room(other)
-        assert target not in DOORS, f"{name} imports {other}, a door for users"
         if own in DOORS:
             continue
+        assert target not in DOORS, f"{name} imports {other}, a door for users"
         if target in KEYS:
             assert own == target or name in KEYS[target], f"{name} imports {other}; only {KEYS[target]} may"
         else:

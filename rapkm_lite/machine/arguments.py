@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -45,8 +46,13 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     return array
 
 
+def masked(value) -> bool:
+    """Is it a masked array?  NumPy reads their module, which takes a while, where somebody makes one and not before."""
+    return "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray)
+
+
 def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+    if masked(value) and np.ma.is_masked(value):
         holes = np.ma.count_masked(value)
         raise ValueError(f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)")
     try:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from xml.sax.saxutils import quoteattr
-
 import numpy as np
 
 from .arguments import exact_array, positive_number
@@ -29,6 +27,8 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     >>> to_mjcf(load()).count("<motor")
     3
     """
+    from xml.sax.saxutils import quoteattr  # only when needed: it brings a tenth of what the package imports
+
     if not isinstance(robot, Manipulator):
         raise ValueError(f"robot = {robot!r}; allowed: a Manipulator")
     timestep = positive_number("timestep", timestep)

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from .arguments import short
+from .arguments import masked, short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +63,7 @@ def frozen(array) -> np.ndarray:
     Traceback (most recent call last):
     ValueError: assignment destination is read-only
     """
-    if isinstance(array, np.ma.MaskedArray):
+    if masked(array):
         if _is_frozen(array.data) and _is_frozen(np.ma.getmaskarray(array)):
             return array
         return np.ma.MaskedArray(frozen(array.data), frozen(np.ma.getmaskarray(array)), fill_value=array.fill_value)
@@ -127,7 +127,7 @@ class Value:
         """Refuse what is not of the kind that the field is declared with, for the kinds below."""
         kind = self.__dataclass_fields__[name].type
         if kind == "np.ndarray":
-            array = np.ma.filled(value, 0) if isinstance(value, np.ma.MaskedArray) else value
+            array = np.ma.filled(value, 0) if masked(value) else value
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf" or not np.all(np.isfinite(array)):
                 raise ValueError(f"{name} = {short(value)}; allowed: an array of finite numbers")
         elif kind in _KINDS and kind not in (c.__name__ for c in type(value).__mro__):
@@ -185,7 +185,7 @@ def _names(cls: type) -> tuple[str, ...]:
 
 
 def _equal(a, b) -> bool:
-    if isinstance(a, np.ma.MaskedArray) or isinstance(b, np.ma.MaskedArray):
+    if masked(a) or masked(b):
         masks = np.array_equal(np.ma.getmaskarray(a), np.ma.getmaskarray(b))
         return masks and _equal(np.ma.filled(a, 0), np.ma.filled(b, 0))
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -201,7 +201,7 @@ def _equal(a, b) -> bool:
 def _key(value):
     """Something hashable that is equal for equal values: 1 and 1.0, 0.0 and -0.0 are equal."""
     if isinstance(value, np.ndarray):
-        numbers = np.ma.filled(value, 0)
+        numbers = np.ma.filled(value, 0) if masked(value) else value
         if numbers.dtype.kind in "biuf":
             numbers = numbers.astype(float)
             numbers = np.where(np.isnan(numbers), np.nan, numbers + 0.0)

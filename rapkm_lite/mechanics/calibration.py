@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -86,6 +85,8 @@ class Calibration(Value):
         level = positive_number("level", level)
         if level >= 1.0:
             raise ValueError(f"level = {level:g}; allowed: above 0 and below 1")
+        from statistics import NormalDist
+
         half = NormalDist().inv_cdf(0.5 + level / 2) * np.sqrt(np.diagonal(self.covariance))
         return np.stack([self.estimate - half, self.estimate + half])
 

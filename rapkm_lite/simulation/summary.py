@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
-
 from ..control.laws import AntagonismFilter
 from .experiments import experiment, measured_energies
 from .runs import simulate
@@ -14,19 +12,14 @@ ROWS = "without filter", "with filter"
 
 
 def summary() -> dict:
-    """Version, machine and energies per drive in J, as plain values; rows without / with filter (16) at the true pose.
+    """Machine, law and energies per drive in J, as plain values; rows without / with filter (16) at the true pose.
 
     The default experiment is ``data/testbed.toml`` with the lessons' offsets of (4, -2, 5) mrad.
     """
     setting = experiment("testbed")
     laws = setting.law, AntagonismFilter(setting.law, pose="true")
     runs = [simulate(setting.robot, law, setting.trajectory, OFFSET) for law in laws]
-    try:
-        number = version("rapkm-lite")
-    except PackageNotFoundError:
-        number = "from a folder"
     return {
-        "version": number,
         "machine": repr(setting.robot),
         "law": repr(setting.law),
         "offset_rad": list(OFFSET),
@@ -38,7 +31,7 @@ def summary() -> dict:
 
 
 def as_text(values: dict) -> str:
-    """The table of `summary` for people."""
+    """The table of `summary`, and the "version", for people."""
     offsets = ", ".join(f"{1e3 * o:g}" for o in values["offset_rad"])
     tables = values["energy_J"]
     lines = [
