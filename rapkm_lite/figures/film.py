@@ -16,16 +16,19 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
+from ..simulation.compiled import COMPILED
 from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
+# In a browser, where nothing is compiled, drawing a frame takes most of a second.
+MOST_FRAMES = None if COMPILED else 8
 
 
 @dataclass(frozen=True)
 class Film:
     """A film as bytes: an animated WebP, its poster (WebP, and PNG for what shows no HTML), and its words.
 
-    In a notebook it shows itself; who asks the system for less motion sees the poster.
+    In a notebook it shows itself; who asks the system for less motion sees the poster.  `note`: what stands below it.
     """
 
     moving: bytes
@@ -33,6 +36,7 @@ class Film:
     png: bytes
     size: tuple[int, int]
     alt: str
+    note: str = ""
 
     def save(self, path: str | Path) -> None:
         """Write the animated WebP to a file."""
@@ -45,6 +49,7 @@ class Film:
             f'<img alt="{words}" width="{width}" height="{height}" style="max-width: 100%; height: auto"'
             f' src="{_address(self.moving)}"></picture>'
         )
+        page += f"<br><small>{html.escape(self.note)}</small>" if self.note else ""
         return {"text/html": page, "image/png": base64.b64encode(self.png).decode("ascii"), "text/plain": self.alt}
 
     def __repr__(self) -> str:
@@ -126,6 +131,7 @@ def film(
     loops: int = 2,
     poster: int = -1,
     dpi: float = 96,
+    most: int | None = MOST_FRAMES,
 ) -> Film:
     """A film of ``draw(ax, step)``, called for every step of `frames` on empty axes; the last expression of a cell.
 
@@ -135,6 +141,7 @@ def film(
     seconds : of motion, in equal steps.  rest : seconds that the last frame stays.
     loops : how often it plays; it always stops, on its last frame.
     poster : index of the frame that stands for the film where motion is not wanted.
+    most : the most frames; of more, some are left out, and the film says so.  Without Numba 8, else all.
 
     Set the limits of the axes in `draw`.  Raises ValueError without words, with fewer than two frames, with loops < 1,
     or when the film would be larger than 120 kB.
@@ -150,6 +157,12 @@ def film(
         raise ValueError(f"frames has {len(steps)} steps; allowed: two or more")
     if loops < 1:
         raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
+    note = ""
+    if most is not None and len(steps) > most:
+        # First, last and poster are among them.
+        kept = sorted({*np.linspace(0, len(steps) - 1, most).round().astype(int).tolist(), poster % len(steps)})
+        note = f"{len(kept)} of {len(steps)} pictures, because drawing them takes long here."
+        steps, poster = [steps[k] for k in kept], kept.index(poster % len(steps))
     with matplotlib.style.context(STYLE):
         shots = _shots(draw, steps, panels, figsize, dpi)
     each = round(1000 * seconds / len(steps))
@@ -161,4 +174,5 @@ def film(
         png=_file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True),
         size=still.size,
         alt=alt,
+        note=note,
     )

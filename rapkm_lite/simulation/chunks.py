@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.grammar import BadAnswer
-from .compiled import DONE, encode, many
+from .compiled import DONE, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .loop import LAW_FAILED
 from .runs import complete
@@ -49,7 +49,8 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
 
     A function of values only, so that any executor can send it to another process.
     """
-    codes = {id(law): encode(law, setup.model) for law in laws}
+    # Without a compiler nothing runs side by side, and sums are sooner made at the end of a run.
+    codes = {id(law): encode(law, setup.model) if compiled() else None for law in laws}
     rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
     fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
     if fast:
