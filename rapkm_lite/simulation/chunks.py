@@ -31,7 +31,7 @@ class Columns(NamedTuple):
     @classmethod
     def blank(cls, k: int, N: int) -> Columns:
         sizes = (k, N), k, k, (k, 2), k, k, k
-        return cls(*map(np.zeros, sizes), np.full(k, NOT_RUN))
+        return cls._make([*map(np.zeros, sizes), np.full(k, NOT_RUN)])
 
     @property
     def failed(self) -> np.ndarray:
