@@ -91,7 +91,8 @@ def distribution(source: Path, target: Path) -> None:
     for row in added.values():
         # The kernel brings IPython and the rest itself.
         row["depends"] = [name for name in row["depends"] if name in packages]
-    # Explorers are made by a door of the package, so the widgets come with it; symbolic cells ask for SymPy themselves.
+    # The widgets come with the package, whose explorers need them; SymPy too, which lesson 12 needs inside the package.
+    packages["rapkm-lite"]["depends"].append("sympy")
     text = json.dumps(lock, indent=None, separators=(",", ":"))
     (target / "pyodide-lock.json").write_text(text, encoding="utf-8")
 

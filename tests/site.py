@@ -38,8 +38,13 @@ SHOWN = (
     "contents",
     "lessons/00_start_here",
     "lessons/04_antagonism_filter_energy",
+    "lessons/08_self_calibration",
+    "lessons/11_choosing_a_controller",
+    "lessons/12_your_machine",
+    "lessons/solutions/07_synchronization",
     "lessons/equations",
     "reference/mechanics",
+    "run",
 )
 
 
