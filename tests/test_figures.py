@@ -26,7 +26,7 @@ PURE_NUMBERS = {
     "gain of drive 3 / gain of drives 1 and 2",
     "visible share β, all drives",
     "σ_min(Ã₁)",
-    "σ_min(Ã), all drives",
+    r"$\mathrm{σ}_{\mathrm{min}}$(Ã), all drives",
     "share of the edge",
     "share that still fights",
     "all links too long by the share ε",

@@ -16,14 +16,11 @@ from ..figures.marks import (
     drive_legend,
     pair_legend,
 )
-from .calibration import calibration
-from .choosing import controller_choice
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress
-from .imperfections import imperfections
-from .own import own_machine
-from .redundancy import allocation
+from .practice import controller_choice, imperfections, own_machine
+from .redundancy import allocation, calibration
 from .rest import landscape, steady_state, three_opinions
 from .runs import animation, decentralized_run, via_points
 from .torque import computed_torque

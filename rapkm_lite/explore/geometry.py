@@ -10,17 +10,17 @@ from scipy.ndimage import distance_transform_edt
 from ..figures import marks
 from ..figures.machine import arm_points, plane_limits
 from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
-from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
+from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour
 from ..machine.arguments import matvec
-from ..machine.manipulator import Manipulator, load
+from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
 from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
 from .controls import choice, slider
 from .explorer import Explorer, explorer
+from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders
 
-TIME = "time in s"
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
 # Steps of the map on which the arms stand out; weak is far from the colour of the paper.
@@ -29,11 +29,6 @@ MAP = marks.Palette(
     ("#8C8C8C", "#ADADAD", "#C6C6C4", "#DADAD2", "#E8E8DC", "#F4F3E4", "#FCFBEE"),
     ("#8A8A94", "#70707C", "#5A5A66", "#474752", "#383842", "#2B2B33", "#202026"),
 )
-
-
-def frictionless(robot: Manipulator | None) -> Manipulator:
-    """The given machine, or the testbed without friction."""
-    return load().replace(friction=0.0) if robot is None else robot
 
 
 def machine(robot: Manipulator | None = None) -> Explorer:
@@ -46,28 +41,25 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     # An image ends where its last pixels end, half a step beyond their centres.
     wide, tall = (gx[1] - gx[0]) / 2, (gy[1] - gy[0]) / 2
     extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
-    outline, curves = (
-        marks.workspace_outline(robot),
-        lru_cache(maxsize=8)(lambda mode: marks.singular_curves(robot, modes[mode])),
+    outline = marks.workspace_outline(robot)
+    curves = lru_cache(maxsize=8)(lambda mode: marks.singular_curves(robot, modes[mode]))
+    matrices = lru_cache(maxsize=8)(
+        lambda mode: act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
     )
     # Outside, where the map is cut off, the value of the nearest point inside.
     nearest = tuple(np.asarray(distance_transform_edt(~inside, return_distances=False, return_indices=True)))
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ndarray:
-        A = act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
         rows = list(which[drives] or range(robot.n_arms))
-        return on_grid(inside, act.singular_values(A[:, rows])[:, 1])[nearest].filled(0.0)
+        return on_grid(inside, act.singular_values(matrices(mode)[:, rows])[:, 1])[nearest].filled(0.0)
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
-        point = marks.clamped(robot, 1e-3 * np.array([x, y]))
-        q = inverse_kinematics(robot, point, modes[mode])
+        point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
             for curve in curves(mode)[pair]:
                 picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
-        marks.draw_machine(picture, "machine", robot, q)
-        picture.handle("machine", *point, x=(1e3, 0), y=(0, 1e3))
         A = act.control_matrix(robot, q)
         numbers = {
             "end-effector": f"({1e3 * point[0]:.0f}, {1e3 * point[1]:.0f}) mm",
@@ -91,9 +83,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
     small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | bare
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
-    controls = {
-        "x": slider("x in mm", -200, 200, 2, 20),
-        "y": slider("y in mm", -200, 230, 2, 30),
+    controls = place_sliders(20, 30) | {
         "mode": choice("working mode", modes),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
@@ -127,7 +117,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         share = np.linspace(0, 100, len(t))
         picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
         marks.draw_machine(picture, "plane", robot, t.q[k])
-        picture.handle("plane", *t.x[k], along=t.x, place=share)
+        picture.handle("plane", *t.x[k], along=t.x[::2], place=share[::2])
         for i, pair in enumerate(pairs):
             style = pair_line(robot, pair)
             picture.line("sigma", share, sigma[:, i], **style)
@@ -135,15 +125,13 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             corners = act.force_polygon(A[k][list(pair)], 1e-3 * torque)
             edge = {"edgecolor": style["color"], "linestyle": style["linestyle"]}
             picture.polygon("force", corners, fill=False, linewidth=1.5, **edge)
+        marks.traces(picture, "null", share, null)
         for i in range(robot.n_arms):
-            picture.line("null", share, null[:, i], **arm_line(i))
             picture.line("null", place, null[k, i], marker="o", markersize=6, color=arm_colour(i), zorder=4)
         for panel in ("sigma", "null"):
             picture.line(panel, [place, place], picture.ylim(panel), color=NEUTRAL, linewidth=0.8, zorder=1)
             picture.handle(panel, place, None, place=(1, 0))
-        corners = act.force_polygon(A[k], 1e-3 * torque)
-        picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
-        picture.fit("force", np.abs(corners).max())
+        picture.fit("force", draw_forces(picture, A[k], torque))
         picture.limits("force", x=picture.ylim("force"))
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
@@ -156,13 +144,12 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
     drives = marks.drive_lines(robot)
     way = {"xlabel": "place on the path in %", "xlim": (0, 100)}
-    force = {"xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal", "xlim": (-2, 2), "ylim": (-2, 2)}
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
         "sigma": way
         | {"title": "Pairs", "ylabel": "σ_min in rad/m", "ylim": (0, 8), "legend": marks.pair_lines(robot)},
         "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
-        "force": force | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
+        "force": force_panel(2) | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
@@ -203,8 +190,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
         }
 
-    torque = {"xlabel": TIME, "ylabel": "torque in mN m", "xlim": (0, 5), "ylim": (-100, 100)}
-    torque["legend"] = marks.drive_lines(robot)
+    torque = over_time("torque in mN m", robot=robot, ylim=(-100, 100))
     panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),

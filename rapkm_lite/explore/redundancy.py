@@ -1,21 +1,25 @@
-"""Explorer of torques for one force: within limits, of least peak, of one sign."""
+"""Explorers of what the redundancy is good for: readings that show the offsets, and a choice of torques."""
 
 from __future__ import annotations
 
+from functools import lru_cache, partial
+
 import numpy as np
 
-from ..figures.marks import bars, draw_machine, draw_workspace, per_drive
-from ..figures.marks.plane import clamped
-from ..figures.style import AFTER, ALARM
+from ..figures import marks
+from ..figures.machine import plane_limits
+from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour
+from ..lessons.lesson08.tasks import counted, ring
 from ..lessons.lesson09.figures import shortest_reach
 from ..lessons.lesson09.tasks import one_sign, smallest
 from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import control_matrix, force_polygon
+from ..mechanics.actuation import control_matrix, prestress_projector
+from ..mechanics.calibration import CalibrationError, calibrate
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .geometry import frictionless, plane_limits
+from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -26,52 +30,102 @@ RULES = {
 
 
 def allocation(robot: Manipulator | None = None) -> Explorer:
-    """A force at a place, the limits of the drives, and torques by four rules: what each drive gives."""
+    """The torques that make one force: of least size (pale bars) and by the chosen rule; dots: the limits."""
     robot = frictionless(robot)
 
     def draw(picture, x, y, f_x, f_y, limit, rule):
-        point = clamped(robot, 1e-3 * np.array([x, y]))
-        q = inverse_kinematics(robot, point)
-        draw_machine(picture, "machine", robot, q)
-        picture.handle("machine", *point, x=(1e3, 0), y=(0, 1e3))
+        _, q = held_machine(picture, "machine", robot, x, y)
         A, f = control_matrix(robot, q), np.array([f_x, f_y])
-        corners = force_polygon(A, 1e-3 * limit)
-        picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
+        draw_forces(picture, A, limit)
         inner = shortest_reach(A, 1e-3 * limit, 181)
         picture.line("force", *np.vstack([inner, inner[:1]]).T, color=AFTER, linewidth=1.2, linestyle="--")
         picture.line("force", f_x, f_y, marker="o", markersize=7, color=ALARM, zorder=4)
         picture.handle("force", f_x, f_y, f_x=(1, 0), f_y=(0, 1))
         plain, torques = smallest(A, f), RULES[rule](A, f, 1e-3 * limit)
-        bars(picture, "torque", [(1e3 * plain, {"alpha": 0.3}), (1e3 * torques, {})], form=".0f")
+        marks.bars(picture, "torque", [(1e3 * plain, {"alpha": 0.3}), (1e3 * torques, {})], form=".0f")
         for side in (-limit, limit):
-            picture.line("torque", [0.4, robot.n_arms + 0.6], [side, side], color=ALARM, linestyle=":", linewidth=1.5)
-        picture.fit("torque", 1.15e3 * np.append(np.concatenate([plain, torques]), 1e-3 * limit))
+            picture.line("torque", picture.xlim("torque"), [side, side], color=ALARM, linestyle=":", linewidth=1.5)
+        picture.fit("torque", 1150 * plain, 1150 * torques, 1.15 * limit)
         return {
-            "torques": per_drive(1e3 * torques, 1) + " mN m",
-            "of least size": per_drive(1e3 * plain, 1) + " mN m",
+            "torques": marks.per_drive(1e3 * torques, 1) + " mN m",
+            "of least size": marks.per_drive(1e3 * plain, 1) + " mN m",
             "largest": f"{np.abs(torques).max() / limit * 1e5:.0f} % of the limit",
         }
 
-    def setup(picture):
-        draw_workspace(picture, "machine", robot)
-        dash = {"color": AFTER, "linestyle": "--"}
-        picture.legend("force", [("within limits", {"color": AFTER}), ("by least size", dash)])
-
-    ticks = range(1, robot.n_arms + 1)
-    force = {"xlabel": "f_x in N", "ylabel": "f_y in N", "aspect": "equal", "xlim": (-1.8, 1.8), "ylim": (-1.8, 1.8)}
+    reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "force": force,
-        "torque": {"title": "Pale: least size", "xlabel": "drive", "ylabel": "torque in mN m", "xticks": [*ticks]},
+        "force": force_panel(1.8) | {"legend": reaches},
+        "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
     }
-    panels["torque"]["xlim"] = (0.4, robot.n_arms + 0.6)
-    controls = {
-        "x": slider("x in mm", -150, 150, 5, 0),
-        "y": slider("y in mm", -150, 150, 5, 0),
+    controls = place_sliders(0, 0, -150, 150, 5) | {
         "f_x": slider("force f_x in N", -1.5, 1.5, 0.05, 0.0),
         "f_y": slider("force f_y in N", -1.5, 1.5, 0.05, 0.75),
         "limit": slider("limit in mN m", 20, 200, 5, 85),
         "rule": choice("rule", RULES.keys(), "within the limits"),
     }
-    about = "The torques that make one force: of least size (pale bars) and by the chosen rule; dots: the limits."
-    return explorer(draw, controls, panels, size=(10.4, 3.8), setup=setup, about=about)
+    space = partial(marks.draw_workspace, panel="machine", robot=robot)
+    return explorer(draw, controls, panels, size=(10.4, 3.8), setup=space)
+
+
+def calibration(robot: Manipulator | None = None) -> Explorer:
+    """Places on a circle, what each drive contributes to the equation there, and the error of the offsets found."""
+    robot = frictionless(robot)
+    N, middle = robot.n_arms, robot.base.mean(axis=0)
+    offset = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
+    degrees = np.arange(361)
+
+    @lru_cache(maxsize=32)
+    def around(radius: int):
+        """The circle, and the length of each drive's row of the null basis of A^T, a degree apart."""
+        way = middle + ring(degrees, 1e-3 * radius)
+        A = control_matrix(robot, inverse_kinematics(robot, way))
+        return way, np.sqrt(np.diagonal(prestress_projector(A), axis1=-2, axis2=-1))
+
+    @lru_cache(maxsize=128)
+    def found(radius: int, turn: int, places: int, counts: int):
+        angles = turn + 360 * np.arange(places) / places
+        q_a = inverse_kinematics(robot, middle + ring(angles, 1e-3 * radius))[:, :N] + offset
+        try:
+            return angles, calibrate(robot, counted(q_a, counts), noise=2 * np.pi / counts / np.sqrt(12))
+        except CalibrationError as refused:
+            return angles, refused
+
+    def draw(picture, radius, turn, places, counts):
+        angles, result = found(radius, turn, places, counts)
+        (way, share), seen = around(radius), np.unique(np.round(angles).astype(int) % 360)
+        marks.draw_machine(picture, "plane", robot, inverse_kinematics(robot, way[turn]))
+        picture.line("plane", *way.T, color=NEUTRAL, linewidth=1, zorder=2)
+        dots = {"linestyle": "none", "marker": "o", "markersize": 6, "zorder": 6}
+        picture.line("plane", *way[seen].T, color=ALARM, **dots)
+        picture.handle("plane", *way[turn], along=way[::3], turn=degrees[::3])
+        marks.traces(picture, "seen", degrees, share)
+        for i in range(N):
+            picture.line("seen", seen, share[seen, i], color=arm_colour(i), **dots)
+        if isinstance(result, CalibrationError):
+            return {"combinations that are known": f"{result.rank} of {N}", "calibration": "refused"}
+        error, spread = 1e3 * np.array([result.offset - offset, np.sqrt(np.diagonal(result.covariance))])
+        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})])
+        picture.fit("error", 1.25 * error, 1.25 * spread, least=0.05)
+        return {
+            "condition": f"{result.condition:.2f}",
+            "error of the offsets": marks.per_drive(error, 3) + " mrad",
+            "standard deviation expected": marks.per_drive(spread, 3) + " mrad",
+        }
+
+    wide = {"color": NEUTRAL, "linewidth": 7}
+    both = [("found − true", wide), ("expected", wide | {"alpha": 0.4})]
+    seen = {"xlabel": "place on the circle in °", "ylabel": "|component of η|", "xlim": (0, 360), "ylim": (0, 1)}
+    panels = {
+        "plane": plane_limits(robot, 0.05),
+        "seen": seen | {"legend": marks.drive_lines(robot)},
+        "error": {"ylabel": "error in mrad", "legend": both, **marks.drive_axis(N)},
+    }
+    controls = {
+        "radius": slider("radius in mm", 10, 125, 5, 120),
+        "turn": slider("turn of the first place in °", 0, 120, 5, 0),
+        "places": choice("places on the circle", [1, 2, 3, 6, 24, 1000], 3),
+        "counts": choice("counts a turn", [("2000", 2000), ("20 000", 20_000), ("200 000", 200_000)], 20_000),
+    }
+    space = partial(marks.draw_workspace, panel="plane", robot=robot)
+    return explorer(draw, controls, panels, size=(11.0, 3.8), setup=space)

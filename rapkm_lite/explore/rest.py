@@ -19,7 +19,7 @@ from ..simulation.energy import antagonism_form
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .geometry import TIME, frictionless
+from .shared import curves, frictionless, held_machine, over_time, place_sliders
 
 
 def steady_state(robot: Manipulator | None = None) -> Explorer:
@@ -33,16 +33,13 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         K_P = np.array([values[f"K_P_{i + 1}"] for i in range(N)])
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
         K_D = 0.225 * np.sqrt(K_P / 7.05)
-        point = marks.clamped(robot, 1e-3 * np.array([x, y]))
-        q = inverse_kinematics(robot, point)
+        point, q = held_machine(picture, "plane", robot, x, y)
         A = act.control_matrix(robot, q)
         theory = 1e3 * steady_state_error(A, K_P, offset)
         torque = 1e3 * steady_state_torque(A, K_P, offset)
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error = 1e3 * run.error
-        marks.draw_machine(picture, "plane", robot, q)
-        picture.handle("plane", *point, x=(1e3, 0), y=(0, 1e3))
-        marks.traces(picture, "error", run.t, error)
+        curves(picture, "error", run.t, error, 1.0)
         for i in range(N):
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
         picture.fit("error", error, theory, least=1.0)
@@ -61,20 +58,16 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
     wide = {"color": NEUTRAL, "linewidth": 7}
     both = [("theory", wide | {"alpha": 0.45}), ("simulated", wide)]
-    lines = marks.drive_lines(robot)
     panels = {
         "plane": plane_limits(robot, 0.05),
-        "error": {"xlabel": TIME, "ylabel": "angle error in mrad", "xlim": (0, 1.5), "legend": lines},
+        "error": over_time("angle error in mrad", 1.5, robot),
         "rest": {"ylabel": "error at rest in mrad", "legend": both, **marks.drive_axis(N)},
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     middle = np.round(500 * robot.base.mean(axis=0)).astype(int) * 2
-    controls |= {
-        "x": slider("x in mm", -200, 200, 2, int(middle[0])),
-        "y": slider("y in mm", -200, 230, 2, int(middle[1])),
-    }
+    controls |= place_sliders(int(middle[0]), int(middle[1]))
     layout = [["plane", "error"], ["rest", "torque"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
 
@@ -164,8 +157,11 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 ring = centre[:, None] + np.sqrt(level - rest) * root @ wheel
                 shade = str(0.62 - 0.55 * k / (len(LEVELS) - 1))
                 picture.line("map", *ring, color=shade, linewidth=1.6)
-                if np.abs(ring[:, 45]).max() < 11:
-                    picture.text("map", *ring[:, 45], f"{level:g} J", fontsize=9, color=shade, va="bottom")
+                # The number stands where the lines are far apart.
+                away = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1]
+                k = np.argmax(np.where(np.abs(ring).max(axis=0) < 10.5, away, -1.0))
+                if np.abs(ring[:, k]).max() < 10.5:
+                    picture.text("map", *ring[:, k], f"{level:g} J", fontsize=9, color=shade, ha="center", va="center")
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)

@@ -19,7 +19,7 @@ from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .geometry import TIME, frictionless
+from .shared import curves, frictionless, over_time
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -39,10 +39,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         offset = marks.offset_values(offsets, N)
         run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder or None)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        marks.traces(picture, "torque", run.t, torque)
-        marks.traces(picture, "error", run.t, error)
-        picture.fit("torque", torque, least=50.0)
-        picture.fit("error", error, least=5.0)
+        curves(picture, "torque", run.t, torque, 50.0)
+        curves(picture, "error", run.t, error, 5.0)
         groups = [(energy, {})]
         if table is not None:
             groups.append((table[int(filter != "off")], {"alpha": 0.4}))
@@ -60,10 +58,9 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
 
     wide = {"color": NEUTRAL, "linewidth": 7}
     both = [("this run", wide), ("Table 1", wide | {"alpha": 0.4})][: 1 if table is None else 2]
-    time = {"xlabel": TIME, "xlim": (0, 5), "legend": marks.drive_lines(robot)}
     panels = {
-        "torque": {"ylabel": "torque in mN m", **time},
-        "error": {"ylabel": "angle error in mrad", **time},
+        "torque": over_time("torque in mN m", robot=robot),
+        "error": over_time("angle error in mrad", robot=robot),
         "energy": {"ylabel": "electric energy in J", "legend": both, **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
@@ -129,12 +126,10 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         words = {"ha": "center", "va": "bottom", "fontsize": 10}
         picture.text("plane", corner[0] + SCALE * UNIT / 2, corner[1] + 0.015, f"{UNIT:g} N", **words)
 
-    plane = plane_limits(robot, 0.05) | {"title": "Forces of the drives; black: their sum"}
-    time = {"xlabel": TIME, "xlim": (0, 5)}
     panels = {
-        "plane": plane,
-        "torque": {"title": "Torque", "ylabel": "torque in mN m", "legend": marks.drive_lines(robot), **time},
-        "error": {"title": "Distance from the path", "ylabel": "path error in mm", **time},
+        "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},
+        "torque": over_time("torque in mN m", robot=robot, title="Torque"),
+        "error": over_time("path error in mm", title="Distance from the path"),
     }
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
@@ -156,27 +151,29 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     share = np.linalg.norm(path.x - ends[0], axis=-1) / np.linalg.norm(ends[1] - ends[0])
 
-    @lru_cache(maxsize=128)
-    def run(legs: int, late: int, filter: bool):
+    @lru_cache(maxsize=32)
+    def set_points(legs: int) -> np.ndarray:
+        """Base angles (k, N) in rad of drives that interpolate between the via points."""
         at = np.linspace(0, 1, legs + 1)
         via = np.unwrap(inverse_kinematics(robot, ends[0] + at[:, None] * (ends[1] - ends[0]))[:, :N], axis=0)
-        q_a = np.stack([np.interp(share, at, via[:, i]) for i in range(N)], axis=-1)
-        samples = late // 2
-        q_a[:, 0] = np.concatenate([np.repeat(q_a[:1, 0], samples), q_a[: len(q_a) - samples, 0]])
-        law = PD(7.05, 0.225)
-        return simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
+        return np.stack([np.interp(share, at, via[:, i]) for i in range(N)], axis=-1)
+
+    @lru_cache(maxsize=128)
+    def run(legs: int, late: int, filter: bool):
+        q_a, samples, law = set_points(legs).copy(), late // 2, PD(7.05, 0.225)
+        q_a[samples:, 0], q_a[:samples, 0] = q_a[: len(q_a) - samples, 0].copy(), q_a[0, 0]
+        done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
+        return done, antagonistic_torque(done)
 
     def draw(picture, legs, late, filter):
-        done = run(legs, late, filter)
+        done, null = run(legs, late, filter)
         there = len(path) // 2 + 1
         off = 1e3 * (done.x - path.x)[:there]
-        null = antagonistic_torque(done)
         pressing = 1e3 * null
         for axis in (0, 1):
             picture.trace("way", 240 * share[:there], off[:, axis], **WAYS[axis][1])
         picture.fit("way", off, least=1.0)
-        marks.traces(picture, "torque", done.t, pressing)
-        picture.fit("torque", pressing, least=5.0)
+        curves(picture, "torque", done.t, pressing, 5.0)
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
         return {
             "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",
@@ -186,8 +183,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         }
 
     way = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, 240)}
-    torque = {"xlabel": TIME, "ylabel": "torque that only presses in mN m", "xlim": (0, 3)}
-    panels = {"way": way | {"legend": WAYS}, "torque": torque | {"legend": marks.drive_lines(robot)}}
+    panels = {"way": way | {"legend": WAYS}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
     counts = [(f"{240 / legs:g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
     controls = {
         "legs": choice("distance of the via points", counts, 8),

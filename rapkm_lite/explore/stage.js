@@ -66,8 +66,7 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
   const levels = fixed(scale?.levels), room = scale ? 2.1 * font + widest(levels) : 1.2 * font;
   const box = { left, top, width: Math.max(wide - left - room, 10), height: tall };
   if (spec.aspect === "equal") {
-    const per = Math.min(box.width / (x1 - x0), tall / (y1 - y0));
-    const width = per * (x1 - x0), height = per * (y1 - y0);
+    const per = Math.min(box.width / (x1 - x0), tall / (y1 - y0)), width = per * (x1 - x0), height = per * (y1 - y0);
     Object.assign(box, { left: left + (box.width - width) / 2, top: top + tall - height, width, height });
   }
   const fits = (list) => list.length * (widest(list) + 0.6 * font) < box.width;
@@ -96,8 +95,7 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
 }
 
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
-const css = (c) => `rgb(${c.join()})`;
-const mix = (a, b, share) => a.map((v, k) => Math.round(v + share * (b[k] - v)));
+const css = (c) => `rgb(${c.join()})`, mix = (a, b, share) => a.map((v, k) => Math.round(v + share * (b[k] - v)));
 const shine = (c) => [0.2126, 0.7152, 0.0722].reduce((sum, w, k) => sum + w * ((c[k] / 255 + 0.055) / 1.055) ** 2.4, 0);
 const contrast = (a, b) => (Math.max(shine(a), shine(b)) + 0.05) / (Math.min(shine(a), shine(b)) + 0.05);
 
@@ -118,8 +116,7 @@ export function themeOf(el) {
   return { dark, colour };
 }
 
-const SHARE = { left: 0, center: 0.5, right: 1 };
-const DROP = { baseline: 0, bottom: -0.35, center: 0.36, top: 1.05 };
+const SHARE = { left: 0, center: 0.5, right: 1 }, DROP = { baseline: 0, bottom: -0.35, center: 0.36, top: 1.05 };
 
 class Panel {
   constructor(name, spec, parent) {
@@ -128,16 +125,17 @@ class Panel {
     this.el.style.gridArea = name;
     for (const part of ["head", "ylabel", "plot", "scale", "xlabel"])
       this[part] = rich(make("div", { className: `rapkm-${part}` }, this.el), spec[part]);
+    this.heading = make("b", {}, this.head);
     this.canvas = make("canvas", { role: "img", ariaLabel: spec.title?.trim() || spec.ylabel || name }, this.plot);
     this.ctx = this.canvas.getContext("2d");
   }
 
   /** Title and legend are words of the page, which wrap by themselves; written anew only when they change. */
-  entitle(title, legend = []) {
-    const { theme } = this, told = JSON.stringify([title, legend, theme.dark]);
-    if (told === this.told) return;
-    const { color, bold = true } = title?.style ?? {}, heading = rich(make("b"), title?.words ?? this.spec.title);
+  entitle({ words = this.spec.title, style: { color, bold = true } = {} } = {}, legend = []) {
+    const { theme, heading } = this, told = JSON.stringify([legend, theme.dark]);
+    if (heading.words !== words) rich(heading, (heading.words = words));
     Object.assign(heading.style, { color: theme.colour(color) ?? "", fontWeight: bold ? 700 : 400 });
+    if (told === this.told) return;
     const entries = legend.map(([words, { color, width, dash, alpha }]) => {
       const entry = rich(make("span"), words), dashes = dash.map((d) => d * width * POINT).join(" ");
       const look = `stroke="${theme.colour(color)}" stroke-width="${width * POINT}" stroke-dasharray="${dashes}"`;
@@ -169,15 +167,16 @@ class Panel {
 
   /** Paint marks; `look` = {theme, base, floor, family} says how. */
   paint(look, frame, marks) {
-    const { ctx, canvas, plot } = this, { theme } = look, last = (kind) => marks.findLast((mark) => mark.kind === kind);
+    const { ctx, canvas, room: [wide, high] } = this, { theme } = look;
+    const last = (kind) => marks.findLast((mark) => mark.kind === kind);
     Object.assign(this, { frame, look, theme, taken: [] });
     const [palette, label] = last("scale")?.words ?? [];
     if (label && !this.scale.textContent) rich(this.scale, label);
     this.entitle(last("title"), last("legend")?.words);
-    const { clientWidth: wide, clientHeight: high } = plot, ratio = (this.ratio = window.devicePixelRatio || 1);
     if (!wide || !high || !frame) return;
+    const ratio = (this.ratio = window.devicePixelRatio || 1);
+    const [width, height] = this.room.map((v) => Math.round(v * ratio));
     // Setting a size blanks a canvas, so only when it is another one.
-    const width = Math.round(wide * ratio), height = Math.round(high * ratio);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.size = (points) => Math.max((points / 10.5) * look.base, look.floor);
     const font = 0.92 * this.size(10.5);
@@ -252,8 +251,6 @@ function area(panel, path, style) {
   stroke(panel, path, style, true);
 }
 
-const polygon = (panel, { points }, style) => area(panel, pixels(panel, points), style);
-
 function words(panel, { kind, points, words }, style) {
   const { box } = panel, right = box.left + box.width, foot = box.top + box.height;
   const inside = () => [box.left + points[0] * box.width, foot - points[1] * box.height];
@@ -278,8 +275,8 @@ function image(panel, { points, words: [key, palette], images }) {
   if (panel.map.key !== now) {
     const canvas = make("canvas", { width, height }), picture = ctx.createImageData(width, height);
     const out = new Uint32Array(picture.data.buffer), bounds = palette.levels;
-    const pack = ([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
-    const packed = palette[theme.dark ? "dark" : "light"].map((c) => pack(rgb(c)));
+    const colours = palette[theme.dark ? "dark" : "light"].map(rgb);
+    const packed = colours.map(([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0);
     const place = (k, n, count) => Math.min(Math.max(((k + 0.5) / n) * count - 0.5, 0), count - 1.000001);
     for (let j = 0; j < height; j++) {
       const v = place(height - 1 - j, height, rows);
@@ -301,6 +298,7 @@ function image(panel, { points, words: [key, palette], images }) {
   ctx.drawImage(panel.map.canvas, left / ratio, top / ratio, width / ratio, height / ratio);
 }
 
+const polygon = (panel, { points }, style) => area(panel, pixels(panel, points), style);
 const PAINT = { line, polygon, bar: polygon, label: words, words, image };
 
 /** The distance of (x, y) from a path x0, y0, x1, y1, ... and where along it the nearest point is, in corners. */
@@ -343,7 +341,6 @@ function rich(el, words = "") {
 
 /** Show a picture in `el`; returns a function that takes it away, with `say(words)` for a note below the picture. */
 export function mount(el, scene, link) {
-  const me = Math.random().toString(36).slice(2);
   const root = make("div", { className: "rapkm", role: "group", ariaLabel: scene.about || scene.name }, el);
   const stage = make("div", { className: "rapkm-panels" }, root);
   const problem = make("p", { className: "rapkm-problem", hidden: true }, stage);
@@ -356,18 +353,22 @@ export function mount(el, scene, link) {
   stage.style.setProperty("--columns", scene.widths.map((w) => `minmax(0, ${w}fr)`).join(" "));
   stage.style.setProperty("--shape", scene.size.join(" / "));
   const panels = Object.entries(scene.panels).map(([name, spec]) => new Panel(name, spec, stage));
-  const known = { styles: {}, images: {} }, knobs = [], open = new Set();
+  const known = { styles: {}, images: {} }, knobs = [], open = new Set(), me = Math.random().toString(36).slice(2);
   const state = { fixed: [], marks: [], handles: [], frames: null, places: {}, drawn: 0 };
-  let held = null, rest = 0, seq = 0, waiting = { to: {}, by: {} };
+  let held = null, rest = 0, seq = 0, waiting = { to: {}, by: {} }, look = null;
 
-  function paint() {
-    if (!state.frames || !root.clientWidth) return;
-    const style = getComputedStyle(root), floor = parseFloat(style.getPropertyValue("--least")) || 12;
-    const look = { theme: themeOf(root), floor, base: parseFloat(style.fontSize), family: style.fontFamily };
+  // Sizes and colours are noted when they are new: whoever asks for them at every step lays out the page every time.
+  function paint(renewed = !look) {
+    if (!state.frames || (renewed && !root.clientWidth)) return;
+    if (renewed) {
+      const style = getComputedStyle(root), floor = parseFloat(style.getPropertyValue("--least")) || 12;
+      look = { theme: themeOf(root), floor, base: parseFloat(style.fontSize), family: style.fontFamily };
+      for (const panel of panels) panel.room = [panel.plot.clientWidth, panel.plot.clientHeight];
+    }
     const marks = [...state.fixed, ...state.marks];
     for (const p of panels) p.paint(look, state.frames[p.name], marks.filter((m) => m.panel === p.name));
     state.handles.forEach(knob);
-    knobs.slice(state.handles.length).forEach((knob) => (knob.hidden = true));
+    for (const knob of knobs.slice(state.handles.length)) knob.hidden = true;
   }
 
   // One focusable knob for each handle.
@@ -494,7 +495,7 @@ export function mount(el, scene, link) {
   }
 
   // A new style sheet may come late, so the picture is painted again for a while.
-  const watch = new MutationObserver(() => [0, 300, 1200].forEach((ms) => setTimeout(paint, ms)));
+  const watch = new MutationObserver(() => [0, 300, 1200].forEach((ms) => setTimeout(paint, ms, true)));
   for (const node of [document.documentElement, document.body]) watch.observe(node, { attributes: true });
   const sizes = new ResizeObserver(paint), gone = new AbortController(), { signal } = gone;
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
@@ -503,12 +504,11 @@ export function mount(el, scene, link) {
   for (const name of ["blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
   link.receive(receive);
   link.send({ kind: "hello" });
-  const leave = () => {
+  return Object.assign(() => {
     gone.abort();
     watch.disconnect();
     root.remove();
-  };
-  return Object.assign(leave, { say });
+  }, { say });
 }
 
 /** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts. */

@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
 from ..figures.maps import pair_line, pair_name
-from ..figures.marks import draw_workspace, drive_lines, offset_values, pair_lines, per_drive, singular_curves, traces
+from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves
 from ..figures.style import AFTER, ALARM, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
@@ -18,7 +18,7 @@ from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .geometry import TIME, frictionless
+from .shared import curves, frictionless, over_time
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -41,11 +41,11 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N = robot.n_arms
     pairs = act.drive_pairs(robot)
-    curves = singular_curves(robot)
+    singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     words = [*fixed, "switched pair", "redundant coordinates"]
-    path = lru_cache(maxsize=8)(lambda side: triangle(robot, 1e-3 * side))
-    coarse = lru_cache(maxsize=8)(lambda side: triangle(robot, 1e-3 * side, dt=0.01))
+    path = lru_cache(maxsize=16)(lambda side: triangle(robot, 1e-3 * side))
+    coarse = lru_cache(maxsize=64)(lambda side: triangle(robot, 1e-3 * side, dt=0.01))
 
     def law_of(word, rate):
         # Two equal real poles at -rate.
@@ -57,10 +57,12 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     @lru_cache(maxsize=64)
     def distance(law: str, side: int) -> str:
         """How near the path comes to the points on which the pair is singular."""
-        points = np.concatenate(curves[fixed[law]])
+        points = np.concatenate(singular[fixed[law]])
         gap = cdist(coarse(side).x, points).min()
         return "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
 
+    # The redundant law has no peaks, so that fewer places show it.
+    redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
     norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side)))
 
     def draw(picture, law, side, rate, **offsets):
@@ -68,19 +70,18 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.line("plane", *t.x.T, color=AFTER, linewidth=2, zorder=3)
         numbers = {}
         if law in fixed:
-            for line in curves[fixed[law]]:
+            for line in singular[fixed[law]]:
                 picture.line("plane", *line.T, color=pair_line(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
-            if curves[fixed[law]]:
+            if singular[fixed[law]]:
                 numbers["distance from its singular curve"] = distance(law, side)
         norm = norms(law, side)
-        picture.line("map", t.t, norms("redundant coordinates", side), color=NEUTRAL, linewidth=1.2, linestyle="--")
+        picture.line("map", t.t[::5], redundant(side), color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", t.t, np.minimum(norm, 1e6), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         for panel, values, least in (("torque", torque, 300.0), ("error", error, 20.0)):
-            traces(picture, panel, run.t, values)
-            picture.fit(panel, values, least=least, most=MOST[panel])
+            curves(picture, panel, run.t, values, least, MOST[panel])
             if np.abs(values).max() > picture.ylim(panel)[1]:
                 words = f"goes on to {np.abs(values).max():.0f}"
                 picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
@@ -94,20 +95,19 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
 
     def setup(picture):
         draw_workspace(picture, "plane", robot)
-        for pair, lines in curves.items():
+        for pair, lines in singular.items():
             for line in lines:
                 picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
 
     low, high = robot.base.min(axis=0) - [0, 0.06], robot.base.max(axis=0) + [0, 0.02]
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
-    time = {"xlabel": TIME, "xlim": (0, 5), "legend": drive_lines(robot)}
     laws = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
-    feedback = {"ylabel": "norm in N m s²/rad", "yscale": "log", "ylim": (1e-3, 1e2)}
+    feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": laws}
     panels = {
         "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1]), "title": "Path"},
-        "map": {"title": "Feedback", **time, **feedback, "legend": laws},
-        "torque": {"title": "Torque", "ylabel": "torque in mN m", **time},
-        "error": {"title": "Error", "ylabel": "angle error in mrad", **time},
+        "map": over_time("norm in N m s²/rad", **feedback),
+        "torque": over_time("torque in mN m", robot=robot, title="Torque"),
+        "error": over_time("angle error in mrad", robot=robot, title="Error"),
     }
     controls = {
         "law": choice("law", words),

@@ -163,7 +163,10 @@ def _user(law: CompiledLaw | None, N: int):
 
 def _made_for(value, width: int, make, count: int = 0):
     """The table of a machine or path, made once for a width and a count of blocks: values do not change."""
-    made = _made.setdefault(value, {})
+    # An equal value shares the table; that it is equal is found out once, since a path has many numbers to compare.
+    made = value.__dict__.get("_tables")
+    if made is None:
+        made = value.__dict__["_tables"] = _made.setdefault(value, {})
     if (width, count) not in made:
         made[width, count] = make(value, width)
     return made[width, count]

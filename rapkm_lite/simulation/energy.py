@@ -9,7 +9,7 @@ import numpy as np
 
 from ..machine.arguments import having, matvec, of_kind, positive_number, real_array
 from ..machine.manipulator import Manipulator, manipulator
-from ..mechanics.actuation import control_matrix, prestress_projector
+from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import steady_state_torque
 from ..mechanics.trajectory import Trajectory
 
@@ -60,7 +60,8 @@ def antagonistic_torque(run) -> np.ndarray:
     True
     """
     _run(run)
-    return matvec(prestress_projector(control_matrix(run.robot, run.q)), run.c)
+    A = control_matrix(run.robot, run.q)
+    return run.c - matvec(weighted_pseudoinverse(A), matvec(A.mT, run.c))
 
 
 def antagonistic_energy(run) -> float:

@@ -10,6 +10,7 @@ import textwrap
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
@@ -28,6 +29,7 @@ _ALONE = (
 )
 
 
+_RIM = patheffects.withStroke(linewidth=2.5, foreground="white")
 _RC = mpl.rc_params_from_file(STYLE, use_default_template=False)
 
 
@@ -101,6 +103,8 @@ def _patch(ax, mark: Mark) -> None:
 
 def _words(ax, mark: Mark) -> None:
     where = {"transform": ax.transAxes} if mark.kind == "words" else {"clip_on": True}
+    # Words on a line have a rim of paper, as on the canvas.
+    where |= {} if mark.style.get("color") == "white" else {"path_effects": [_RIM]}
     ax.text(*mark.data[0], mathtext(mark.words), **where, **mark.style)
 
 

@@ -65,7 +65,7 @@ def plot_slow_error(t, error, predicted, ax=None):
     >>> ax = plot_slow_error(np.linspace(0, 1, 5), np.zeros((5, 2)), np.full((5, 2), 1e-4))
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.2))
-    for axis, (word, colour) in enumerate((("x", AFTER), ("y", BEFORE))):
+    for axis, (word, colour) in enumerate((("x", AFTER), ("y", ALARM))):
         ax.plot(t, 1e3 * error[:, axis], color=colour, label=f"run, {word}")
         ax.plot(t, 1e3 * predicted[:, axis], color=colour, ls="--", lw=1.2, label=f"theory, {word}")
     ax.axhline(0, color="#BBBBBB", lw=0.8)

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures.marks.stored import mathtext
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 from . import four_rrr
 
@@ -60,7 +61,8 @@ def plot_apex(angle, sigma, pose, axes=None):
     axes = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained")[1] if axes is None else axes
     axes[0].plot(angle, sigma, color=AFTER)
     axes[0].axvline(pose[2], color=ALARM, ls=":", label=f"{pose[2]:.5f} rad")
-    axes[0].set(xlabel="platform angle in rad", ylabel="σ_min(Ã), all drives", ylim=(0, None), title="in the centre")
+    axes[0].set(xlabel="platform angle in rad", ylim=(0, None), title="in the centre")
+    axes[0].set_ylabel(mathtext("σ_min(Ã), all drives"))
     axes[0].legend()
     plot_four_legs(pose, axes[1], lines=True).set_title("all distal lines through one point")
     return axes

@@ -1,0 +1,152 @@
+"""Explorers of practice: a machine that is not its drawing, laws under disturbances, a machine still to be built."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
+from ..control.laws import PD, AntagonismFilter
+from ..figures import marks
+from ..figures.style import NEUTRAL
+from ..machine.arguments import matvec
+from ..machine.manipulator import Manipulator, load
+from ..mechanics.actuation import control_matrix, required_wrench, singular_values, weighted_pseudoinverse
+from ..mechanics.dynamics import minimal_dynamics
+from ..mechanics.kinematics import inverse_kinematics, working_modes
+from ..mechanics.trajectory import triangle
+from ..simulation.energy import antagonistic_energy, antagonistic_torque
+from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
+from ..simulation.runs import SimulationError, simulate
+from .controls import choice, log_slider, offset_sliders, slider, switch
+from .explorer import Explorer, explorer
+from .shared import distance_panels, draw_distance, frictionless, over_time
+
+FAULTS = {
+    "nothing": [],
+    "drive 1 dead": [DeadDrive(0, 0.5)],
+    "encoder 1 silent for 20 ms": [EncoderDropout(0, 0.6, 0.62)],
+    "encoder 1 silent for 100 ms": [EncoderDropout(0, 0.6, 0.7)],
+}
+OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, kg/m
+
+
+def imperfections(robot: Manipulator | None = None) -> Explorer:
+    """Distance from the path and torques that act, with links too long, weak drives and one fault."""
+    robot = load() if robot is None else robot
+    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
+
+    def draw(picture, longer, K_P, limit, fault, filter):
+        built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
+        law = PD(K_P, 0.225 * np.sqrt(K_P / 7.05))
+        law, lost = AntagonismFilter(law) if filter else law, ""
+        try:
+            run = simulate(built, law, path, model=robot, faults=[TorqueLimit(1e-3 * limit), *FAULTS[fault]])
+        except SimulationError as error:
+            if error.partial is None:
+                raise
+            run, lost = error.partial, f", lost at {error.time:.2f} s"
+        off, torque = draw_distance(picture, run, (1.0, 20.0))
+        return {
+            "farthest from the path": f"{off.max():.2f} mm{lost}",
+            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1) + " mN m",
+            "electric energy": f"{run.energy.sum():.2f} J",
+        }
+
+    controls = {
+        "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
+        "K_P": log_slider("K_P in N m/rad", 2.0, 50.0, 7.05),
+        "limit": slider("torque limit in mN m", 40, 400, 10, 150),
+        "fault": choice("what breaks", FAULTS.keys()),
+        "filter": switch("antagonism filter"),
+    }
+    return explorer(draw, controls, distance_panels(robot, 2.5, "torque that acts in mN m"), size=(9.2, 3.8))
+
+
+def controller_choice(robot: Manipulator | None = None) -> Explorer:
+    """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders."""
+    robot = frictionless(robot)
+    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), 2.5, centre=robot.base.mean(axis=0))
+    q = path.q[0]
+    A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
+    # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
+    carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
+    laws = {
+        "PD": lambda k, d: PD(carried * k, carried * d),
+        "PD and filter": lambda k, d: AntagonismFilter(PD(carried * k, carried * d)),
+        "computed torque, fixed pair": CTC,
+        "computed torque, switched pair": SwitchedCTC,
+        "computed torque, end-effector": lambda k, d: CTC(k, d, None),
+        "computed torque, redundant": RedundantCTC,
+    }
+    loaded = lru_cache(maxsize=16)(lambda grams: robot.replace(load=1e-3 * grams))
+
+    def draw(picture, law, frequency, load, coarse, **offsets):
+        w, offset = 2 * np.pi * frequency, marks.offset_values(offsets, robot.n_arms)
+        sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
+        run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
+        off, torque = draw_distance(picture, run, (2.0, 60.0))
+        return {
+            "largest error": f"{off.max():.2f} mm",
+            "largest jump of a torque": f"{np.abs(np.diff(torque, axis=0)).max():.1f} mN m",
+            "energy": f"{run.energy.sum():.2f} J, of which antagonism {antagonistic_energy(run):.2f} J",
+        }
+
+    controls = {
+        "law": choice("law", laws.keys(), "PD"),
+        "frequency": slider("speed of the loop in Hz", 1, 8, 0.5, 5),
+        "load": slider("unknown payload in g", 0, 200, 20, 0),
+        "coarse": switch("2000 counts per turn"),
+    } | offset_sliders(robot, (4.0, -2.0, 5.0), 10)
+    return explorer(draw, controls, distance_panels(robot, 2.5), size=(9.2, 3.8))
+
+
+def own_machine(robot: Manipulator | None = None) -> Explorer:
+    """A machine in the middle of the triangle, the torques that move it, and those that offsets only press."""
+    robot = frictionless(robot)
+    N, middle = robot.n_arms, robot.base.mean(axis=0)
+    along = robot.base - middle
+    out = along / np.linalg.norm(along, axis=1, keepdims=True)
+    modes = {"".join("+" if s > 0 else "−" for s in mode): mode for mode in working_modes(robot)}
+    offset = np.resize(OFFSET, N)
+
+    def draw(picture, radius, proximal, distal, load, mode):
+        lengths = 1e-3 * np.array([proximal, distal])
+        base = middle + 1e-3 * radius * out
+        own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
+        # A sample for each pixel or two.
+        path = triangle(own, dt=0.02)
+        A = control_matrix(own, path.q)
+        inverse = weighted_pseudoinverse(A)
+        moving = matvec(inverse, required_wrench(own, path.q, path.qd, path.qdd))
+        pressing = -GAIN * (offset - matvec(inverse, matvec(A.mT, offset)))
+        marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
+        picture.line("machine", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=1)
+        for panel, torque in (("moving", moving), ("pressing", pressing)):
+            marks.traces(picture, panel, path.t, 1e3 * torque)
+            picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)
+        heat = np.sum(own.resistance * (pressing[:-1] / own.torque_constant) ** 2) * path.dt
+        return {
+            "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
+            "cost of the offsets, at rest everywhere": f"{heat:.2f} J",
+            "largest torques that press": marks.per_drive(1e3 * np.abs(pressing).max(axis=0), 0) + " mN m",
+            "smallest σ_min on the triangle": f"{singular_values(A)[:, 1].min():.2f} rad/m",
+        }
+
+    (left, low), (right, high) = middle - 0.48, middle + 0.48
+    wide = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (left, right), "ylim": (low, high)}
+    panels = {
+        "machine": wide,
+        "moving": over_time("torque in mN m", robot=robot, title="moves"),
+        "pressing": over_time("torque in mN m", title="only presses"),
+    }
+    controls = {
+        "radius": slider("base joints from the middle in mm", 200, 320, 5, 230),
+        "proximal": slider("proximal links in mm", 150, 300, 5, 200),
+        "distal": slider("distal links in mm", 150, 300, 5, 200),
+        "load": slider("load in kg", 0.0, 1.0, 0.1, 0.5),
+        "mode": choice("working mode", modes),
+    }
+    return explorer(draw, controls, panels, size=(10.4, 3.6))

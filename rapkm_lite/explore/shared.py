@@ -1,0 +1,72 @@
+"""What several explorers share: the machine they start from, its end-effector by hand, curves over time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..figures import marks
+from ..figures.style import AFTER, ALARM
+from ..machine.manipulator import Manipulator, load
+from ..mechanics.actuation import force_polygon
+from ..mechanics.kinematics import inverse_kinematics
+from .controls import slider
+
+TIME = "time in s"
+
+
+def frictionless(robot: Manipulator | None) -> Manipulator:
+    """The given machine, or the testbed without friction."""
+    return load().replace(friction=0.0) if robot is None else robot
+
+
+def place_sliders(x: int, y: int, low: int = -200, high: int = 230, step: int = 2) -> dict:
+    """Sliders x and y in mm for the place of the end-effector."""
+    return {"x": slider("x in mm", low, -low, step, x), "y": slider("y in mm", low, high, step, y)}
+
+
+def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):
+    """The machine with a handle on its end-effector, on the way to (x, y) in mm; its place (2,) in m and pose (2N,)."""
+    point = marks.clamped(robot, 1e-3 * np.array([x, y]))
+    q = inverse_kinematics(robot, point, mode)
+    marks.draw_machine(picture, panel, robot, q)
+    picture.handle(panel, *point, x=(1e3, 0), y=(0, 1e3))
+    return point, q
+
+
+def force_panel(limit: float) -> dict:
+    """Keywords of a panel of forces at the end-effector, up to `limit` in N."""
+    square = {"aspect": "equal", "xlim": (-limit, limit), "ylim": (-limit, limit)}
+    return {"xlabel": "f_x in N", "ylabel": "f_y in N"} | square
+
+
+def draw_forces(picture, A, torque: float) -> np.ndarray:
+    """All forces of torques up to `torque` in mN m, in the panel "force"; the corners (2m, 2) in N."""
+    corners = force_polygon(A, 1e-3 * torque)
+    picture.polygon("force", corners, facecolor="#DCE6F0", edgecolor=AFTER, linewidth=1.5, zorder=0.5)
+    return corners
+
+
+def over_time(ylabel: str, end: float = 5.0, robot: Manipulator | None = None, **more) -> dict:
+    """Keywords of a panel of curves over time up to `end` in s, with a legend of the drives of `robot`."""
+    legend = {} if robot is None else {"legend": marks.drive_lines(robot)}
+    return {"xlabel": TIME, "ylabel": ylabel, "xlim": (0, end)} | legend | more
+
+
+def curves(picture, panel: str, t, values, least: float, most: float = np.inf) -> None:
+    """A curve for each drive, values (k, N), and limits that hold them."""
+    marks.traces(picture, panel, t, values)
+    picture.fit(panel, values, least=least, most=most)
+
+
+def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN m") -> dict:
+    """The panels of `draw_distance`."""
+    return {"error": over_time("distance from the path in mm", end), "torque": over_time(torque, end, robot)}
+
+
+def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of a run from its path (k,) in mm, and torques (k, N) in mN m, with the least limits of both panels."""
+    off, torque = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1), 1e3 * run.c
+    picture.trace("error", run.t, off, color=ALARM)
+    picture.fit("error", off, symmetric=False, least=least[0])
+    curves(picture, "torque", run.t, torque, least[1])
+    return off, torque
