@@ -59,6 +59,13 @@ def test_base_points_are_found_but_for_a_similarity_of_the_plane(name):
     assert_allclose(np.diff(found.offset), np.diff(OFFSET[:N]), rtol=0, atol=1e-10)
 
 
+def test_intervals_are_those_of_a_normal_distribution():
+    found = rk.calibrate(TESTBED, readings(TESTBED), noise=1e-4)
+    sigma = np.sqrt(np.diagonal(found.covariance))
+    for given, width in (((), 1.959964), ((0.5,), 0.674490), ((0.6826895,), 1.0)):  # tables of the normal distribution
+        assert_allclose(found.interval(*given), found.estimate + width * np.array([-sigma, sigma]), rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("name", "ranks"), [("testbed", (3, 9, 11)), ("four_arms", (4, 12, 16))])
 def test_ranks(name, ranks):
     """N offsets and 2N lengths are seen, of all 5N unknowns all but a similarity of the plane (reference values)."""

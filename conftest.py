@@ -1,0 +1,20 @@
+"""What pytest leaves alone, and where it finds its files, from whatever folder it is called."""
+
+from pathlib import Path
+
+HERE = Path(__file__).parent
+LEFT_ALONE = {
+    HERE / name
+    for name in (
+        "conftest.py", "docs", "notebooks/build.py", "notebooks/skeleton", "notebooks/solutions", "notebooks/workshop",
+        "tests/bench", "tests/browser/conftest.py", "tests/conftest.py", "tests/site.py", "tests/user_script.py",
+    )
+}  # fmt: skip
+
+
+def pytest_ignore_collect(collection_path):
+    return True if collection_path in LEFT_ALONE else None
+
+
+def pytest_configure(config):
+    config.option.nbval_sanitize_with = str(HERE / "tests" / "nbval-sanitize.cfg")
