@@ -141,6 +141,14 @@ def test_a_machine_that_leaves_the_workspace(law):
     assert "unstable gain" in error.reason and 0 < k < 300
 
 
+def test_faults_that_are_not_to_blame_are_not_named():
+    """Gains far beyond what 1 kHz can hold: without any fault the run is lost as well."""
+    faults = [rk.OffsetJump(0, 0.0, 1e-4), rk.EncoderDropout(1, 0.0, 0.002)]
+    for broken in (faults, faults[:1], []):
+        error = lost(ROBOT, rk.PD(1e4, 0.225), PATH, OFFSET, faults=broken)
+        assert "unstable gain" in error.reason and "acts" not in error.reason
+
+
 def test_angles_that_fit_no_pose():
     far = 2.5 * np.array([1.0, -1.0, 1.0])
     still = rk.hold(ROBOT, [0.0, 0.0], 0.01)

@@ -1,5 +1,7 @@
 """Identities of the chapter for machines at random: 2 to 6 arms, any base polygon, lengths within a factor of three."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -182,8 +184,13 @@ def test_close_loops_is_limited_in_its_steps():
     robot = rk.load()
     q = rk.inverse_kinematics(robot, [0.02, 0.05])
     far = q + np.array([0.6, -0.5, 0.4, 0.5, 0.6, -0.4])
-    with pytest.raises(rk.ConvergenceError):
-        rk.close_loops(robot, far, iterations=1)
+    for steps in (1, 2):
+        with pytest.raises(rk.ConvergenceError) as caught:
+            rk.close_loops(robot, far, iterations=steps)
+        stopped = re.search(r"m at \[(.*?)\]", str(caught.value))
+        assert stopped is not None
+        way = np.linalg.norm(np.fromstring(stopped[1], sep=",") - far)
+        assert way <= 0.5 * steps + 1e-5 and (steps > 1 or way > 0.5 - 1e-5)
     near = rk.close_loops(robot, far, iterations=100)
     assert np.abs(rk.loop_constraints(robot, near)).max() < 1e-12
     assert np.linalg.norm(near - far) <= np.linalg.norm(q - far) + 1e-9  # nearest: no farther than one that is known
