@@ -56,8 +56,8 @@ def smooth_sign(z):
     return -t if z > 0.0 else t
 
 
-if not COMPILED:
-    smooth_sign = math.tanh
+# In plain Python the library's is sooner done.
+tanh = smooth_sign if COMPILED else math.tanh
 
 
 @leaf
@@ -113,7 +113,7 @@ def drag(w1, w2, friction, env, place, base):
     env : gravity vector, and the sharpness 1 / v0 of the friction law.
     """
     ax, ay, dx, dy, _, inv, _ = place
-    drive = w1 * (env[0] * ay - env[1] * ax) + friction * smooth_sign(base * env[2])
+    drive = w1 * (env[0] * ay - env[1] * ax) + friction * tanh(base * env[2])
     distal = w2 * (env[0] * dy - env[1] * dx)
     return inv * (ax * distal - dx * drive), inv * (ay * distal - dy * drive)
 
