@@ -87,7 +87,7 @@ GOOD: dict[str, Any] = {
     "base": ROBOT.base, "lengths": 0.2, "masses": 0.1, "centers": 0.1, "inertias": 1e-3, "rotor_inertia": 1e-6,
     "resistance": 0.6, "torque_constant": 0.02, "friction_velocity": 0.01, "gravity": (0.0, -9.81), "load": 0.1,
     "arms": (0, 1), "current": (0, 1), "desired": PATH[3], "truth": ([0.0, 0.0], [0.0, 0.0]), "keeper": CONTROLLER,
-    "reason": "it was lost", "partial": None, "sweep": None, "timestep": 1e-3, "other": ROBOT, "k": 3,
+    "reason": "it was lost", "partial": None, "sweep": None, "timestep": 1e-3, "other": ROBOT, "k": 3, "items": [1, 2],
     "q_a_desired": RUN.q_a,
     # pictures
     "ax": None, "axes": None, "title": "a title", "label": "a label", "labels": True, "alpha": 0.8, "colour": "#112233",
