@@ -105,12 +105,22 @@ def test_the_poster_is_the_last_frame_and_paper_stays_white():
     assert moving.getpixel((0, 0)) == (255, 255, 255)
 
 
+def test_a_film_with_frames_left_out_says_so_and_keeps_its_ends():
+    steps = np.linspace(0, 3, 30)
+    film = plotting.film(turning, steps, "A hand turns.", figsize=(2, 2), poster=7, most=4)
+    seen = [0, 7, 10, 19, 29]
+    whole = plotting.film(turning, steps[seen], "A hand turns.", figsize=(2, 2), poster=1)
+    assert film.moving == whole.moving and film.png == whole.png
+    assert f"{len(seen)} of 30 pictures" in film._repr_mimebundle_()["text/html"] and not whole.note
+
+
 @pytest.mark.parametrize(
     "frames, alt, more, sentence",
     [
         ([1.0], "A hand.", {}, "frames has 1 steps; allowed"),
         ([0.0, 1.0], " ", {}, "alt = ' '; allowed"),
         ([0.0, 1.0], "A hand.", {"loops": 0}, "loops = 0; allowed"),
+        ([0.0, 1.0], "A hand.", {"most": 1}, "most = 1; allowed"),
     ],
 )
 def test_films_refuse_what_they_cannot_show(frames, alt, more, sentence):

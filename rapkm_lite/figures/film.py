@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
-from ..simulation.compiled import COMPILED
 from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
-# In a browser, where nothing is compiled, drawing a frame takes most of a second.
-MOST_FRAMES = None if COMPILED else 8
+# Where the kernel itself runs in a browser (Pyodide), drawing a frame takes most of a second.
+MOST_FRAMES = 8 if sys.platform == "emscripten" else None
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def film(
     seconds : of motion, in equal steps.  rest : seconds that the last frame stays.
     loops : how often it plays; it always stops, on its last frame.
     poster : index of the frame that stands for the film where motion is not wanted.
-    most : the most frames; of more, some are left out, and the film says so.  Without Numba 8, else all.
+    most : the most frames; of more, some are left out, and the film says so.  In a browser's own kernel 8, else all.
 
     Set the limits of the axes in `draw`.  Raises ValueError without words, with fewer than two frames, with loops < 1,
     or when the film would be larger than 120 kB.
@@ -157,6 +157,8 @@ def film(
         raise ValueError(f"frames has {len(steps)} steps; allowed: two or more")
     if loops < 1:
         raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
+    if most is not None and most < 2:
+        raise ValueError(f"most = {most}; allowed: two or more, or None for all")
     note = ""
     if most is not None and len(steps) > most:
         # First, last and poster are among them.
