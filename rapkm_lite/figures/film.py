@@ -21,7 +21,7 @@ from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
 # Where the kernel itself runs in a browser (Pyodide), drawing a frame takes most of a second.
-MOST_FRAMES = 8 if sys.platform == "emscripten" else None
+_MOST_FRAMES = 8 if sys.platform == "emscripten" else None
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def film(
     loops: int = 2,
     poster: int = -1,
     dpi: float = 96,
-    most: int | None = MOST_FRAMES,
+    most: int | None = _MOST_FRAMES,
 ) -> Film:
     """A film of ``draw(ax, step)``, called for every step of `frames` on empty axes; the last expression of a cell.
 
