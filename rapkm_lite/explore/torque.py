@@ -104,7 +104,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     laws = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
     feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": laws}
     panels = {
-        "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1]), "title": "Path"},
+        "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])},
         "map": over_time("norm in N m s²/rad", **feedback),
         "torque": over_time("torque in mN m", robot=robot, title="Torque"),
         "error": over_time("angle error in mrad", robot=robot, title="Error"),

@@ -217,7 +217,8 @@ def plot_pair_measures(trajectory, ax=None):
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", ylabel="σ_min(A), σ_min(A_jk) in rad/m", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set_ylabel(r"$\sigma_\mathrm{min}(A)$, $\sigma_\mathrm{min}(A_{jk})$ in rad/m")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax
 

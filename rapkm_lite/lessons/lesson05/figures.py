@@ -194,7 +194,7 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
         plot_map(x, y, on_grid(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
         plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
         _frame(ax).label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="σ_min(Ã₁)", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label=r"$\sigma_\mathrm{min}(\tilde{A}_1)$", shrink=0.85)
     return axes
 
 
