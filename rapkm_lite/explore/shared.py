@@ -65,7 +65,7 @@ def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Distance of a run from its path (k,) in mm, and torques (k, N) in mN m, with the least limits of both panels."""
-    off, torque = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1), 1e3 * run.c
+    off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
     picture.fit("error", off, symmetric=False, least=least[0])
     curves(picture, "torque", run.t, torque, least[1])
