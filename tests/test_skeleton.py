@@ -20,7 +20,7 @@ def test_a_lesson_made_from_the_skeleton_is_green(tmp_path):
     skipped = shutil.ignore_patterns("__pycache__", "*.ipynb", ".ipynb_checkpoints")
     for name in ("rapkm_lite", "notebooks", "tests", "data"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=skipped)
-    for name in ("README.md", "pyproject.toml"):
+    for name in ("README.md", "conftest.py", "pyproject.toml"):
         shutil.copy(ROOT / name, tmp_path / name)
     run(tmp_path, "notebooks/build.py", "new", "97_turning_drives")
     run(tmp_path, "notebooks/build.py", "97")
