@@ -195,7 +195,7 @@ def tests_by_line(folder: Path, names) -> dict:
         import pytest
 
         tracer = Tracer(folder)
-        pytest.main(["-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
+        pytest.main(["-n0", "-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
         found = {"seen": tracer.seen(folder), "seconds": tracer.seconds, "failed": tracer.failed}
         place.write_text(json.dumps(found))
         return 0
@@ -219,7 +219,7 @@ def killed(mutant: Mutant, folder: Path, found: dict) -> bool:
         import pytest
 
         for names in (quick, near[len(quick) :]):
-            if names and pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-m", "fast", *names]) != 0:
+            if names and pytest.main(["-n0", "-q", "-x", "-p", "no:cacheprovider", "-m", "fast", *names]) != 0:
                 return 1
         return 0
 

@@ -25,7 +25,8 @@ def test_a_lesson_made_from_the_skeleton_is_green(tmp_path):
     run(tmp_path, "notebooks/build.py", "new", "97_turning_drives")
     run(tmp_path, "notebooks/build.py", "97")
     tests = ("tests/test_lessons.py", "tests/test_figures.py", "notebooks")
-    said = run(tmp_path, "-m", "pytest", "-q", *tests, "-k", "97 or figures_is_generated", "-p", "no:cacheprovider")
+    options = ("-q", "-n0", "-p", "no:cacheprovider", "-k", "97 or figures_is_generated")
+    said = run(tmp_path, "-m", "pytest", *options, *tests)
     assert "passed" in said and "failed" not in said
     assert (
         run(tmp_path, "-c", "from rapkm_lite import plotting; print(plotting.plot_turning_97.__module__)").strip()

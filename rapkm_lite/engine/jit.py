@@ -12,7 +12,7 @@ from . import compiled
 
 COMPILED = compiled()
 if COMPILED:
-    from numba import njit
+    from numba import njit, types
 
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
 _OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
@@ -59,6 +59,17 @@ def _forgiving(dispatcher):
 def leaf(function):
     """Compile a function that only kernels call, and put it into each of them."""
     return njit(forceinline=True, **_INNER)(function) if COMPILED else function
+
+
+def index(function):
+    """A `leaf` of whole numbers, compiled once: Numba would compile it anew for each constant among its arguments."""
+    if not COMPILED:
+        return function
+    dispatcher = njit(forceinline=True, **_INNER)(function)
+    ask = dispatcher.get_call_template
+    known = functools.cache(lambda *args: ask(args, {}))
+    dispatcher.get_call_template = lambda args, kws: known(*map(types.unliteral, args))
+    return dispatcher
 
 
 def outlined(function):

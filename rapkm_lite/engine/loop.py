@@ -194,7 +194,8 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled.
-    study : None for a single run.  modelled : None for laws without a model; else the `extra` of the model.
+    history, study : None for a study, None for a single run: an `else` would be compiled for both.
+    modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     clock : a long run is made in parts, whose state is in w; table and history hold those of one part.
     """
@@ -206,9 +207,10 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         k, o = clock.first + row, row * columns
 
         # Sense: the machine as it is, and what the hold will start from.
+        far = 0
         if study is not None:
             far = plant.sense(lanes, arms, extra, table, o, w, dt)
-        else:
+        if history is not None:
             far = single.sense(arms, extra, table, o, w, dt)
         if far > 0:
             plant.mend(lanes, arms, table, o, w)
@@ -223,7 +225,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         if law.posed:
             if law.pose == MEASURED:
-                measured_pose(lanes, drives, arms, study, table, o, w, k, not sensor.quantized)
+                measured_pose(lanes, drives, arms, history, study, table, o, w, k, not sensor.quantized)
                 measured_rate(lanes, drives, arms, table, o, w)
             else:
                 true_pose(lanes, drives, arms, law, w)
@@ -252,16 +254,16 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         # Record.
         if study is not None:
             add_up(lanes, drives, arms, w)
-        else:
+        if history is not None:
             record(drives, arms, history, w, row)
-        if k + 1 == clock.samples:
-            last_torque(drives, arms, w, k)
-            return
+            if k + 1 == clock.samples:
+                last_torque(drives, arms, w, k)
+                return
 
         # Hold.
         if study is not None:
             plant.hold(lanes, arms, extra, w, dt)
-        else:
+        if history is not None:
             single.hold(arms, extra, w, dt)
         if plant.judge(lanes, arms, w, k) == len(lanes):
             return

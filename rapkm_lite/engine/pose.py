@@ -168,7 +168,7 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
 
 
 @outlined
-def measured_pose(lanes, drives, arms, study, table, o, w, k, smooth):
+def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
     tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
@@ -180,11 +180,11 @@ def measured_pose(lanes, drives, arms, study, table, o, w, k, smooth):
         w[of(PY, j, W, L)] = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
-    if study is None:
+    if history is not None:
         fetch(UX, COS, W, table, o, w)
         fetch(UY, SIN, W, table, o, w)
         single_newton(drives, arms, w, tolerance)
-    else:
+    if study is not None:
         count = L
         for _ in range(12):
             if count > 0:

@@ -7,7 +7,7 @@ that weigh and do nothing; L is the number of runs.  Both come as tuples, whose 
 
 from __future__ import annotations
 
-from .jit import leaf
+from .jit import index, leaf
 
 # The arms of the machine as in `tables.arm_table`; those of the controller's model follow from MODEL on.
 BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCALE = range(15)
@@ -113,19 +113,19 @@ BLOCKS = UY + 1
 ENVIRONMENT, SINGLES = 4, 60
 
 
-@leaf
+@index
 def at(block, i, j, W, L):
     """Index of arm i and run j in a pair row."""
     return (block * W + i) * L + j
 
 
-@leaf
+@index
 def of(row, j, W, L):
     """Index of run j in a run row."""
     return (BLOCKS * W + row) * L + j
 
 
-@leaf
+@index
 def want(table, o, block, i, W):
     """Desired motion of arm i at a sample, from a block of `tables.motion_table`."""
     return table[o + 6 + block * W + i]

@@ -128,14 +128,14 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             part = slice(first, min(first + PART, samples))
             table = _motion(trajectory, W, count, part)
             clock = tables.Clock(first, samples, trajectory.dt)
-            log = tables.plain(np.zeros(0 if history is None else (part.stop - first) * (6 + 3 * N)))
+            log = None if history is None else tables.plain(np.zeros((part.stop - first) * (6 + 3 * N)))
             try:
                 closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             work[:] = w
-            if history is not None:
+            if log is not None and history is not None:
                 log = np.reshape(log, (part.stop - first, -1))
                 for i, values in enumerate(np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1)):
                     history[i][part] = values
