@@ -1,6 +1,9 @@
 """What pytest leaves alone, and where it finds its files, from whatever folder it is called."""
 
+import sys
 from pathlib import Path
+
+import pytest
 
 HERE = Path(__file__).parent
 LEFT_ALONE = {
@@ -14,6 +17,13 @@ LEFT_ALONE = {
 
 def pytest_ignore_collect(collection_path):
     return True if collection_path in LEFT_ALONE else None
+
+
+@pytest.fixture(autouse=True)
+def no_figure_stays_open():
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 def pytest_configure(config):
