@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, machines, random_motion
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.linalg import many_inverses, pivots
 
 
 @machines
@@ -114,3 +115,18 @@ def test_machines_are_unchanged_by_it():
     A = rk.redundant_control_matrix(MACHINES["four_arms"], rk.inverse_kinematics(MACHINES["four_arms"], [0.03, 0.02]))
     assert_allclose(rk.explicit_pseudoinverse(A, rk.select_independent(A)), np.linalg.pinv(A.T, rcond=1e-9), atol=1e-12)
     assert rk.nullspace_projector(FRICTIONLESS, q).shape == (6, 6)
+
+
+def test_pivots_do_not_feel_the_scale():
+    R = np.triu(np.random.default_rng(3).normal(size=(6, 2, 2)))
+    one_by_one = [pivots(1e-6 * matrix) for matrix in R]
+    size, relative = pivots(1e-6 * R)
+    assert_allclose([size, relative], [min(s for s, _ in one_by_one), min(r for _, r in one_by_one)], rtol=1e-15)
+    assert_allclose(relative, pivots(R)[1], rtol=1e-12)
+
+
+def test_minors_are_for_stacks_of_two_columns_alone():
+    A = np.random.default_rng(4).normal(size=(5, 4, 3))
+    assert many_inverses(A) is None and many_inverses(A[0, :, :2]) is None
+    A = A[..., :2]
+    assert_allclose(many_inverses(A), np.linalg.pinv(A.mT), rtol=0, atol=1e-12)

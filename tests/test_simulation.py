@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.energy import root_mean_square_torque
 
 ROBOT = rk.load().replace(friction=0.0)
 PD = rk.PD(7.05, 0.225)
@@ -79,6 +80,15 @@ def test_work_without_friction_is_the_kinetic_energy():
     kinetic = rk.kinetic_energy(ROBOT, run.q, run.qd)
     # Relative to the largest energy; a Runge-Kutta step of 1 ms is good to (rate dt)^5, about 1e-10 here.
     np.testing.assert_allclose(rk.mechanical_work(run).sum(), kinetic[-1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 4])
+def test_a_run_of_few_holds_has_their_mean(samples):
+    robot = rk.load()
+    run = rk.simulate(robot, rk.PD(7.05, 0.225), rk.hold(robot, [0.03, 0.02], 1e-3 * (samples - 1)), [4e-3, 0.0, 0.0])
+    assert len(run.t) == samples
+    square = sum(c @ c for c in run.c[:-1]) / (samples - 1)
+    np.testing.assert_allclose(root_mean_square_torque(run), np.sqrt(square), rtol=1e-12)
 
 
 def test_a_study_is_its_runs():

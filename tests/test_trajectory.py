@@ -106,3 +106,10 @@ def test_samples_and_other_machines():
     assert_allclose(other.x, path.x)
     assert_allclose(rk.forward_kinematics(MACHINES["asymmetric"], other.q), path.x, atol=1e-14)
     assert repr(path) == "Trajectory(501 samples, 5 s, 'testbed')"
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_rates_of_another_motion_are_refused(factor):
+    path = rk.circle(TESTBED, 0.05, 1.0)
+    with pytest.raises(ValueError, match="does not fit x"):
+        rk.follow(TESTBED, path.t, path.x, factor * path.xd, path.xdd)
