@@ -139,6 +139,13 @@ class Tracer:
         self.seconds: dict[str, float] = {}
         self.failed: list[str] = []
 
+    # What a file of tests makes while it is imported belongs to all of them.
+    def pytest_collectstart(self, collector):
+        self.coverage.switch_context(collector.nodeid if collector.nodeid.endswith(".py") else "")
+
+    def pytest_collectreport(self, report):
+        self.coverage.switch_context("")
+
     def pytest_runtest_logstart(self, nodeid, location):
         self.coverage.switch_context(nodeid)
         self.start = time.perf_counter()
@@ -155,9 +162,13 @@ class Tracer:
         """Tests by line, by module; without those that fail in an unchanged tree."""
         self.coverage.stop()
         data, seen = self.coverage.get_data(), {}
+        of_file: dict[str, set[str]] = {}
+        for test in self.seconds:
+            of_file.setdefault(test.split("::")[0], set()).add(test)
         for file in data.measured_files():
             lines = data.contexts_by_lineno(file)
-            good = {line: sorted(set(tests) - {"", *self.failed}) for line, tests in lines.items()}
+            tests = {line: set().union(*(of_file.get(c, {c}) for c in found)) for line, found in lines.items()}
+            good = {line: sorted(names & set(self.seconds) - set(self.failed)) for line, names in tests.items()}
             seen[Path(file).relative_to(folder).as_posix()] = good
         return seen
 
