@@ -536,3 +536,21 @@ def test_one_pose_and_a_trajectory_are_the_same_call(name):
         assert_allclose(block.reshape(whole.shape), single, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
         assert f(*[a[:0] for a in args]).shape == (0, *whole.shape[1:])
     assert rk.actuation_type(robot, q).shape == (12,)
+
+
+def test_a_matrix_for_each_pose():
+    """Gains and weights may differ from pose to pose; the poses must be the same ones."""
+    rng = np.random.default_rng(8)
+    q = rk.inverse_kinematics(TESTBED, rng.uniform(-0.05, 0.05, (4, 2)))
+    A = rk.control_matrix(TESTBED, q)
+    K = np.einsum("kij,klj->kil", *[rng.normal(size=(4, 3, 3))] * 2) + np.eye(3)
+    for function in (rk.command_filter, rk.weighted_pseudoinverse):
+        assert_allclose(function(A, K), [function(*pair) for pair in zip(A, K, strict=True)], rtol=0, atol=1e-12)
+        with pytest.raises(ValueError, match="leading|shape"):
+            function(A, K[:3])
+    qd = np.einsum("kij,kj->ki", rk.orthogonal_complement(TESTBED, q), rng.normal(size=(4, 2)))
+    qdd = np.zeros_like(qd)
+    one_by_one = [rk.inverse_dynamics(TESTBED, *row[:3], W=row[3]) for row in zip(q, qd, qdd, K, strict=True)]
+    assert_allclose(rk.inverse_dynamics(TESTBED, q, qd, qdd, W=K), one_by_one, rtol=0, atol=1e-12)
+    with pytest.raises(ValueError, match="leading|shape"):
+        rk.inverse_dynamics(TESTBED, q, qd, qdd, W=K[:3])

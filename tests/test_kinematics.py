@@ -122,6 +122,14 @@ def test_close_loops_finds_the_nearest_configuration(robot):
         assert_allclose(found, peer.x, atol=1e-6)
 
 
+def test_close_loops_squares_its_error():
+    """Newton's method: 0.1 rad, then about 1e-2, 1e-4, 1e-8, and below the tolerance, in five steps."""
+    rng = np.random.default_rng(0)
+    q = rk.inverse_kinematics(TESTBED, rng.uniform(-0.06, 0.06, (60, 2)))
+    for rough in q + rng.uniform(-0.1, 0.1, q.shape):
+        rk.close_loops(TESTBED, rough, iterations=5)
+
+
 def test_close_loops_is_a_projection():
     q = rk.inverse_kinematics(TESTBED, random_points(TESTBED, 100))
     assert_allclose(rk.close_loops(TESTBED, q), q, atol=1e-13)

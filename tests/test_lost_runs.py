@@ -294,3 +294,19 @@ def test_a_process_that_dies_takes_no_finished_rows_along():
     part = caught.value.partial
     assert part.failed.tolist() == [False, False, True, True, True, True]
     assert_array_equal(part.energies[0], rk.simulate(ROBOT, pd, PATH).energy)
+
+
+def test_a_law_that_fails_within_a_library_is_named_by_its_own_line():
+    def law(t, q_a, qd_a, desired):
+        return pd(t, q_a, qd_a, desired) if t < 0.1 else np.linalg.solve(np.zeros((3, 3)), q_a)
+
+    with pytest.raises(rk.SimulationError, match=r"LinAlgError.*\(line \d+ of test_lost_runs.py: return pd"):
+        rk.simulate(ROBOT, law, PATH, OFFSET)
+
+
+@pytest.mark.parametrize("law", [rk.PD, rk.APD, rk.CTC, rk.RedundantAPD, rk.RedundantCTC])
+def test_gains_are_positive(law):
+    with pytest.raises(ValueError, match="K_P"):
+        law(0.0, 1.0)
+    with pytest.raises(ValueError, match="K_D"):
+        law(1.0, 0.0)
