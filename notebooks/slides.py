@@ -21,13 +21,14 @@ sys.path.insert(0, str(HERE))
 
 def main(number: str, target: str = "") -> int:
     """Write the slides of the lesson with this number; 2 when there is no such lesson."""
-    from workshop.deck import page, slides
-
     found = sorted(HERE.glob(f"{number}_*.ipynb"))
     if len(found) != 1:
         allowed = ", ".join(path.stem[:2] for path in sorted(HERE.glob("[0-9][0-9]_*.ipynb")))
         print(f"lesson = {number!r}; allowed: {allowed}", file=sys.stderr)
         return 2
+    # Imported here: a wrong number is told without `latex2mathml`.
+    from workshop.deck import page, slides
+
     notebook = nbformat.read(found[0], as_version=4)
     path = Path(target or f"slides_{number}.html")
     path.write_text(page(notebook), encoding="utf-8")
