@@ -546,11 +546,13 @@ def test_a_matrix_for_each_pose():
     K = np.einsum("kij,klj->kil", *[rng.normal(size=(4, 3, 3))] * 2) + np.eye(3)
     for function in (rk.command_filter, rk.weighted_pseudoinverse):
         assert_allclose(function(A, K), [function(*pair) for pair in zip(A, K, strict=True)], rtol=0, atol=1e-12)
-        with pytest.raises(ValueError, match=r"leading|shape"):
+        with pytest.raises(ValueError, match=r"A \(4,\), [KW] \(3,\); allowed: equal ones"):
             function(A, K[:3])
     qd = np.einsum("kij,kj->ki", rk.orthogonal_complement(TESTBED, q), rng.normal(size=(4, 2)))
     qdd = np.zeros_like(qd)
     one_by_one = [rk.inverse_dynamics(TESTBED, *row[:3], W=row[3]) for row in zip(q, qd, qdd, K, strict=True)]
     assert_allclose(rk.inverse_dynamics(TESTBED, q, qd, qdd, W=K), one_by_one, rtol=0, atol=1e-12)
-    with pytest.raises(ValueError, match=r"leading|shape"):
+    with pytest.raises(ValueError, match=r"A \(4,\), W \(3,\); allowed: equal ones"):
         rk.inverse_dynamics(TESTBED, q, qd, qdd, W=K[:3])
+    with pytest.raises(ValueError, match=r"motion \(4,\), W \(3,\); allowed: equal ones"):
+        rk.inverse_dynamics(TESTBED, q[0], qd[0], qdd, W=K[:3])
