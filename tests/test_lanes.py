@@ -216,7 +216,7 @@ MOTIONS = {
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize(
     ("friction", "velocity"),
-    [(0.0, 0.01), (4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3), (1.0, 0.03), (1.0, 1e-4)],
+    [(0.0, 0.01), (4.2e-3, 0.01), (4.2e-3, 1e-3), (0.1, 0.1), (0.3, 3e-3), (1.0, 0.03), (1.0, 1e-4), (4.2e-3, 1e-4)],
 )
 def test_friction_as_a_stiff_solver_has_it(friction, velocity, motion):
     """LSODA at its tightest in every hold."""
@@ -225,6 +225,15 @@ def test_friction_as_a_stiff_solver_has_it(friction, velocity, motion):
     assert_allclose(rk.simulate(robot, PD, path, OFFSET[:3]).x, states[:, :2], rtol=0, atol=2e-9)
     study = rk.sweep(robot, PD, path, [OFFSET[:3], [0.0, 0.0, 0.0]])
     assert_allclose(study.x_final[0], states[-1, :2], rtol=0, atol=2e-9)
+
+
+def test_friction_of_a_machine_that_is_thrown_about():
+    """Thousands of rad/s^2, in which the bend of friction is passed unresolved, against the same solver: to 10 nm."""
+    robot, path, law = MACHINES["testbed"], MOTIONS["a drive turns back"], rk.CTC(250.0**2, 500.0, None)
+    offset = np.array([0.05, 0.04, -0.06])
+    states = reference(robot, law, path, offset, method="LSODA", rtol=1e-12, atol=1e-15)[0]
+    assert_allclose(rk.simulate(robot, law, path, offset).x, states[:, :2], rtol=0, atol=1e-8)
+    assert_allclose(rk.sweep(robot, law, path, offset).x_final[0], states[-1, :2], rtol=0, atol=1e-8)
 
 
 def test_friction_beyond_all_measure():

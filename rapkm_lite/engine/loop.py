@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from . import plant, single
+from .decentralized import command_filter, force_filter, integral, proportional
 from .jit import kernel, leaf, outlined
 from .laws import computed_torque
 from .leaves import solve2
@@ -51,78 +52,31 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
             w[at(ED, i, j, W, L)] -= want(table, o, RATE, i, W)
 
 
-@outlined
-def proportional(lanes, arms, w):
-    """PD (12)."""
-    P = len(arms) * len(lanes)
-    for p in range(P):
-        w[C * P + p] = -(w[GAIN_P * P + p] * w[E * P + p] + w[GAIN_D * P + p] * w[ED * P + p])
-
-
-@outlined
-def integral(lanes, arms, w, dt):
-    """PD with an integral that stands still while its drive is at the limit."""
-    P = len(arms) * len(lanes)
-    for p in range(P):
-        e, ed, limit = w[E * P + p], w[ED * P + p], w[LIMIT * P + p]
-        grown = w[MEMORY * P + p] + w[GAIN_I * P + p] * dt * e
-        c = -(w[GAIN_P * P + p] * e + w[GAIN_D * P + p] * ed + grown)
-        held = min(max(c, -limit), limit)
-        w[C * P + p], w[MEMORY * P + p] = held, grown if held == c else w[MEMORY * P + p]
-
-
-@outlined
-def force_filter(lanes, drives, arms, w):
-    """The filter (16) of whatever stands in C, weighted where W is not the identity."""
-    L, N, W = len(lanes), len(drives), len(arms)
-    for j in range(L):
-        m11 = m12 = m22 = fx = fy = -0.0
-        for i in range(N):
-            a1, a2, c, ease = (
-                w[at(A1, i, j, W, L)],
-                w[at(A2, i, j, W, L)],
-                w[at(C, i, j, W, L)],
-                w[at(EASE, i, j, W, L)],
-            )
-            m11, m12, m22 = m11 + ease * a1 * a1, m12 + ease * a1 * a2, m22 + ease * a2 * a2
-            fx, fy = fx + a1 * c, fy + a2 * c
-        gx, gy = solve2(m11, m12, m22, fx, fy)
-        for i in range(N):
-            w[at(C, i, j, W, L)] = w[at(EASE, i, j, W, L)] * (w[at(A1, i, j, W, L)] * gx + w[at(A2, i, j, W, L)] * gy)
-
-
-@outlined
-def command_filter(lanes, drives, arms, w):
-    """PD drives with filtered commands (17)-(18)."""
-    L, N, W = len(lanes), len(drives), len(arms)
-    for j in range(L):
-        m11 = m12 = m22 = fx = fy = n11 = n12 = n22 = hx = hy = -0.0
-        for i in range(N):
-            p, d, a1, a2 = (
-                w[at(GAIN_P, i, j, W, L)],
-                w[at(GAIN_D, i, j, W, L)],
-                w[at(A1, i, j, W, L)],
-                w[at(A2, i, j, W, L)],
-            )
-            e, ed, pp, dd = p * w[at(E, i, j, W, L)], d * w[at(ED, i, j, W, L)], p * p, d * d
-            m11, m12, m22, fx, fy = m11 + pp * a1 * a1, m12 + pp * a1 * a2, m22 + pp * a2 * a2, fx + a1 * e, fy + a2 * e
-            n11, n12, n22 = n11 + dd * a1 * a1, n12 + dd * a1 * a2, n22 + dd * a2 * a2
-            hx, hy = hx + a1 * ed, hy + a2 * ed
-        gx, gy = solve2(m11, m12, m22, fx, fy)
-        rx, ry = solve2(n11, n12, n22, hx, hy)
-        for i in range(N):
-            p, d = w[at(GAIN_P, i, j, W, L)], w[at(GAIN_D, i, j, W, L)]
-            w[at(C, i, j, W, L)] = -(
-                w[at(A1, i, j, W, L)] * (p * p * gx + d * d * rx) + w[at(A2, i, j, W, L)] * (p * p * gy + d * d * ry)
-            )
-
-
 @leaf
 def take_answer(drives, arms, w, buffer):
     """The torques that a user's law left at the end of the buffer."""
     N, W = len(drives), len(arms)
     for i in range(N):
         w[C * W + i] = buffer[len(buffer) - N + i]
+
+
+@leaf
+def command(lanes, drives, arms, modelled, user, law, table, o, w, t, dt, buffer):
+    """The torques C of the law and of the filter around it."""
+    if law.form == PD:
+        proportional(lanes, arms, w)
+    elif law.form == PID:
+        integral(lanes, arms, w, dt)
+    elif modelled is not None:
+        computed_torque(lanes, drives, arms, modelled, law, table, o, w)
+    elif user is not None:
+        fill(drives, arms, law, t, table, o, w, buffer)
+        user(buffer)
+        take_answer(drives, arms, w, buffer)
+    if law.filter == FORCE_FILTER:
+        force_filter(lanes, drives, arms, w)
+    elif law.filter == COMMAND_FILTER:
+        command_filter(lanes, drives, arms, w)
 
 
 @leaf
@@ -233,20 +187,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
                 return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
-        if law.form == PD:
-            proportional(lanes, arms, w)
-        elif law.form == PID:
-            integral(lanes, arms, w, dt)
-        elif modelled is not None:
-            computed_torque(lanes, drives, arms, modelled, law, table, o, w)
-        elif user is not None:
-            fill(drives, arms, law, k * dt, table, o, w, buffer)
-            user(buffer)
-            take_answer(drives, arms, w, buffer)
-        if law.filter == FORCE_FILTER:
-            force_filter(lanes, drives, arms, w)
-        elif law.filter == COMMAND_FILTER:
-            command_filter(lanes, drives, arms, w)
+        command(lanes, drives, arms, modelled, user, law, table, o, w, k * dt, dt, buffer)
         if len(faulty) > 0:
             break_drives(lanes, arms, faults, w, k)
 

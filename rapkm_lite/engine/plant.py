@@ -13,8 +13,9 @@ from .leaves import drag, geometry, share, small_angle, solve2
 from .rows import *
 from .tables import *
 
-# Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the most steps.
-STIFF, FAST, MOST_STEPS = 1.0, 0.6, 4000.0
+# Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law; the angle in rad by which
+# a step that is longer may err, as where a machine is thrown about; and the most steps.
+STIFF, FAST, FINE, MOST_STEPS = 1.0, 0.6, 3e-9, 4000.0
 
 
 @outlined
@@ -138,7 +139,7 @@ def join(lanes, arms, w):
 
 @leaf
 def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
-    """What friction of a drive asks of a hold: lambda dt, |qdd| dt / v0, and 1 where the drive can pass zero in it.
+    """What friction of a drive asks of a hold: lambda dt, steps across the bend, and 1 where the drive can pass zero.
 
     lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
     """
@@ -146,7 +147,8 @@ def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt)
     yields = friction * (bx * gx + by * gy)
     qdd = abs(bx * kx + by * ky + acc)
     passes = abs(rate) < 20.0 / sharpness + (qdd + 2.0 * yields) * dt
-    return yields * sharpness * dt, (qdd + yields) * dt * sharpness, 1.0 if passes and friction > 0.0 else 0.0
+    steps = min((qdd + yields) * dt * sharpness / FAST, yields * dt * dt / FINE)
+    return yields * sharpness * dt, steps, 1.0 if passes and friction > 0.0 else 0.0
 
 
 @outlined
@@ -176,7 +178,7 @@ def count_steps(lanes, arms, w, dt):
                 dt,
             )
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS))))
+        n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = n
         w[of(STEP, j, W, L)] = dt / n if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.

@@ -6,7 +6,7 @@ import math
 
 from .jit import kernel, leaf, outlined
 from .leaves import drag, geometry, share, small_angle, solve2
-from .plant import FAST, MOST_STEPS, STIFF, judge, mend, stiffness
+from .plant import MOST_STEPS, STIFF, judge, mend, stiffness
 from .rows import *
 from .tables import *
 
@@ -137,7 +137,7 @@ def count_steps(arms, w, kx, ky, dt):
             dt,
         )
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-    return max(1.0, math.ceil(max(stiff / STIFF, min(fast / FAST, MOST_STEPS)))) if near > 0.0 else 0.0
+    return max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS)))) if near > 0.0 else 0.0
 
 
 @outlined

@@ -172,9 +172,9 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
       const qdd = Math.abs(bx * acc[0] + by * acc[1] + bend[i]);
       stiff += yields * sharpness * dt;
       if (!(f > 0 && Math.abs(rates[i]) < 20 / sharpness + (qdd + 2 * yields) * dt)) continue;
-      near = true, fast = Math.max(fast, (qdd + yields) * dt * sharpness);
+      near = true, fast = Math.max(fast, Math.min((qdd + yields) * dt * sharpness / 0.6, yields * dt * dt / 3e-9));
     }
-    return near ? Math.max(1, Math.ceil(Math.max(stiff, Math.min(fast / 0.6, 4000)))) : 1;
+    return near ? Math.max(1, Math.ceil(Math.max(stiff, Math.min(fast, 4000)))) : 1;
   }
 
   let x = path.x[0], y = path.x[1], vx = 0, vy = 0, x1 = x, y1 = y, x2 = x, y2 = y;

@@ -10,19 +10,22 @@ from .quantities import entrywise, matrices, quantities
 from .seen import Seen, alike, ratio_of
 
 
+def _argument(seen: Seen, k: int) -> list[np.ndarray]:
+    """Argument k of all cases where it always has the shape of the answer, else an empty list."""
+    values = [case[k] for case in seen.cases if k < len(case) and isinstance(case[k], np.ndarray)]
+    fits = len(values) == len(seen.cases) and all(a.shape == w.shape for a, w in zip(values, seen.want, strict=True))
+    return values if fits else []
+
+
 def from_argument(seen: Seen) -> str:
     """An argument itself, or its difference from or sum with the right answer."""
     for k, name in enumerate(seen.names):
-        pairs = [
-            (case[k], w)
-            for case, w in zip(seen.cases, seen.want, strict=True)
-            if k < len(case) and isinstance(case[k], np.ndarray) and case[k].shape == w.shape
-        ]
-        if len(pairs) < len(seen.cases):
+        if not (values := _argument(seen, k)):
             continue
+        pairs = list(zip(values, seen.want, strict=True))
         tries = [
-            ([a for a, _ in pairs], f"the answer is {name} itself, unchanged"),
-            ([-a for a, _ in pairs], f"the answer is minus {name} itself"),
+            (values, f"the answer is {name} itself, unchanged"),
+            ([-a for a in values], f"the answer is minus {name} itself"),
             ([a - w for a, w in pairs], f"the answer is the complement: {name} minus the right answer"),
             ([w - a for a, w in pairs], f"the answer differs from the right one by {name}: it is subtracted once more"),
             ([a + w for a, w in pairs], f"the answer differs from the right one by {name}: it is added once more"),
@@ -40,28 +43,35 @@ def _power(p: float) -> str:
     return {1.0: "", 2.0: " squared", 0.5: " (its root)"}[abs(p)]
 
 
+def _whole_factor(seen: Seen) -> str:
+    """One factor per case that is a power of a quantity among the arguments."""
+    ratios = [ratio_of([g], [w]) for g, w, _ in seen]
+    if not all(ratios) or not seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
+        return ""
+    for name, values in quantities(seen.names, seen.cases):
+        if abs(values[0] - 1.0) <= 1e-6:
+            continue
+        for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
+            rest = np.array(ratios) / np.asarray(values) ** p
+            # What does not vary explains a factor only if nothing else is left.
+            if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
+                continue
+            if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]):
+                word = "is missing" if p < 0 else "is one too many"
+                more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
+                return f"the factor {name}{_power(p)} {word}{more}"
+    return ""
+
+
 def argument_factor(seen: Seen) -> str:
     """A factor per case, or per entry, that is a power of one of the arguments: missing or one too many."""
-    ratios = [ratio_of([g], [w]) for g, w, _ in seen]
-    fits = seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)])
-    if fits and all(ratios):
-        for name, values in quantities(seen.names, seen.cases):
-            for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
-                rest = np.array(ratios) / np.asarray(values) ** p
-                if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
-                    continue
-                if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]) and abs(values[0] - 1.0) > 1e-6:
-                    word = "is missing" if p < 0 else "is one too many"
-                    more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
-                    return f"the factor {name}{_power(p)} {word}{more}"
+    if words := _whole_factor(seen):
+        return words
     for name, scales in entrywise(seen.names, seen.cases, seen.want):
         for p in (-1.0, 1.0, -2.0, 2.0):
             if seen.same([w * s**p for w, s in zip(seen.want, scales, strict=True)]):
                 return f"each entry has the factor {name}{_power(p)} {'missing' if p < 0 else 'once too many'}"
-    for name, models in matrices(seen.names, seen.cases, seen.want):
-        if seen.same(models):
-            return name
-    return ""
+    return next((name for name, models in matrices(seen.names, seen.cases, seen.want) if seen.same(models)), "")
 
 
 def constant_factor(seen: Seen) -> str:
@@ -100,10 +110,7 @@ def function_of(seen: Seen) -> str:
 def combination(seen: Seen) -> str:
     """A sum of the right answer and arguments of its shape, with whole or half coefficients."""
     columns = {"the right answer": seen.want}
-    for k, name in enumerate(seen.names):
-        fit = [case[k] for case in seen.cases if k < len(case) and isinstance(case[k], np.ndarray)]
-        if len(fit) == len(seen.cases) and all(a.shape == w.shape for a, w in zip(fit, seen.want, strict=True)):
-            columns[name] = fit
+    columns |= {name: values for k, name in enumerate(seen.names) if (values := _argument(seen, k))}
     M = np.array([np.concatenate([np.ravel(v) for v in side]) for side in columns.values()]).T
     if M.shape[1] < 2 or M.shape[0] < 3 * M.shape[1]:
         return ""
@@ -125,11 +132,14 @@ def mixture(seen: Seen) -> str:
     if want.shape[1] < 2 * shape[0] or np.linalg.matrix_rank(want, 1e-6 * np.abs(want).max()) < shape[0]:
         return ""
     M = got @ np.linalg.pinv(want)
-    if not alike(M @ want, got, seen.slack):
-        return ""
+    return _mixed(M, "row" if len(shape) == 2 else "entry") if alike(M @ want, got, seen.slack) else ""
+
+
+def _mixed(M: np.ndarray, part: str) -> str:
+    """Words for what the matrix M does to the rows or entries of the right answer."""
     if not np.any(np.abs(M - np.diag(np.diag(M))) > 1e-4):
         rows = ", ".join(f"{i} ({f:.4g})" for i, f in enumerate(np.diag(M)) if abs(f - 1.0) > 1e-4)
-        return f"a constant factor is wrong in {'row' if len(shape) == 2 else 'entry'} {rows}, counted from 0"
+        return f"a constant factor is wrong in {part} {rows}, counted from 0"
     if np.all((np.abs(np.abs(M) - 1) < 1e-4).sum(axis=1) == 1) and np.all((np.abs(M) < 1e-4).sum(axis=1) == len(M) - 1):
         return "the entries stand in another order, some with the opposite sign"
     return "the entries are a fixed mixture of the right ones: they are given in another basis or frame"

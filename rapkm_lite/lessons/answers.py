@@ -131,7 +131,8 @@ def numbers(got: Any) -> np.ndarray:
         kind = type(got).__name__
         raise Ended("wrong", f"the answer is not numeric but of type {kind}, or too large", "not numeric") from None
     if array.dtype.kind == "c":
-        raise Ended("wrong", "the answer is complex; a real one is wanted", "complex")
+        real = " (.real of it, since all imaginary parts are zero, as after np.linalg.eig)" * (not array.imag.any())
+        raise Ended("wrong", f"the answer is complex; a real one is wanted{real}", "complex")
     if array.dtype.kind not in "iuf":
         raise Ended("wrong", f"the answer is not numeric but of type {type(got).__name__}", "not numeric")
     return np.array(array, dtype=float)

@@ -51,8 +51,11 @@ def sign(seen: Seen) -> str:
         return "the answer has the opposite sign"
     if seen.same([np.abs(w) for w in seen.want]):
         return "the answer has lost its signs: it is the absolute value"
-    if not all(alike(np.abs(w), np.abs(g), seen.slack) for g, w, _ in seen):
-        return ""
+    return _some_signs(seen) if all(alike(np.abs(w), np.abs(g), seen.slack) for g, w, _ in seen) else ""
+
+
+def _some_signs(seen: Seen) -> str:
+    """Words for the rows, columns or entries that have the opposite sign."""
     scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
     flipped = {
         tuple(int(i) for i in place) for g, w, _ in seen for place in np.argwhere(np.abs(g - w) > seen.slack * scale)
@@ -147,6 +150,11 @@ def where(seen: Seen, right: list[bool]) -> str:
         if all(labels) and not {getattr(case, "label", "") for case in good} & set(labels):
             return f"it is right in {len(good)} of {len(right)} cases, and wrong for " + ", ".join(labels)
         return f"it is right in {len(good)} of {len(right)} cases"
+    return _wrong_lines(seen)
+
+
+def _wrong_lines(seen: Seen) -> str:
+    """The rows, columns or entries that hold all that is wrong, where there are others."""
     shapes = {w.shape for w in seen.want}
     if len(shapes) > 1 or not all(g.shape == w.shape for g, w, _ in seen) or len(shape := shapes.pop()) not in (1, 2):
         return ""

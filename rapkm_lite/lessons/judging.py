@@ -58,17 +58,22 @@ def _near_and_far(exercise: Exercise, answer: Any) -> Result:
     return all_of_them if result.word == "ok" else result
 
 
-def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
-    if not exercise.is_value(cases) and not callable(answer):
-        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
+def _seen(exercise: Exercise, answer: Any, cases: list[tuple]) -> Seen:
+    """Given and right answers of all cases, in one shape; ends where they show a mistake that has a name."""
     read = [numbers(given(answer, case)) for case in cases]
     reference = exercise.reference
     assert callable(reference)
     want = [np.asarray(reference(*map(copied, case)), dtype=float) for case in cases]
     names = tuple(inspect.signature(reference).parameters)
-    seen = Seen(read, want, cases, names)
-    _known_mistake(exercise, seen)
-    seen = Seen([fitting(g, w.shape) for g, w in zip(read, want, strict=True)], want, cases, names)
+    _known_mistake(exercise, Seen(read, want, cases, names))
+    return Seen([fitting(g, w.shape) for g, w in zip(read, want, strict=True)], want, cases, names)
+
+
+def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
+    if not exercise.is_value(cases) and not callable(answer):
+        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
+    seen = _seen(exercise, answer, cases)
+    want = seen.want
     worst = [_deviation(g, w) for g, w, _ in seen] if exercise.unique else [0.0] * len(cases)
     allowed = [max(exercise.tolerance, 1e-9 * _size(w)) for w in want]
     right = [d <= a for d, a in zip(worst, allowed, strict=True)]
@@ -80,9 +85,7 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     if all(right):
         raise Ended("wrong", f"{sentence}: {lawful:.3g} (allowed {exercise.tolerance:.0e})", sentence)
     off = f"off by up to {max(worst):.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
-    # Small cases are held against the mean size: a search stops at the same absolute error everywhere.
-    usual = float(np.mean([_size(w) for w in want])) or 1.0
-    share = max(d / max(_size(w), usual) if not good else 0.0 for d, w, good in zip(worst, want, right, strict=True))
+    share = _share(worst, want, right)
     if share <= exercise.close:
         return Result(
             "close", f"the method is right, {off}, that is {100 * share:.2g} %. To improve: {exercise.improve}"
@@ -90,6 +93,12 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     _explained(exercise, seen, right, off)
     law = f"; {sentence}: {lawful:.3g}" if exercise.invariant and lawful > exercise.tolerance else ""
     raise Ended("wrong", f"it is {off}{law}", "no name found")
+
+
+def _share(worst: list[float], want: list[np.ndarray], right: list[bool]) -> float:
+    """The largest deviation, relative: small cases against the mean size, for a search errs as much everywhere."""
+    usual = float(np.mean([_size(w) for w in want])) or 1.0
+    return max(d / max(_size(w), usual) if not good else 0.0 for d, w, good in zip(worst, want, right, strict=True))
 
 
 def _size(want: np.ndarray) -> float:
@@ -158,14 +167,7 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> N
 def _behaviour(exercise: Exercise, answer: Any) -> Result:
     """The verdict on a design: its measured numbers beside their limits."""
     assert exercise.judge
-    if callable(answer) and not callable(exercise.reference):
-        raise Ended("wrong", "the answer is a function; a value is wanted", "not a value")
-    if not callable(answer) and callable(exercise.reference):
-        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
-    if callable(answer):
-        answer = Answer(answer) if inspect.isroutine(answer) else answer
-    else:
-        answer = fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
+    answer = _design(exercise, answer)
     for sentence, made in exercise.mistakes.items():
         if _true(made, answer):
             raise Ended("wrong", sentence, sentence)
@@ -177,6 +179,17 @@ def _behaviour(exercise: Exercise, answer: Any) -> Result:
     if miss <= exercise.close:
         return Result("close", f"{text}. To improve: {exercise.improve}")
     raise Ended("wrong", text, "; ".join(f"{m.what} misses its limit" for m in measured if m.miss > 0.0))
+
+
+def _design(exercise: Exercise, answer: Any) -> Any:
+    """A design as its judge wants it: a function where one is asked for, else numbers of the right shape."""
+    if callable(answer) and not callable(exercise.reference):
+        raise Ended("wrong", "the answer is a function; a value is wanted", "not a value")
+    if not callable(answer) and callable(exercise.reference):
+        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
+    if callable(answer):
+        return Answer(answer) if inspect.isroutine(answer) else answer
+    return fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
 
 
 def _true(made: Callable, answer: Any) -> bool:

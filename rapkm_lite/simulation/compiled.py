@@ -79,20 +79,15 @@ def _sums(setup: Setup, w) -> tuple:
     )
 
 
-def _run(setup: Setup, codes: list[Code], offsets, history):
-    """Run as many runs as there are codes side by side; returns a function that gives the rows of the work table.
-
-    history : None for a study; the columns of an `Outcome` for a single run.
-    """
+def _work(setup: Setup, codes: list[Code], offsets, width: int):
+    """The work table of runs that begin: flat, its pair rows (blocks, width, L) and its run rows (rows, L)."""
     from ..engine import rows
-    from ..engine.loop import closed_loops
 
-    robot, model, trajectory = setup.robot, setup.model, setup.trajectory
-    L, N, W = len(codes), robot.n_arms, tables.width(robot.n_arms, history is not None)
-    work = tables.aligned((rows.BLOCKS * W + rows.SINGLES) * L)
-    blocks, runs = work[: rows.BLOCKS * W * L].reshape(-1, W, L), work[rows.BLOCKS * W * L :].reshape(-1, L)
-    for i, arms in enumerate((robot, model)):
-        table, environment = _made_for(arms, W, _arms)
+    robot, L, N = setup.robot, len(codes), setup.robot.n_arms
+    work = tables.aligned((rows.BLOCKS * width + rows.SINGLES) * L)
+    blocks, runs = work[: rows.BLOCKS * width * L].reshape(-1, width, L), work[rows.BLOCKS * width * L :].reshape(-1, L)
+    for i, arms in enumerate((robot, setup.model)):
+        table, environment = _made_for(arms, width, _arms)
         blocks[i * rows.MODEL : (i + 1) * rows.MODEL] = table[..., None]
         start = rows.GRAVITY_X + i * rows.ENVIRONMENT
         runs[start : start + rows.ENVIRONMENT] = environment[:, None]
@@ -103,8 +98,22 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     blocks[rows.OFFSET, :N] = offsets.T
     blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
     for place in (rows.X, rows.PX, rows.PX1, rows.PX2):
-        runs[place : place + 2] = trajectory.x[0][:, None]
-    runs[rows.VX : rows.VY + 1] = trajectory.xd[0][:, None]
+        runs[place : place + 2] = setup.trajectory.x[0][:, None]
+    runs[rows.VX : rows.VY + 1] = setup.trajectory.xd[0][:, None]
+    return work, blocks, runs
+
+
+def _run(setup: Setup, codes: list[Code], offsets, history):
+    """Run as many runs as there are codes side by side; returns a function that gives the rows of the work table.
+
+    history : None for a study; the columns of an `Outcome` for a single run.
+    """
+    from ..engine import rows
+    from ..engine.loop import closed_loops
+
+    robot, model, trajectory = setup.robot, setup.model, setup.trajectory
+    L, N, W = len(codes), robot.n_arms, tables.width(robot.n_arms, history is not None)
+    work, blocks, runs = _work(setup, codes, offsets, W)
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)
     form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
@@ -136,9 +145,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             work[:] = w
             if log is not None and history is not None:
-                log = np.reshape(log, (part.stop - first, -1))
-                for i, values in enumerate(np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1)):
-                    history[i][part] = values
+                _keep(log, history, part, N)
             if not np.any(runs[rows.STATUS] == DONE):
                 break
 
@@ -147,6 +154,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         return blocks[index, :N] if name in ("COPPER", "WORK") else runs[index]
 
     return row
+
+
+def _keep(log, history: list[np.ndarray], part: slice, N: int) -> None:
+    """Take the samples of a part of a single run into the columns of its history."""
+    log = np.reshape(log, (part.stop - part.start, -1))
+    for column, values in zip(history, np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1), strict=True):
+        column[part] = values
 
 
 def _user(law: CompiledLaw | None, N: int):

@@ -56,20 +56,23 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
             row.append(mark.words)
         rows.append(row)
         parts.append(mark.data.ravel())
-    handles = []
-    for handle in picture.handles:
-        entry = {"panel": handle["panel"], "at": [None if v is None else float(v) for v in handle["at"]]}
-        if handle["along"] is None:
-            entry["set"] = {k: [float(v) for v in (*values, 0.0)[:3]] for k, values in handle["set"].items()}
-        else:
-            entry["set"] = {k: np.asarray(values).tolist() for k, values in handle["set"].items()}
-            entry["along"] = np.round(handle["along"], 6).ravel().tolist()
-        if handle["grip"] is not None:
-            entry["grip"] = np.asarray(handle["grip"], dtype=float).tolist()
-        handles.append(entry)
+    handles = [_handle(handle) for handle in picture.handles]
     numbers = np.concatenate(parts) if parts else np.empty(0)
     header = {"marks": rows, "styles": styles, "images": images, "frames": picture.frames, "handles": handles}
     return header, [numbers.astype("<f4").tobytes(), *buffers]
+
+
+def _handle(handle: dict) -> dict:
+    """A handle as the canvas reads it."""
+    entry = {"panel": handle["panel"], "at": [None if v is None else float(v) for v in handle["at"]]}
+    if handle["along"] is None:
+        entry["set"] = {k: [float(v) for v in (*values, 0.0)[:3]] for k, values in handle["set"].items()}
+    else:
+        entry["set"] = {k: np.asarray(values).tolist() for k, values in handle["set"].items()}
+        entry["along"] = np.round(handle["along"], 6).ravel().tolist()
+    if handle["grip"] is not None:
+        entry["grip"] = np.asarray(handle["grip"], dtype=float).tolist()
+    return entry
 
 
 def decode(header: dict, buffers: list[bytes], styles: dict) -> list[tuple]:

@@ -173,10 +173,10 @@ MINIMA = {
     "this is the cost of equal offsets, (1, 1, 1) over its norm": lambda S, size: size**2 * S.sum() / len(S),
     "this is the cost of offsets that are all equal to size: their norm is larger": lambda S, size: size**2 * S.sum(),
     "np.linalg.eig does not sort: its first eigenvalue need not be the smallest (order)": (
-        lambda S, size: size**2 * np.linalg.eig(S)[0][0]
+        lambda S, size: size**2 * np.linalg.eig(S)[0][0].real
     ),
     "np.linalg.eig does not sort: its last eigenvalue need not be the smallest (order)": (
-        lambda S, size: size**2 * np.linalg.eig(S)[0][-1]
+        lambda S, size: size**2 * np.linalg.eig(S)[0][-1].real
     ),
     "this is the smallest entry of S, not its smallest eigenvalue": lambda S, size: size**2 * S.min(),
     "this is the mean cost over all directions; the least is wanted": _eigenvalues(lambda e, size: size**2 * e.mean()),
