@@ -55,7 +55,9 @@ def _guard(picture: Callable) -> Callable:
                 _check(parameter, given[parameter.name], known)
         try:
             return picture(*args, **named)
-        except (ArithmeticError, AttributeError, TypeError, LookupError, ValueError) as error:
+        except (ArithmeticError, AttributeError, TypeError, LookupError, ValueError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and type(error) is not RuntimeError:
+                raise  # a run that was lost, say
             # Curves may be whatever can be drawn; what could not is held to the names.
             for parameter in asked:
                 _check(parameter, given[parameter.name], known)

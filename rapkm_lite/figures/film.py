@@ -143,8 +143,8 @@ def film(
     poster : index of the frame that stands for the film where motion is not wanted.
     most : the most frames; of more, some are left out, and the film says so.  In a browser's own kernel 8, else all.
 
-    Set the limits of the axes in `draw`.  Raises ValueError without words, with fewer than two frames, with loops < 1,
-    or when the film would be larger than 120 kB.
+    Set the limits of the axes in `draw`.  Raises ValueError without words or time, with fewer than two frames,
+    with loops < 1, or when the film would be larger than 120 kB.
 
     >>> import numpy as np
     >>> film(lambda ax, s: ax.plot([0, np.cos(s)], [0, np.sin(s)]), np.linspace(0, 1, 3), "A hand turns.").alt
@@ -155,6 +155,8 @@ def film(
         raise ValueError(f"alt = {alt!r}; allowed: a sentence that says what is seen and what it shows")
     if len(steps) < 2:
         raise ValueError(f"frames has {len(steps)} steps; allowed: two or more")
+    if not seconds > 0 or not rest >= 0:
+        raise ValueError(f"seconds = {seconds}, rest = {rest}; allowed: a positive time, and a time of rest or 0")
     if loops < 1:
         raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
     if most is not None and most < 2:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import patheffects
 
+from ..machine.arguments import short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
 from ..mechanics.kinematics import inverse_kinematics
@@ -70,6 +71,8 @@ def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
     [[1.0, None], [2.0, 3.0]]
     """
     values = np.asarray(values)
+    if values.dtype.kind not in "biuf" or not np.all(np.isfinite(values)):
+        raise ValueError(f"values = {short(values)}; allowed: finite numbers, one for each point inside")
     grid = np.ma.array(np.zeros((*inside.shape, *values.shape[1:])), mask=True)
     grid[inside] = values
     return grid

@@ -150,7 +150,7 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
     if sensors.encoder is not None and without(encoder=None):
         yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
     if sensors.offset.any() and without(offset=0.0 * sensors.offset):
-        yield f"{_offsets(setup)}, is too large here; without it is not lost"
+        yield f"{_offsets(setup)}, is too large here; with right encoders it is not lost"
 
 
 def _offsets(setup: Setup) -> str:

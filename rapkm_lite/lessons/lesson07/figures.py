@@ -65,7 +65,7 @@ def plot_spacing(spacing, gap, marked=None, ax=None):
     return ax
 
 
-def plot_demand(part, demand, points, ax=None):
+def plot_demand(part, demand, points: dict, ax=None):
     """|eta^T q_a''| (k,) in rad along an edge, at the shares `part` (k,) of the way, and via points as ticks on it.
 
     points : dict of label -> shares of the way between 0 and 1.

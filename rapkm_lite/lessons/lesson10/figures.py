@@ -57,7 +57,7 @@ def plot_model_share(eps, share, t, leak, axes=None):
     return axes
 
 
-def plot_hunting_maps(gains, counts, jumps, friction, axes=None):
+def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
     """Jumps of the torques at rest over gain (k,) in N m/rad and counts per turn (j,), and where a step fills the band.
 
     jumps : dict of title -> (j, k) jumps per second.  friction : f_c in N m; the line is K_P 2 pi / counts = 2 f_c.

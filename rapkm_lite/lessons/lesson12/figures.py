@@ -68,17 +68,17 @@ def plot_apex(angle, sigma, pose, axes=None):
     return axes
 
 
-def plot_length_choice(lengths, conditions, marked, ax=None):
+def plot_length_choice(lengths, conditions: dict, special, ax=None):
     """Condition number of A over the length (k,) in m that makes radians comparable with metres.
 
-    conditions : dict of label -> (k,).  marked : a length in m to point at, as (words, number).
+    conditions : dict of label -> (k,).  special : a length in m to point at, as (words, number).
 
     >>> ax = plot_length_choice([0.1, 1.0], {"centre": [1.0, 7.0]}, ("platform", 0.14))
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for (label, condition), look in zip(conditions.items(), ("-", "--", ":"), strict=False):
         ax.loglog(lengths, condition, look, color=AFTER, label=label)
-    words, length = marked
+    words, length = special
     ax.axvline(length, color=ALARM, ls=":", label=words)
     ax.set(xlabel="characteristic length in m", ylabel="condition number of A")
     ax.legend(loc="lower left")
