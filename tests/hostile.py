@@ -133,7 +133,7 @@ OTHER: dict[tuple[str, str], Any] = {
     ("plot_apex", "angle"): [0.0, 0.3, 0.7], ("plot_apex", "sigma"): [0.35, 0.2, 0.0],
     ("plot_apex", "pose"): [0.0, 0.0, 0.59], ("plot_four_legs", "pose"): [0.0, 0.0, 0.1],
     ("plot_length_choice", "lengths"): [0.1, 1.0], ("plot_length_choice", "conditions"): {"centre": [1.0, 7.0]},
-    ("plot_length_choice", "marked"): ("platform", 0.14),
+    ("plot_length_choice", "special"): ("platform", 0.14),
     ("plot_places", "groups"): {"three": [[0.1, 0.0], [0.0, 0.1], [-0.1, 0.0]]},
     **{("plot_counted", n): ALONG for n in ("t", "gap", "exact")}, ("plot_bias", "names"): ["a"],
     **{("plot_bias", n): [[1e-5, 2e-5]] for n in ("residual", "bias")},

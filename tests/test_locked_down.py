@@ -26,6 +26,7 @@ threading._start_joinable_thread = refuse
 """
 NO_PROCESSES = """
 import socket, subprocess
+import numpy.testing  # in NumPy 2.0.0 it asks the processor's name by a process, and SciPy imports it
 def refuse(*args, **kwargs):
     raise AssertionError("a process or a connection was started")
 socket.socket.connect = subprocess.Popen.__init__ = refuse
