@@ -9,6 +9,8 @@ from reference import reference
 from samples import MACHINES
 
 import rapkm_lite as rk
+from rapkm_lite.engine import COMPILED
+from rapkm_lite.engine.loop import closed_loops
 from rapkm_lite.simulation import compiled
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
@@ -171,6 +173,20 @@ def test_other_machines(machine, name):
 
 
 # Company.
+@pytest.mark.skipif(not COMPILED, reason="a row is filled up for vector registers, in compiled runs only")
+@pytest.mark.parametrize("law", [rk.PD(5.0, 0.5), rk.CTC(400.0, 40.0, (0, 4)), rk.RedundantCTC(400.0, 40.0)])
+def test_three_and_four_arms_share_a_kernel(law):
+    """A fourth arm without mass, whose row of A is zero, leaves the machine of three what it is."""
+    three, four = rk.load(), rk.load("four_arms")
+    run = rk.simulate(three, law, rk.circle(three, 0.02, 0.1))
+    kernels = len(closed_loops.signatures)
+    rk.simulate(four, law, rk.circle(four, 0.02, 0.1))
+    assert len(closed_loops.signatures) == kernels
+    # An elbow is counted after the drives of its own machine.
+    expected = (0, 4) if isinstance(law, rk.CTC) else (-1, -1)
+    assert_array_equal(run.pairs, np.broadcast_to(expected, run.pairs.shape))
+
+
 def test_laws_of_all_kinds_in_one_sweep():
     """A row has the bits of a sweep of its own, whatever its neighbours, the threads and the order."""
     every = list(laws(3).values())

@@ -18,7 +18,7 @@ from .tables import *
 
 @outlined
 def look(lanes, drives, arms, table, o, w):
-    """The model at the pose: rows b and l of its rates, a.d, 1 / (a x d), and the errors of the elbows."""
+    """The model at the pose: rows b and l of its rates, a.d, a x d and its inverse, and the errors of the elbows."""
     L, N, W = len(lanes), len(drives), len(arms)
     far = 0
     for i in range(N):
@@ -37,9 +37,10 @@ def look(lanes, drives, arms, table, o, w):
             )
             bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)] = bx, by, lx, ly
-            w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)] = ad, inv
+            den = ax * dy - ay * dx
+            w[at(MAD, i, j, W, L)], w[at(MDEN, i, j, W, L)], w[at(MINV, i, j, W, L)] = ad, den, inv
             # a x d and a.d are the sine and cosine of the elbow angle times both lengths.
-            s, t = cos / inv - sin * ad, cos * ad + sin / inv
+            s, t = cos * den - sin * ad, cos * ad + sin * den
             s *= w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
             w[at(ELBOW_E, i, j, W, L)] = small_angle(s)
             w[at(ELBOW_ED, i, j, W, L)] = -(bx + lx) * w[of(PVX, j, W, L)] - (by + ly) * w[of(PVY, j, W, L)] - rate
@@ -48,7 +49,7 @@ def look(lanes, drives, arms, table, o, w):
         for i in range(N):
             cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
             for j in range(L):
-                ad, den = w[at(MAD, i, j, W, L)], 1.0 / w[at(MINV, i, j, W, L)]
+                ad, den = w[at(MAD, i, j, W, L)], w[at(MDEN, i, j, W, L)]
                 s, t = cos * den - sin * ad, cos * ad + sin * den
                 # Only those that are far: no run feels its neighbours.
                 if not (abs(s * w[at(MODEL + ELBOW_SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
@@ -83,7 +84,8 @@ def shares(lanes, drives, arms, extra, w):
                     w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
                     w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
                 )
-                place = lx / inv, ly / inv, bx / inv, by / inv, ad, inv, 0.0
+                den = w[at(MDEN, i, j, W, L)]
+                place = lx * den, ly * den, bx * den, by * den, ad, inv, 0.0
                 gx, gy = drag(
                     w[at(MODEL + W1, i, j, W, L)],
                     w[at(MODEL + W2, i, j, W, L)],

@@ -90,16 +90,16 @@ def break_drives(lanes, arms, faults, w, k):
 
 
 @leaf
-def record(drives, arms, history, w, k):
-    """A sample of a single run."""
-    N, W = len(drives), len(arms)
-    o = k * (6 + 3 * N)
-    history[o], history[o + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
-    history[o + 2], history[o + 3] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+def record(arms, history, N, w, row):
+    """A sample of a single run of N drives: a row in each column of its history, which are flat."""
+    W = len(arms)
+    states, q, qd, c, joints = history
+    for i in range(4):
+        states[4 * row + i] = w[of(X + i, 0, W, 1)]
     for i in range(N):
-        history[o + 4 + i], history[o + 4 + N + i] = w[at(Q, i, 0, W, 1)], w[at(QD, i, 0, W, 1)]
-        history[o + 4 + 2 * N + i] = w[at(C, i, 0, W, 1)]
-    history[o + 4 + 3 * N], history[o + 5 + 3 * N] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
+        o = N * row + i
+        q[o], qd[o], c[o] = w[Q * W + i], w[QD * W + i], w[C * W + i]
+    joints[2 * row], joints[2 * row + 1] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
 
 
 @outlined
@@ -148,7 +148,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled; an `else` would stay.
-    history, study : one of them is None.  modelled : None for laws without a model; else the `extra` of the model.
+    history, study : columns of a single run, or () for a study; one of them is None.  modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     clock : a long run is made in parts, whose state is in w; table and history hold those of one part.
     """
@@ -156,7 +156,8 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     lanes, drives, arms, faulty, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     real = len(faulty) > 0 or sensor.quantized or sensor.filtered
-    for row in range(len(table) // columns):
+    rows = len(table) // columns
+    for row in range(rows):
         k, o = clock.first + row, row * columns
 
         # Sense: the machine as it is, and what the hold will start from.
@@ -195,7 +196,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         if study is not None:
             add_up(lanes, drives, arms, w)
         if history is not None:
-            record(drives, arms, history, w, row)
+            record(arms, history, len(history[1]) // rows, w, row)
             if k + 1 == clock.samples:
                 last_torque(drives, arms, w, k)
                 return

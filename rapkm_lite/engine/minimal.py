@@ -22,12 +22,9 @@ def best_pair(lanes, drives, arms, w):
                 size = (
                     w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
                     * w[at(MODEL + ELBOW_SCALE, k, j, W, L)]
-                    / (
-                        w[at(MODEL + SCALE, i, j, W, L)]
-                        * w[at(MODEL + SCALE, k, j, W, L)]
-                        * w[at(MINV, i, j, W, L)]
-                        * w[at(MINV, k, j, W, L)]
-                    )
+                    / (w[at(MODEL + SCALE, i, j, W, L)] * w[at(MODEL + SCALE, k, j, W, L)])
+                    * w[at(MDEN, i, j, W, L)]
+                    * w[at(MDEN, k, j, W, L)]
                 )
                 measure = abs(
                     size

@@ -77,10 +77,9 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
             fx, fy = fx + w[at(GX, i, j, W, L)], fy + w[at(GY, i, j, W, L)]
             near = min(near, w[at(NEAR, i, j, W, L)])
         sx, sy = solve2(m11, m12, m22, fx, fy)
-        near = min(min(near, m11), m11 * m22 - m12 * m12)
-        todo = w[of(TODO, j, W, L)]
-        more = todo if near > 0.0 and max(abs(sx), abs(sy)) >= tolerance else 0.0
-        w[of(FAR, j, W, L)] += 0.0 if near > 0.0 else todo
+        least, todo = min(m11, m11 * m22 - m12 * m12), w[of(TODO, j, W, L)]
+        more = todo if near >= 0.0 and least > 0.0 and max(abs(sx), abs(sy)) >= tolerance else 0.0
+        w[of(FAR, j, W, L)] += 0.0 if near >= 0.0 and least > 0.0 else todo
         # A run that is done stays where it is and finds the same matrix again, whatever its neighbours still need.
         w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
         w[of(PY, j, W, L)] += sy if more > 0.0 else 0.0
@@ -125,7 +124,7 @@ def single_newton(drives, arms, w, tolerance):
         for i in range(1, N):
             m11, m12, m22 = m11 + w[P11 * W + i], m12 + w[P12 * W + i], m22 + w[P22 * W + i]
             fx, fy, near = fx + w[GX * W + i], fy + w[GY * W + i], min(near, w[NEAR * W + i])
-        if not min(min(near, m11), m11 * m22 - m12 * m12) > 0.0:
+        if not (near >= 0.0 and min(m11, m11 * m22 - m12 * m12) > 0.0):
             w[of(FAR, 0, W, 1)] = 1.0
             break
         sx, sy = solve2(m11, m12, m22, fx, fy)

@@ -34,6 +34,7 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
     L1,
     L2,
     MAD,
+    MDEN,
     MINV,
     ACC_B,
     ACC_E,
@@ -48,7 +49,7 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
     WANTED_RATE,
     UX,
     UY,
-) = range(FY + 1, FY + 31)
+) = range(FY + 1, FY + 32)
 BLOCKS = UY + 1
 
 (

@@ -34,16 +34,17 @@ ANGLE, RATE, COS, SIN, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, 
 def arm_table(robot, width: int) -> np.ndarray:
     """The constants of each arm that the kernels need, (15, width), in the order of `rows`.
 
-    Arms beyond the machine's are copies of its first one, without mass and friction.
+    Arms beyond the machine's are copies of its first one that reach as far, but have no mass, no friction, and elbows
+    of no sign: their rows of A and all that they add to a sum are zero.
     """
     l1, l2 = robot.lengths.T
     proximal, distal, _ = robot.arm_inertias.T
     w1, w2 = robot.arm_moments.T
     mass, none = _tip_masses(robot), np.arange(width) >= robot.n_arms
-    geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2, robot.mode]
+    geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2]
     masses = [proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction]
-    table = np.stack([*geometry, *masses, 1 / l1, 1 / (l1 * l2)])[:, _filled(robot.n_arms, width)]
-    table[len(geometry) : len(geometry) + len(masses), none] = 0.0
+    table = np.stack([*geometry, robot.mode, *masses, 1 / l1, 1 / (l1 * l2)])[:, np.where(none, 0, np.arange(width))]
+    table[len(geometry) : -2, none] = 0.0
     return table
 
 
@@ -65,7 +66,7 @@ FEW, ALL = 4, 10
 
 
 def motion_table(trajectory, width: int, count: int = ALL, rows: slice = slice(None)) -> np.ndarray:
-    """Desired motion per sample, (k, 6 + count width); arms beyond the machine's are copies of its first one."""
+    """Desired motion per sample, (k, 6 + count width); zeros for arms beyond the machine's."""
     N = trajectory.n_arms
     x, xd, xdd, q, qd, qdd = (getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd"))
     blocks = [
@@ -80,13 +81,8 @@ def motion_table(trajectory, width: int, count: int = ALL, rows: slice = slice(N
         np.sin(q[:, N:]),
         q[:, N:],
     ]
-    arms = _filled(N, width)
-    return np.column_stack([x, xd, xdd, *(block[:, arms] for block in blocks[:count])])
-
-
-def _filled(N: int, width: int) -> np.ndarray:
-    """Indices of the arms in a row of `width`: those beyond the machine's are copies of its first one."""
-    return np.where(np.arange(width) < N, np.arange(width), 0)
+    rest = np.zeros((len(x), width - N))
+    return np.column_stack([x, xd, xdd, *(part for block in blocks[:count] for part in (block, rest))])
 
 
 def sizes(count: int) -> tuple:

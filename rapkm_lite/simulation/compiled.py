@@ -95,6 +95,9 @@ def _work(setup: Setup, codes: list[Code], offsets, width: int):
         blocks[getattr(rows, name), :N] = np.stack([code.drives[name] for code in codes], axis=-1)
     for name in codes[0].run:
         runs[getattr(rows, name)] = [code.run[name] for code in codes]
+    # Elbows are counted after all arms of a row.
+    joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
+    joints[joints >= N] += width - N
     blocks[rows.OFFSET, :N] = offsets.T
     blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
     for place in (rows.X, rows.PX, rows.PX1, rows.PX2):
@@ -126,7 +129,9 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         code.switched,
         asks,
     )
-    kind = tables.Kind(sizes(L), sizes(N), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
+    # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
+    drives = W if user is None else N
+    kind = tables.Kind(sizes(L), sizes(drives), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
     modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < form < tables.USER else None
     count = tables.FEW if modelled is None and user is None else tables.ALL
@@ -137,30 +142,27 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             part = slice(first, min(first + PART, samples))
             table = _motion(trajectory, W, count, part)
             clock = tables.Clock(first, samples, trajectory.dt)
-            log = None if history is None else tables.plain(np.zeros((part.stop - first) * (6 + 3 * N)))
+            log = None if history is None else tuple(tables.plain(column[part].reshape(-1)) for column in history)
             try:
                 closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             work[:] = w
-            if log is not None and history is not None:
-                _keep(log, history, part, N)
+            if log is not None and history is not None and not compiled():
+                for column, values in zip(history, log, strict=True):
+                    column[part] = np.reshape(values, (-1, column.shape[1]))
             if not np.any(runs[rows.STATUS] == DONE):
                 break
+
+    if history is not None:
+        history[-1][history[-1] >= drives] -= drives - N
 
     def row(name: str) -> np.ndarray:
         index = getattr(rows, name)
         return blocks[index, :N] if name in ("COPPER", "WORK") else runs[index]
 
     return row
-
-
-def _keep(log, history: list[np.ndarray], part: slice, N: int) -> None:
-    """Take the samples of a part of a single run into the columns of its history."""
-    log = np.reshape(log, (part.stop - part.start, -1))
-    for column, values in zip(history, np.split(log, [4, 4 + N, 4 + 2 * N, 4 + 3 * N], axis=1), strict=True):
-        column[part] = values
 
 
 def _user(law: CompiledLaw | None, N: int):
