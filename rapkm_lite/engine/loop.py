@@ -148,7 +148,8 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled; an `else` would stay.
-    history, study : columns of a single run, or () for a study; one of them is None.  modelled : None for laws without a model; else the `extra` of the model.
+    history, study : the flat columns of a single run, or () for a study; the other one is None.
+    modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     clock : a long run is made in parts, whose state is in w; table and history hold those of one part.
     """

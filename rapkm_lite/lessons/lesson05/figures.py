@@ -117,7 +117,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(ax)
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", aspect="auto", title="enlarged, axes unequal")
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], aspect="auto", title="enlarged, axes unequal")
     axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
 
@@ -148,7 +148,7 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
     axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="wanted")
     axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
     axes[0].set(xlim=(-0.31, 0.31), ylim=(-0.31, 0.31), title=f"{run.t[k]:.2f} s")
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], ylabel="", title="enlarged")
+    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], title="enlarged")
     axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
     return axes
 
