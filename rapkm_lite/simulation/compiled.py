@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from typing import Any
 
 import numpy as np
@@ -20,8 +19,6 @@ __all__ = [
     "COMPILED", "DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled", "encode", "many",
     "single", "without_compiler",
 ]  # fmt: skip
-
-_made = weakref.WeakKeyDictionary()
 
 
 def encode(law: Any, model) -> Code | None:
@@ -179,10 +176,7 @@ def _user(law: CompiledLaw | None, N: int):
 
 def _made_for(value, width: int, make, count: int = 0):
     """The table of a machine or path, made once for a width and a count of blocks: values do not change."""
-    # An equal value shares the table; that it is equal is found out once, since a path has many numbers to compare.
-    made = value.__dict__.get("_tables")
-    if made is None:
-        made = value.__dict__["_tables"] = _made.setdefault(value, {})
+    made = value.__dict__.setdefault("_tables", {})
     if (width, count) not in made:
         made[width, count] = make(value, width)
     return made[width, count]

@@ -49,7 +49,7 @@ class Sensors(Value):
         N = whole_number("N", N, 1)
         if self.offset.shape not in ((), (N,)):
             raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or ({N},), one per drive")
-        return self.with_offset(np.broadcast_to(self.offset, (N,)))
+        return self if self.offset.ndim else self.with_offset(np.broadcast_to(self.offset, (N,)))
 
     def with_offset(self, offset) -> Sensors:
         """The same with other offsets."""
