@@ -14,10 +14,37 @@ from .decentralized import command_filter, force_filter, integral, proportional
 from .jit import kernel, leaf, outlined
 from .laws import computed_torque
 from .leaves import solve2
-from .pose import measured_pose, measured_rate, true_pose
+from .pose import find_pose
 from .rows import *
 from .tables import *
 from .user import fill
+
+
+@leaf
+def sense(lanes, arms, extra, study, history, table, o, w, dt):
+    """The machine at a sample, in the layout of a study or of a single run."""
+    far = 0
+    if study is not None:
+        far = plant.sense(lanes, arms, extra, table, o, w, dt)
+    if history is not None:
+        far = single.sense(arms, extra, table, o, w, dt)
+    if far > 0:
+        plant.mend(lanes, arms, table, o, w)
+
+
+@leaf
+def hold(lanes, arms, extra, study, history, w, dt):
+    """The machine until the next sample, in either layout."""
+    if study is not None:
+        plant.hold(lanes, arms, extra, w, dt)
+    if history is not None:
+        single.hold(arms, extra, w, dt)
+
+
+@leaf
+def real(faulty, sensor):
+    """Do the encoders show anything but the true angles and rates, shifted?"""
+    return len(faulty) > 0 or sensor.quantized or sensor.filtered
 
 
 @outlined
@@ -156,34 +183,23 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     dt = clock.dt
     lanes, drives, arms, faulty, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
-    real = len(faulty) > 0 or sensor.quantized or sensor.filtered
     rows = len(table) // columns
     for row in range(rows):
         k, o = clock.first + row, row * columns
 
         # Sense: the machine as it is, and what the hold will start from.
-        far = 0
-        if study is not None:
-            far = plant.sense(lanes, arms, extra, table, o, w, dt)
-        if history is not None:
-            far = single.sense(arms, extra, table, o, w, dt)
-        if far > 0:
-            plant.mend(lanes, arms, table, o, w)
+        sense(lanes, arms, extra, study, history, table, o, w, dt)
         if study is not None:
             add_work(lanes, arms, w)
             add_miss(lanes, arms, table, o, w)
 
         # Measure: ideal encoders have their errors from `sense`.
-        if real:
+        if real(faulty, sensor):
             read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k)
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         if law.posed:
-            if law.pose == MEASURED:
-                measured_pose(lanes, drives, arms, history, study, table, o, w, k, not sensor.quantized)
-                measured_rate(lanes, drives, arms, table, o, w)
-            else:
-                true_pose(lanes, drives, arms, law, w)
+            find_pose(lanes, drives, arms, history, study, sensor, law, table, o, w, k)
         if study is not None:
             if k + 1 == clock.samples:
                 return
@@ -203,10 +219,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
                 return
 
         # Hold.
-        if study is not None:
-            plant.hold(lanes, arms, extra, w, dt)
-        if history is not None:
-            single.hold(arms, extra, w, dt)
+        hold(lanes, arms, extra, study, history, w, dt)
         if plant.judge(lanes, arms, w, k) == len(lanes):
             return
 

@@ -96,19 +96,28 @@ def reference(lanes, drives, arms, law, table, o, w):
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
 
 
+@leaf
+def goals(lanes, drives, arms, table, o, w, j):
+    """Of the two coordinates of a law: their rows of F, errors, errors of the rates, and desired accelerations less
+    those at zero xdd."""
+    L, W = len(lanes), len(arms)
+    a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
+    a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
+    task = w[of(JOINT_J, j, W, L)] < 0.0
+    a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
+    e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
+    e1d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d
+    e2d = w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
+    v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
+    return a11, a12, a21, a22, e1, e2, e1d, e2d, v1, v2
+
+
 @outlined
 def minimal_feedback(lanes, drives, arms, law, table, o, w):
     """w and g of APD and CTC for two joints or, where JOINT_J is negative, the end-effector position."""
     L, W = len(lanes), len(arms)
     for j in range(L):
-        a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
-        a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
-        task = w[of(JOINT_J, j, W, L)] < 0.0
-        a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
-        e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
-        e1d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d
-        e2d = w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
-        v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
+        a11, a12, a21, a22, e1, e2, e1d, e2d, v1, v2 = goals(lanes, drives, arms, table, o, w, j)
         s1 = w[of(PAIR_P1, j, W, L)] * e1 + w[of(PAIR_D1, j, W, L)] * e1d
         s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
         force = law.form == APD

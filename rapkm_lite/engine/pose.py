@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .jit import outlined
+from .jit import leaf, outlined
 from .leaves import geometry, pose_terms, solve2
 from .rows import *
 from .single import fetch
@@ -213,3 +213,13 @@ def measured_rate(lanes, drives, arms, table, o, w):
             rate = w[at(ED, i, j, W, L)] + want(table, o, RATE, i, W)
             m11, m12, m22, fx, fy = m11 + a1 * a1, m12 + a1 * a2, m22 + a2 * a2, fx + a1 * rate, fy + a2 * rate
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve2(m11, m12, m22, fx, fy)
+
+
+@leaf
+def find_pose(lanes, drives, arms, history, study, sensor, law, table, o, w, k):
+    """Pose, its velocity, and A there, from the source that the law asks for."""
+    if law.pose == MEASURED:
+        measured_pose(lanes, drives, arms, history, study, table, o, w, k, not sensor.quantized)
+        measured_rate(lanes, drives, arms, table, o, w)
+    else:
+        true_pose(lanes, drives, arms, law, w)

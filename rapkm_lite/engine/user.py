@@ -66,6 +66,20 @@ def fill(drives, arms, law, t, table, o, w, buffer):
         fill_matrices(drives, arms, law, table, o, w, buffer[p + 6 * N :])
 
 
+@leaf
+def fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link):
+    """What arm i adds to the loop constraints: every arm is cut from the second one."""
+    for row in range(N - 1):
+        arm = row if row < 1 else row + 1
+        sign = 1.0 if arm == i else -1.0 if i == 1 else 0.0
+        if sign != 0.0:
+            J[2 * row, i], J[2 * row + 1, i] = -sign * (ay + dy), sign * (ax + dx)
+            J[2 * row, N + i], J[2 * row + 1, N + i] = -sign * dy, sign * dx
+            J_dot[2 * row, i] = -sign * (base * ax + link * dx)
+            J_dot[2 * row + 1, i] = -sign * (base * ay + link * dy)
+            J_dot[2 * row, N + i], J_dot[2 * row + 1, N + i] = -sign * link * dx, -sign * link * dy
+
+
 @outlined
 def fill_matrices(drives, arms, law, table, o, w, room):
     """All matrices of `rapkm_lite.at` at the desired, measured or true pose."""
@@ -133,16 +147,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         distal = w[m + W2 * W] * (gx * dy - gy * dx)
         drag = w[m + FRICTION * W] * smooth_sign(base * sharpness)
         Q_[i, 0], Q_[N + i, 0] = w[m + W1 * W] * (gx * ay - gy * ax) + distal + drag, distal
-        # Every arm is cut from the second one.
-        for row in range(N - 1):
-            arm = row if row < 1 else row + 1
-            sign = 1.0 if arm == i else -1.0 if i == 1 else 0.0
-            if sign != 0.0:
-                J[2 * row, i], J[2 * row + 1, i] = -sign * (ay + dy), sign * (ax + dx)
-                J[2 * row, N + i], J[2 * row + 1, N + i] = -sign * dy, sign * dx
-                J_dot[2 * row, i] = -sign * (base * ax + link * dx)
-                J_dot[2 * row + 1, i] = -sign * (base * ay + link * dy)
-                J_dot[2 * row, N + i], J_dot[2 * row + 1, N + i] = -sign * link * dx, -sign * link * dy
+        fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link)
     U, V, H, T = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(N):
         A[i, 0], A[i, 1] = F[i, 0], F[i, 1]

@@ -116,21 +116,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     work, blocks, runs = _work(setup, codes, offsets, W)
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)
-    form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
-    law = tables.Law(
-        form,
-        filtered,
-        filtered != tables.NO_FILTER or tables.PID < form < tables.USER or asks == tables.POSED,
-        tables.TRUE if code.true_pose else tables.MEASURED,
-        model.same_kinematics(robot),
-        code.switched,
-        asks,
-    )
+    law = _law(code, asks, model.same_kinematics(robot))
+    has_model = tables.PID < law.form < tables.USER
     # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
     drives = W if user is None else N
     kind = tables.Kind(sizes(L), sizes(drives), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
     study = () if history is None else None
-    modelled = sizes(int(tables.extra(model) is not None)) if tables.PID < form < tables.USER else None
+    modelled = sizes(int(tables.extra(model) is not None)) if has_model else None
     count = tables.FEW if modelled is None and user is None else tables.ALL
     sensor, faulty = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
@@ -146,9 +138,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             work[:] = w
-            if log is not None and history is not None and not compiled():
-                for column, values in zip(history, log, strict=True):
-                    column[part] = np.reshape(values, (-1, column.shape[1]))
+            if log is not None and not compiled():
+                _take(history, part, log)
             if not np.any(runs[rows.STATUS] == DONE):
                 break
 
@@ -160,6 +151,20 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         return blocks[index, :N] if name in ("COPPER", "WORK") else runs[index]
 
     return row
+
+
+def _take(history, part: slice, log) -> None:
+    """Lists that were filled without a compiler, into the columns of a history."""
+    for column, values in zip(history, log, strict=True):
+        column[part] = np.reshape(values, (-1, column.shape[1]))
+
+
+def _law(code: Code, asks: int, same: bool) -> tables.Law:
+    """What the kernel has to know of a law; `same` where its model has the kinematics of the machine."""
+    form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
+    posed = filtered != tables.NO_FILTER or tables.PID < form < tables.USER or asks == tables.POSED
+    pose = tables.TRUE if code.true_pose else tables.MEASURED
+    return tables.Law(form, filtered, posed, pose, same, code.switched, asks)
 
 
 def _user(law: CompiledLaw | None, N: int):
