@@ -300,9 +300,9 @@ def test_moving_a_slider_redraws_and_set_redraws_once():
 def test_continuous_update_only_when_compiled_or_asked_for():
     from rapkm_lite import engine
 
-    follows = engine.COMPILED and int(widgets.__version__.split(".")[0]) >= 8
-    assert light().controls["slope"].continuous_update is follows
-    assert made("machine").controls["x"].continuous_update is True
+    new = int(widgets.__version__.split(".")[0]) >= 8
+    assert light().controls["slope"].continuous_update is (engine.COMPILED and new)
+    assert made("machine").controls["x"].continuous_update is new
 
 
 def test_log_slider_has_a_step_at_its_value():
