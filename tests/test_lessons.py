@@ -55,6 +55,7 @@ def test_solved_lesson_passes_every_check_in_strict_mode(path, monkeypatch):
     from nbclient import NotebookClient
 
     monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
+    monkeypatch.setenv("MPLBACKEND", "agg")  # pictures are drawn when the lessons' own cells are tested
     notebook = nbformat.read(path, as_version=4)
     folder = {"metadata": {"path": str(NOTEBOOKS)}}
     NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder).execute()

@@ -62,7 +62,7 @@ def leaf(function):
 
 
 def index(function):
-    """A `leaf` of whole numbers, compiled once: Numba would compile it anew for each constant among its arguments."""
+    """A `leaf` compiled once: Numba would compile it anew for each whole number that is a constant among its arguments."""
     if not COMPILED:
         return function
     dispatcher = njit(forceinline=True, **_INNER)(function)

@@ -3,7 +3,7 @@ the feedback of (19)-(20)."""
 
 from __future__ import annotations
 
-from .jit import leaf, outlined
+from .jit import index, leaf, outlined
 from .leaves import solve2
 from .rows import *
 from .tables import *
@@ -43,7 +43,7 @@ def best_pair(lanes, drives, arms, w):
         w[of(JOINT_K, j, W, L)] = w[of(BEST_K, j, W, L)] if change else w[of(JOINT_K, j, W, L)]
 
 
-@leaf
+@index
 def joint(drives, arms, table, o, w, which, j, L):
     """Of the joint whose number stands in the run row `which`: its row of F, its acceleration at zero xdd, its errors,
     desired rate and acceleration."""

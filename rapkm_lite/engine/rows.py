@@ -7,7 +7,7 @@ that weigh and do nothing; L is the number of runs.  Both come as tuples, whose 
 
 from __future__ import annotations
 
-from .jit import index, leaf
+from .jit import index
 
 # The arms of the machine as in `tables.arm_table`; those of the controller's model follow from MODEL on.
 BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCALE = range(15)
@@ -132,7 +132,7 @@ def want(table, o, block, i, W):
     return table[o + 6 + block * W + i]
 
 
-@leaf
+@index
 def total(row, w, W):
     """Sum of a pair row of a single run; of four arms as a vector register adds fastest."""
     if W == 4:

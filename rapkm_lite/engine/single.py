@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from .jit import kernel, leaf, outlined
+from .jit import index, kernel, leaf, outlined
 from .leaves import drag, geometry, share, small_angle, solve2
 from .plant import MOST_STEPS, STIFF, judge, mend, stiffness
 from .rows import *
 from .tables import *
 
 
-@leaf
+@index
 def fetch(row, block, W, table, o, w):
     """Copy a block of the desired motion into a row; four numbers are read before they are written, as one vector."""
     if W == 4:
