@@ -7,7 +7,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import closure, equations, poses
+from rapkm_lite.mechanics.encoders import closure, poses
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
 NAMES = ("testbed", "four_arms")
@@ -72,7 +72,7 @@ def test_ranks(name, ranks):
     robot = MACHINES[name]
     q = rk.inverse_kinematics(robot, random_points(robot, 60, bend=0.3))
     for unknowns, rank in zip((1, 3, 5), ranks, strict=True):
-        rows = equations(robot, q, unknowns * robot.n_arms)
+        _, rows = closure(rk.at(robot, q), q[:, : robot.n_arms], unknowns * robot.n_arms)
         assert np.linalg.matrix_rank(rows, tol=1e-9) == rank
 
 
@@ -80,15 +80,15 @@ def test_equations_are_the_derivative_of_the_closure():
     robot = MACHINES["asymmetric"]
     N, angles = robot.n_arms, readings(robot, 5)
     angles = angles - OFFSET[:N]
-    q = poses(robot, angles)
-    rows = equations(robot, q, 5 * N)
+    _, rows = closure(rk.at(robot, poses(robot, angles)), angles, 5 * N)
     for k in range(5 * N):
         values = []
         for step in (1e-6, -1e-6):
             p = np.concatenate([np.zeros(N), robot.lengths.ravel(), robot.base.ravel()])
             p[k] += step
             changed = robot.replace(lengths=p[N : 3 * N].reshape(N, 2), base=p[3 * N :].reshape(N, 2))
-            values.append(closure(changed, poses(changed, angles - p[:N]), angles - p[:N]).ravel())
+            moved = angles - p[:N]
+            values.append(closure(rk.at(changed, poses(changed, moved)), moved, 0)[0])
         assert_allclose((values[0] - values[1]) / 2e-6, rows[:, k], rtol=0, atol=1e-7)
 
 

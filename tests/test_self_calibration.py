@@ -8,7 +8,7 @@ from samples import FRICTIONLESS, TESTBED
 import rapkm_lite as rk
 from rapkm_lite.lessons.lesson08 import tasks
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import equations
+from rapkm_lite.mechanics.encoders import closure
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 PD = rk.PD(7.05, 0.225)
@@ -138,7 +138,7 @@ def test_wrong_lengths_hide_in_the_offsets(radius, left):
         wrong = TESTBED.lengths * rng.uniform(-1e-3, 1e-3, (3, 2))
         q_a = rk.inverse_kinematics(TESTBED.replace(lengths=TESTBED.lengths + wrong), x)[:, :3] + OFFSET
         found = rk.calibrate(TESTBED, q_a)
-        rows = equations(TESTBED, rk.inverse_kinematics(TESTBED, x), 9)
+        _, rows = closure(rk.at(TESTBED, rk.inverse_kinematics(TESTBED, x)), q_a, 9)
         first = np.linalg.lstsq(rows[:, :3], rows[:, 3:] @ wrong.ravel(), rcond=None)[0]
         assert_allclose(found.offset - OFFSET, first, rtol=0, atol=0.02 * np.abs(first).max())
         bias.append(np.sqrt(np.mean((found.offset - OFFSET) ** 2)))

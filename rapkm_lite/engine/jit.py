@@ -62,7 +62,7 @@ def leaf(function):
 
 
 def index(function):
-    """A `leaf` compiled once: Numba would compile it anew for each whole number that is a constant among its arguments."""
+    """A `leaf` compiled once: for each whole number among its arguments that is a constant, Numba would do it anew."""
     if not COMPILED:
         return function
     dispatcher = njit(forceinline=True, **_INNER)(function)

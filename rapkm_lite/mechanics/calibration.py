@@ -19,7 +19,7 @@ from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Array, Value
 from .at import at
-from .encoders import changed, closure, equations, gauge, poses, rounding, unknown_names
+from .encoders import changed, closure, gauge, poses, rounding, unknown_names
 from .rests import Rests, fitted_gain, one_sided, rests
 
 UNKNOWNS = ("offsets", "offsets+lengths", "all")
@@ -178,7 +178,7 @@ def _angles_of_torques(
     angles = stand.desired - stand.c / K_P
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
-    felt, seen = (np.abs(closure(robot, poses(robot, a), a)).max() for a in (angles, stand.q_a))
+    felt, seen = (np.abs(closure(at(robot, poses(robot, a)), a, 0)[0]).max() for a in (angles, stand.q_a))
     if felt < 0.1 * seen and seen > 5 * spread:
         notes.append(
             f"the torques are mute: the angles contradict each other by {1e3 * seen:.3g} mrad, the torques by "
@@ -198,10 +198,10 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         basis = np.block([[basis[:, : 3 * N], np.vstack([np.zeros((3 * N, 2 * N - 4)), robot.lengths.max() * free])]])
     p, machine, guess = nominal[:count], robot, None
     for _ in range(50):
-        q = poses(machine, angles - p[:N], guess)
-        guess = at(machine, q).x
-        left = closure(machine, q, angles - p[:N]).ravel() / math.sqrt(len(angles))
-        rows = equations(machine, q, count) @ basis / math.sqrt(len(angles))
+        pose = at(machine, poses(machine, angles - p[:N], guess))
+        guess = pose.x
+        left, rows = (part / math.sqrt(len(angles)) for part in closure(pose, angles - p[:N], count))
+        rows = rows @ basis
         U, sigma, Vt = np.linalg.svd(rows, full_matrices=False)
         explained = U.T @ left
         # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.

@@ -13,9 +13,8 @@ import numpy as np
 from ..machine.arguments import ConvergenceError
 from ..machine.manipulator import Manipulator
 from . import cores
-from .actuation import control_matrix
 from .antagonism import null_basis
-from .at import at
+from .at import At
 from .closure import estimate_pose
 from .kinematics import cross, unit_vector
 
@@ -79,30 +78,24 @@ def _crossings(robot: Manipulator, angles: np.ndarray) -> np.ndarray:
     return both[best, np.arange(len(best))]
 
 
-def closure(robot: Manipulator, q: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """n^T (angles - q_a) at the poses q, (k, N - 2) rad."""
-    n = null_basis(control_matrix(robot, q))
-    return np.einsum("kij,ki->kj", n, cores.wrap(angles - q[:, : robot.n_arms]))
-
-
-def equations(robot: Manipulator, q: np.ndarray, count: int) -> np.ndarray:
-    """d closure / d unknowns at the poses q, (k (N - 2), count).
+def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """n^T (angles - q_a) at the poses, (k (N - 2),) rad, and its derivative by the first unknowns, (k (N - 2), count).
 
     At a fixed end-effector d . db + (a . d / l1) dl1 + l2 dl2 + (a x d) dq_a = 0 for each arm.
     """
-    N = robot.n_arms
-    pose = at(robot, q)
-    d, l2 = pose.d, robot.lengths[:, 1]
-    columns = np.zeros((len(q), N, 5 * N))
+    robot, d = pose.robot, pose.d
+    N, l1, l2 = robot.n_arms, *robot.lengths.T
+    columns = np.zeros((len(d), N, 5 * N))
     i = np.arange(N)
     lever = cross(pose.a, d)
     columns[:, i, i] = 1.0
-    columns[:, i, N + 2 * i] = -np.einsum("kij,kij->ki", pose.a, d) / robot.lengths[:, 0] / lever
+    columns[:, i, N + 2 * i] = -np.einsum("kij,kij->ki", pose.a, d) / l1 / lever
     columns[:, i, N + 2 * i + 1] = -l2 / lever
     for axis in (0, 1):
         columns[:, i, 3 * N + 2 * i + axis] = -d[..., axis] / lever
     n = null_basis(pose.A)
-    return -(n.mT @ columns[..., :count]).reshape(-1, count)
+    left = np.einsum("kij,ki->kj", n, cores.wrap(angles - pose.q[:, :N])).ravel()
+    return left, -(n.mT @ columns[..., :count]).reshape(len(left), count)
 
 
 def gauge(robot: Manipulator) -> np.ndarray:
