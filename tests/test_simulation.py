@@ -91,21 +91,6 @@ def test_a_run_of_few_holds_has_their_mean(samples):
     np.testing.assert_allclose(root_mean_square_torque(run), np.sqrt(square), rtol=1e-12)
 
 
-def test_a_study_is_its_runs():
-    """Every column by its definition, from the samples of single runs."""
-    path, offsets = rk.circle(ROBOT, 0.05, 0.2), np.array([[4e-3, -2e-3, 5e-3], [0.0, 3e-3, -1e-3], [1e-3, 1e-3, 1e-3]])
-    for law in (PD, rk.AntagonismFilter(PD)):
-        study = rk.sweep(ROBOT, law, path, offsets)
-        assert not study.failed.any() and study.failure_time.mask.all()
-        for i, offset in enumerate(offsets):
-            run = rk.simulate(ROBOT, law, path, offset)
-            np.testing.assert_allclose(study.energies[i], run.energy, rtol=1e-9, atol=1e-12)
-            mean = np.mean(np.sum(run.c[:-1] ** 2, axis=-1))
-            np.testing.assert_allclose(study.torque_norm[i], np.sqrt(mean), rtol=1e-9)
-            np.testing.assert_allclose(study.antagonistic_energy[i], rk.antagonistic_energy(run), rtol=1e-7, atol=1e-12)
-            np.testing.assert_allclose(study.x_final[i], run.x[-1], rtol=0, atol=1e-12)
-
-
 def test_quantized_angles_and_filtered_rates():
     seen = []
 

@@ -34,6 +34,7 @@ LAWS = [
 def test_rows_are_single_runs(law, sensors):
     robot = ROBOT.replace(friction=4.2e-3, gravity=(0.0, -0.5))
     study = rk.sweep(robot, law, PATH, OFFSETS[:5], **sensors)
+    assert not study.failed.any() and study.failure_time.mask.all()
     for i in range(5):
         run = rk.simulate(robot, law, PATH, OFFSETS[i], **sensors)
         np.testing.assert_allclose(study.energies[i], run.energy, rtol=0, atol=1e-11)
