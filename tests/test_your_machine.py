@@ -1,5 +1,7 @@
 """The 4RRR machine of lesson 12: its matrices against MuJoCo and SymPy, and what the lesson says about it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -16,7 +18,11 @@ from rapkm_lite.machine.arguments import matvec  # noqa: E402
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
 DRIVEN = np.r_[np.ones(4), np.zeros(5)]
 DEGREES = np.r_[np.ones(8), np.degrees(1.0)]
-MACHINE = four_rrr.four_rrr()
+
+
+@cache
+def machine():
+    return four_rrr.four_rrr()
 
 
 def poses(k, box=(0.15, 0.15, 0.3), seed=5):
@@ -24,7 +30,7 @@ def poses(k, box=(0.15, 0.15, 0.3), seed=5):
 
 
 def A_tilde(pose):
-    return rk.projector(MACHINE.J(four_rrr.angles(pose)))[..., :4, :]
+    return rk.projector(machine().J(four_rrr.angles(pose)))[..., :4, :]
 
 
 # The matrices.
@@ -32,9 +38,9 @@ def test_derived_matrices_obey_mechanics():
     """J is dh/dq; dJ/dt and dG/dt by differences; dG/dt - 2 C is skew, as Christoffel symbols make it."""
     rng = np.random.default_rng(2)
     q, qd, step = rng.uniform(-3, 3, (50, 9)), rng.normal(size=(50, 9)), 1e-6
-    J, J_dot, G, C, Q = MACHINE.terms(q, qd)
-    after, before = (MACHINE.terms(q + s * step * qd, qd) for s in (1, -1))
-    assert_allclose(matvec(J, qd), (MACHINE.h(q + step * qd) - MACHINE.h(q - step * qd)) / (2 * step), atol=1e-8)
+    J, J_dot, G, C, Q = machine().terms(q, qd)
+    after, before = (machine().terms(q + s * step * qd, qd) for s in (1, -1))
+    assert_allclose(matvec(J, qd), (machine().h(q + step * qd) - machine().h(q - step * qd)) / (2 * step), atol=1e-8)
     assert_allclose(J_dot, (after[0] - before[0]) / (2 * step), atol=1e-8)
     S = (after[2] - before[2]) / (2 * step) - 2 * C
     assert_allclose(S + S.mT, 0, atol=1e-8)
@@ -96,7 +102,7 @@ def test_matrices_agree_with_mujoco():
     order = [model.joint(name).dofadr[0] for name in names]
     q = four_rrr.angles(poses(20))
     qd = np.random.default_rng(4).normal(size=(20, 9))
-    J, _, G, C, _ = MACHINE.terms(q, qd)
+    J, _, G, C, _ = machine().terms(q, qd)
     for k in range(20):
         state.qpos[order], state.qvel[order] = q[k], qd[k]
         mujoco.mj_forward(model, state)
@@ -117,7 +123,7 @@ def test_matrices_agree_with_mujoco():
 def test_poses_and_angles_are_inverse_and_closed():
     at = poses(200)
     q = four_rrr.angles(at)
-    assert np.abs(MACHINE.h(q)).max() < 1e-14
+    assert np.abs(machine().h(q)).max() < 1e-14
     assert_allclose(four_rrr.poses(q), at, atol=1e-14)
     assert_allclose(four_rrr.legs(q)[:, :, 2], four_rrr.corners(at), atol=1e-14)
     with pytest.raises(ValueError, match="leg 1"):
@@ -126,7 +132,7 @@ def test_poses_and_angles_are_inverse_and_closed():
 
 def test_the_motion_is_consistent():
     motion = four_rrr.swing(dt=1e-3)
-    J, J_dot, *_ = MACHINE.terms(motion.q, motion.qd)
+    J, J_dot, *_ = machine().terms(motion.q, motion.qd)
     assert np.abs(matvec(J, motion.qd)).max() < 1e-12
     assert np.abs(matvec(J, motion.qdd) + matvec(J_dot, motion.qd)).max() < 1e-11
     # Differences of second order: dt^2 / 6 times the third derivative.
@@ -138,21 +144,21 @@ def test_the_motion_is_consistent():
 def test_accelerations_keep_the_loops_and_the_energy():
     """Without torques the kinetic energy of a run stays, to the fourth order of the step."""
     q = four_rrr.angles(np.array([[0.05, 0.02, 0.1]]))
-    F = rk.complement(MACHINE.J(q), (0, 1, 2))
+    F = rk.complement(machine().J(q), (0, 1, 2))
     qd = matvec(F, np.array([0.5, -0.3, 0.4]))
-    energy = lambda q, qd: float(np.squeeze(qd[:, None] @ MACHINE.terms(q, qd)[2] @ qd[..., None]))  # noqa: E731
+    energy = lambda q, qd: float(np.squeeze(qd[:, None] @ machine().terms(q, qd)[2] @ qd[..., None]))  # noqa: E731
     start = energy(q, qd)
     for _ in range(50):
-        q, qd = runs._hold(MACHINE, q, qd, np.zeros((1, 4)), 1e-3)
-    assert abs(energy(q, qd) / start - 1) < 1e-9 and np.abs(MACHINE.h(q)).max() < 1e-10
-    J, J_dot, *_ = MACHINE.terms(q, qd)
-    assert np.abs(matvec(J, accelerations(MACHINE, q, qd, np.ones((1, 4)))) + matvec(J_dot, qd)).max() < 1e-11
+        q, qd = runs._hold(machine(), q, qd, np.zeros((1, 4)), 1e-3)
+    assert abs(energy(q, qd) / start - 1) < 1e-9 and np.abs(machine().h(q)).max() < 1e-10
+    J, J_dot, *_ = machine().terms(q, qd)
+    assert np.abs(matvec(J, accelerations(machine(), q, qd, np.ones((1, 4)))) + matvec(J_dot, qd)).max() < 1e-11
 
 
 # What the lesson predicts.
 def test_null_vector_and_fight_in_the_centre():
     """By symmetry: a quarter turn maps the machine onto itself, so the null vector is an eigenvector of the shift."""
-    J = MACHINE.J(four_rrr.angles([0.0, 0.0, 0.0]))
+    J = machine().J(four_rrr.angles([0.0, 0.0, 0.0]))
     n = rk.null_basis(rk.complement(J, (0, 1, 2))[:4])[:, 0]
     assert_allclose(n * np.sign(n[0]), np.array([1, -1, 1, -1]) / 2, atol=1e-15)
     c = tasks.fight(J, 4, 40.0, OFFSET)
@@ -161,13 +167,13 @@ def test_null_vector_and_fight_in_the_centre():
 
 def test_the_fight_is_what_stays_at_rest():
     """A step towards rest leaves no force: A~^T c = 0, and the error solves A~^T K_P (e + offset) = 0 in (13)."""
-    J = MACHINE.J(four_rrr.angles([0.05, 0.03, 0.1]))
+    J = machine().J(four_rrr.angles([0.05, 0.03, 0.1]))
     A = rk.complement(J, (0, 1, 2))[:4]
     assert_allclose(tasks.fight(J, 4, 40.0, OFFSET), rk.steady_state_torque(A, 40.0, OFFSET), atol=1e-14)
 
 
 def test_filter_leaves_rounding_only():
-    J = MACHINE.J(four_rrr.angles(poses(300)))
+    J = machine().J(four_rrr.angles(poses(300)))
     A = rk.complement(J, (0, 1, 2))[:, :4]
     c = np.random.default_rng(1).normal(size=(300, 4))
     left = matvec(rk.prestress_projector(A), matvec(rk.antagonism_filter(A), c))
@@ -203,7 +209,7 @@ def test_apex_where_all_distal_lines_meet():
 def test_no_singularity_up_to_045_and_one_in_the_other_mode():
     sigma = np.linalg.svd(A_tilde(poses(5000, (0.14, 0.14, 0.45))), compute_uv=False)
     assert sigma[:, 2].min() > 0.02
-    mixed = MACHINE.J(four_rrr.angles([0.0, 0.0, 0.0], mode=(1, -1, 1, -1)))
+    mixed = machine().J(four_rrr.angles([0.0, 0.0, 0.0], mode=(1, -1, 1, -1)))
     assert np.linalg.svd(rk.projector(mixed)[:4])[1][2] < 1e-12
 
 
@@ -212,7 +218,7 @@ def test_default_cut_off_blows_up_and_the_rank_does_not():
 
     How often that is, 60 % of the poses in the reference, is a matter of the libraries; that it happens is enough.
     """
-    J = MACHINE.J(four_rrr.angles(poses(2000)))
+    J = machine().J(four_rrr.angles(poses(2000)))
     printed = (np.eye(9) - np.linalg.pinv(J) @ J)[:, :4]
     wild = np.abs(np.linalg.pinv(printed.mT)).max(axis=(1, 2)) > 1e6
     sigma = np.linalg.svd(printed.mT, full_matrices=False)[1]
@@ -235,7 +241,7 @@ def test_a_condition_number_needs_a_length():
 
 def feedback(q, v, scale, line=1):
     """(32) for v, all of it in a colleague's units q' = scale q; drives in ours, so the torques compare."""
-    J, _, G, _, _ = MACHINE.terms(q, 0 * q)
+    J, _, G, _, _ = machine().terms(q, 0 * q)
     G = G / scale[:, None] / scale
     N = rk.projector(J / scale)
     pinv = rk.explicit_pseudoinverse(N[:4], rk.select_independent(N[:4], delta=3))
@@ -246,7 +252,7 @@ def test_feedback_feels_the_units_and_feed_forward_does_not():
     motion = four_rrr.swing(dt=4e-3)
     change = []
     for q, qd, qdd in zip(motion.q[::20], motion.qd[::20], motion.qdd[::20], strict=True):
-        J, J_dot, G, _, _ = MACHINE.terms(q, qd)
+        J, J_dot, G, _, _ = machine().terms(q, qd)
         N = rk.projector(J)
         tangent, error = qdd - rk.projector_dot(J, J_dot) @ qd, np.r_[OFFSET, np.zeros(5)]
         for v, line in ((tangent, 1), (error, 1), (error, 2)):
@@ -265,7 +271,7 @@ def test_feedback_feels_the_units_and_feed_forward_does_not():
 
 
 def test_effective_gains_of_29_along_the_circle():
-    F = rk.complement(MACHINE.J(four_rrr.swing(dt=2e-3).q), (0, 1, 2))
+    F = rk.complement(machine().J(four_rrr.swing(dt=2e-3).q), (0, 1, 2))
     lowest = np.linalg.eigvals(rk.effective_gain(F, np.diag(DRIVEN))).real.min(axis=-1)
     assert lowest.min() == pytest.approx(0.032, abs=5e-4) and lowest.max() == pytest.approx(0.178, abs=6e-4)
 
@@ -275,13 +281,13 @@ def pd(z):
 
 
 def filtered(z):
-    return rk.antagonism_filter(rk.complement(MACHINE.J(z.fit), (0, 1, 2))[:4]) @ pd(z)
+    return rk.antagonism_filter(rk.complement(machine().J(z.fit), (0, 1, 2))[:4]) @ pd(z)
 
 
 def redundant_ctc(gains, read):
     def law(z):
         q = read(z)
-        J, J_dot, G, C, _ = MACHINE.terms(q, z.qd)
+        J, J_dot, G, C, _ = machine().terms(q, z.qd)
         N = rk.projector(J)
         G, C, _ = rk.redundant_terms(N, rk.projector_dot(J, J_dot), G, C, np.zeros(9))
         v = z.qdd_d - 40 * gains * (z.qd - z.qd_d) - 400 * gains * (q - z.q_d)
@@ -296,8 +302,8 @@ def test_a_circle_with_a_swing():
     motion = four_rrr.swing(dt=2e-3)
     read = (lambda z: z.q), (lambda z: z.fit)
     laws = [pd, filtered, redundant_ctc(DRIVEN, read[0]), redundant_ctc(np.ones(9), read[0])]
-    q, c = runs.run(MACHINE, [*laws, redundant_ctc(np.ones(9), read[1])], motion, OFFSET)
-    assert np.abs(MACHINE.h(q)).max() < 1e-9
+    q, c = runs.run(machine(), [*laws, redundant_ctc(np.ones(9), read[1])], motion, OFFSET)
+    assert np.abs(machine().h(q)).max() < 1e-9
     off = np.linalg.norm((four_rrr.poses(q) - motion.pose)[..., :2], axis=-1)
     energy = runs.electric_energy(q, c, 2e-3, four_rrr.RESISTANCE, four_rrr.TORQUE_CONSTANT)
     error = 1e3 * np.sqrt(np.mean(off**2, axis=1))
@@ -305,7 +311,7 @@ def test_a_circle_with_a_swing():
     assert_allclose(energy[:4], [35.2, 16.6, 15.3, 15.2], atol=0.06)
     # Encoders at the drives only: what all gains then see is the same four offsets.
     assert 0.3 < error[4] < 0.45
-    A = rk.complement(MACHINE.J(q[0]), (0, 1, 2))[:, :4]
+    A = rk.complement(machine().J(q[0]), (0, 1, 2))[:, :4]
     pressed = matvec(rk.prestress_projector(A), c[0])
     saved = 60 * np.sum(pressed[:-1] ** 2) * 2e-3
     assert energy[0] - energy[1] == pytest.approx(saved, rel=5e-3)
