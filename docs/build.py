@@ -102,10 +102,14 @@ def prepare(notebooks: Path, repository: str) -> None:
     write(WORK / "lessons/solutions/index.md", SOLUTIONS.format(pages="\n".join(solved)))
     write(WORK / "lessons/equations.md", lessons.index_page(index, reference.page_of()))
     write(WORK / "lessons/errata.md", lessons.linked((notebooks / "errata.md").read_text(encoding="utf-8")))
+    # In the repository a README, on the site the first page for teachers, in a folder beside the teaching pages.
+    instructor = (notebooks / "README.md").read_text(encoding="utf-8").replace("](../docs/teaching/", "](../teaching/")
+    write(WORK / "lessons/instructor.md", lessons.linked(instructor))
     reference.write(WORK / "reference")
     develop = pages(HERE, "develop")
     teaching = pages(HERE / "teaching", "teaching") if (HERE / "teaching").is_dir() else []
-    plan = "\n```{toctree}\n:caption: Teach\n:maxdepth: 1\n\n" + "\n".join(teaching) + "\n```\n" if teaching else ""
+    taught = "\n".join(["lessons/instructor", *teaching])
+    plan = f"\n```{{toctree}}\n:caption: Teach\n:maxdepth: 1\n\n{taught}\n```\n"
     listed = "\n".join(f"lessons/{name}" for name in names)
     write(
         WORK / "contents.md",

@@ -359,6 +359,55 @@ def test_code_brings_the_setting_back(name):
     assert eval(explorer.code, {"explore": explore}).values == explorer.values
 
 
+def test_code_names_the_machine_that_was_given():
+    robot = rk.load("four_arms")
+    explorer = explore.machine(robot).set(x=10)
+    assert explorer.code == "explore.machine(robot).set(x=10)"
+    assert eval(explorer.code, {"explore": explore, "robot": robot}).values == explorer.values
+    assert light().set(slope=0.5).code == "explorer.set(slope=0.5)"
+
+
+def test_reset_goes_back_to_what_was_shown_first(capsys):
+    explorer = light().set(slope=0.5)
+    explorer._ipython_display_()
+    explorer.set(slope=1.5).reset()
+    assert explorer.values["slope"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("mark", "words"),
+    [
+        (lambda p: p.line("a", [0, 1], [0, 1], color="nocolour"), "nocolour"),
+        (lambda p: p.text("a", 0, 0, "here", va="middle"), "va = 'middle'"),
+        (lambda p: p.line("a", [0, 1], [0, 1], color=[1, 0, 0]), "color"),
+        (lambda p: p.polygon("a", [0.0, 1.0, 2.0]), "shape \\(3,\\)"),
+    ],
+)
+def test_a_style_that_cannot_be_drawn_is_refused_where_it_is_written(mark, words):
+    picture = explore.Picture({"a": {}})
+    with pytest.raises(ValueError, match=words):
+        mark(picture)
+    assert not picture.marks
+
+
+def test_a_message_that_failed_was_told_to_nobody():
+    picture, known = explore.Picture({"a": {}}), {}
+    picture.line("a", [0, 1], [0, 1], color="#123456")
+    broken = [*picture.marks, picture.marks[0]._replace(style={"color": "nocolour"})]
+    with pytest.raises(ValueError):
+        encode(picture, broken, known)
+    header, _ = encode(picture, picture.marks, known)
+    assert [style["color"] for style in header["styles"].values()] == ["#123456"]
+
+
+def test_a_handle_moves_controls_only():
+    def draw(picture, slope):
+        picture.handle("a", 0.5, slope, slop=(0, 1))
+
+    with pytest.raises(KeyError, match="'slop', which is no control; allowed: slope"):
+        explore.explorer(draw, {"slope": explore.slider("slope in m", 0, 2, 0.1, 1)}, {"a": {}})
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_handles_move_their_controls(name):
     explorer = made(name)

@@ -343,8 +343,8 @@ mount($("stage"), {
   labels: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, c.words])),
   panels: {
     machine: { title: "Take the end-effector", aspect: "equal", xticks: [], yticks: [], xlabel: "mm; grey: all forces of drives with at most 40 mN m" },
-    offset: { title: "Encoder errors, mrad", xticks: [] },
-    torque: { xticks: [] },
+    offset: { title: "Encoder errors, mrad", xticks: [1, 2, 3] },
+    torque: { xticks: [1, 2, 3] },
     forces: { title: "Forces in a chain, mN", aspect: "equal" },
     energy: { title: "Energy of a lap, J", xticks: [] },
     run: { title: "Torques along the path, mN m", xlabel: "time in s" },

@@ -134,6 +134,17 @@ def moved(widget, steps: int):
     return snap(widget, widget.value + way if base is None else widget.value * base**way)
 
 
+def moving(handles: list[dict], controls: dict) -> None:
+    """Refuse a handle that moves what is no control."""
+    for name in {name for handle in handles for name in handle["set"]} - set(controls):
+        raise KeyError(f"a handle moves {name!r}, which is no control; allowed: {', '.join(controls)}")
+
+
+def ranges(controls: dict) -> dict:
+    """The least and the largest value of each slider."""
+    return {name: _ends(widget) for name, widget in controls.items() if hasattr(widget, "min")}
+
+
 def _ends(widget) -> tuple[float, float]:
     if isinstance(widget, widgets.FloatLogSlider):
         return widget.base**widget.min, widget.base**widget.max

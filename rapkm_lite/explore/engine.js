@@ -3,7 +3,6 @@
 // The same algebra as rapkm_lite/engine, which tests/test_engine_js.py holds it to: with v the velocity of the
 // end-effector, an arm with link vectors a, d has the rates b.v and -l.v of its links, b = d / (a x d) and
 // l = a / (a x d), so that b is its row of A.  SI units; an offset is measured minus true angle.
-
 const each = (value, i) => (Array.isArray(value) ? value[i] : value);
 const zeros = (count) => new Float64Array(count);
 const smoothSign = (z) => (z > 20 ? 1 : z < -20 ? -1 : Math.tanh(z)); // beyond 20 the same to the last bit

@@ -17,7 +17,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, check, moved, parts, player, snap, tidied
+from .controls import Shown, check, moved, moving, parts, player, ranges, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -82,7 +82,7 @@ class Explorer:
     """Controls, picture and numbers; shown by ``display(explorer)``, as a plain picture where no kernel runs.
 
     controls : name -> widget.  picture : the `Picture`.  numbers : name -> text of the last step.
-    problem : the sentence shown instead of a result, or "".
+    problem : the sentence shown instead of a result, or "".  made : the call that makes it, in `code`.
     """
 
     def __init__(self, draw, controls: dict, picture: Picture, play: str | None, live: bool, about: str = ""):
@@ -90,16 +90,15 @@ class Explorer:
         of_kind("picture", picture, Picture, "a Picture")
         self.draw, self.controls, self.picture = draw, dict(controls), picture
         self.numbers: dict[str, str] = {}
-        self.problem = ""
         # The draw function of a ready-made explorer is local to the function that bears its name.
         self.name = draw.__qualname__.split(".")[0]
         maker = getattr(sys.modules[draw.__module__], self.name, draw)
         self.about = about or (inspect.getdoc(draw) or inspect.getdoc(maker) or "").split("\n")[0]
-        self._defaults = self.values
+        self._defaults = self._first = self.values
+        self.made, self.problem, self._told = "explorer", "", {}
         self._held, self._watched, self._slow = False, False, 0
-        self._told: dict = {}
-        labels = {name: widget.description for name, widget in controls.items()}
-        self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, "labels": labels})
+        named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
+        self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, **named})
         self.canvas.on_msg(lambda _, content, buffers: self._message(content))
         cells = []
         for name, widget in self.controls.items():
@@ -124,9 +123,8 @@ class Explorer:
     @property
     def code(self) -> str:
         """The line of Python that makes this explorer with this setting."""
-        made = f"explore.{self.name}()" if self.draw.__module__.startswith(__package__) else "explorer"
         changed = [f"{k}={v!r}" for k, v in self.values.items() if v != self._defaults[k]]
-        return f"{made}.set({', '.join(changed)})"
+        return f"{self.made}.set({', '.join(changed)})"
 
     @property
     def sentence(self) -> str:
@@ -169,8 +167,8 @@ class Explorer:
         return self
 
     def reset(self) -> None:
-        """Back to the first setting."""
-        self.set(**self._defaults)
+        """Back to the first setting, as it was shown first."""
+        self.set(**self._first)
 
     def update(self) -> None:
         """Draw the present setting; a setting that cannot be computed is explained in the picture."""
@@ -181,6 +179,7 @@ class Explorer:
             self.numbers = self.draw(self.picture, **self.values) or {}
         except (ValueError, SimulationError, ConvergenceError) as error:
             self.problem, self.numbers = f"No result for this setting: {error}", {}
+        moving(self.picture.handles, self.controls)
         # One slow step may be a cache that fills; from the second in a row on sliders wait for their release.
         self._slow = self._slow + 1 if time.perf_counter() - start > PATIENCE else 0
         if self._slow == 2:
@@ -272,6 +271,7 @@ class Explorer:
         """Two outputs: the stored picture, and the widget, which hides it as soon as a kernel has answered."""
         from IPython.display import display
 
+        self._first = self._first if self._watched else self.values
         display(self.stored(), raw=True)
         display(self.widget)
 

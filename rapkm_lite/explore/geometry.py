@@ -19,7 +19,7 @@ from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders
+from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders, ready_made
 
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
 WEAK = 1.5
@@ -31,6 +31,7 @@ MAP = marks.Palette(
 )
 
 
+@ready_made
 def machine(robot: Manipulator | None = None) -> Explorer:
     """The end-effector by hand in every working mode, a map of sigma_min, and the five-bar of each pair."""
     robot = frictionless(robot)
@@ -92,6 +93,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.4), setup=scale, live=True)
 
 
+@ready_made
 def actuation(robot: Manipulator | None = None) -> Explorer:
     """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce."""
     robot = frictionless(robot)
@@ -162,6 +164,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, widths=[1, 1.35], size=(9.2, 6.6), setup=space, live=True)
 
 
+@ready_made
 def prestress(robot: Manipulator | None = None) -> Explorer:
     """Prestress along the path: torques with and without it, and the changes of sign that let backlash act."""
     robot = frictionless(robot)

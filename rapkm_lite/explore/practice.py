@@ -21,7 +21,7 @@ from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import distance_panels, draw_distance, frictionless, over_time
+from .shared import distance_panels, draw_distance, frictionless, over_time, ready_made
 
 FAULTS = {
     "nothing": [],
@@ -32,6 +32,7 @@ FAULTS = {
 OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, kg/m
 
 
+@ready_made
 def imperfections(robot: Manipulator | None = None) -> Explorer:
     """Distance from the path and torques that act, with links too long, weak drives and one fault."""
     robot = load() if robot is None else robot
@@ -65,6 +66,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, distance_panels(robot, 2.5, "torque that acts in mN m"), size=(9.2, 3.8))
 
 
+@ready_made
 def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders."""
     robot = frictionless(robot)
@@ -103,6 +105,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, distance_panels(robot, 2.5), size=(9.2, 3.8))
 
 
+@ready_made
 def own_machine(robot: Manipulator | None = None) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those that offsets only press."""
     robot = frictionless(robot)

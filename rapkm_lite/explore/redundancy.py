@@ -19,7 +19,7 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders
+from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders, ready_made
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -29,6 +29,7 @@ RULES = {
 }
 
 
+@ready_made
 def allocation(robot: Manipulator | None = None) -> Explorer:
     """The torques that make one force: of least size (pale bars) and by the chosen rule; dots: the limits."""
     robot = frictionless(robot)
@@ -68,6 +69,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, size=(10.4, 3.8), setup=space)
 
 
+@ready_made
 def calibration(robot: Manipulator | None = None) -> Explorer:
     """Places on a circle, what each drive contributes to the equation there, and the error of the offsets found."""
     robot = frictionless(robot)

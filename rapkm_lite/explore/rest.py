@@ -19,9 +19,10 @@ from ..simulation.energy import antagonism_form
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, held_machine, over_time, place_sliders
+from .shared import curves, frictionless, held_machine, over_time, place_sliders, ready_made
 
 
+@ready_made
 def steady_state(robot: Manipulator | None = None) -> Explorer:
     """Offsets and gains of each drive: the error at rest of theory (14) beside a simulation that settles there."""
     robot = frictionless(robot)
@@ -72,6 +73,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
 
 
+@ready_made
 def three_opinions(robot: Manipulator | None = None) -> Explorer:
     """Where each drive wants the end-effector: drag a line, the triangle of disagreement closes, the torques vanish."""
     robot = frictionless(robot)
@@ -130,6 +132,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
 LEVELS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 
 
+@ready_made
 def landscape(robot: Manipulator | None = None) -> Explorer:
     """Level lines of the antagonistic energy over two offsets, and the share of each principal direction."""
     robot = frictionless(robot)
@@ -175,6 +178,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
                 component = directions[i, k] * np.sign(directions[:, k].sum() or 1)
                 picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
+                va = "bottom" if component >= 0 else "top"
+                picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")
         return {
             "antagonistic energy": f"{dq @ S @ dq:.2f} J",
@@ -189,7 +194,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     panels = {
         "map": {"xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
         "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
-        "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.05, 1.05), "legend": arms, **ticks},
+        "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.2, 1.2), "legend": arms, **ticks},
     }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {

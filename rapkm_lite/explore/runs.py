@@ -19,11 +19,12 @@ from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, over_time
+from .shared import curves, frictionless, over_time, ready_made
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
 
+@ready_made
 def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1."""
     robot = frictionless(robot)
@@ -80,6 +81,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
 SCALE, UNIT = 0.4, 0.25
 
 
+@ready_made
 def animation(robot: Manipulator | None = None) -> Explorer:
     """The machine moves along the triangle; arrows are the forces of the drives at the end-effector."""
     robot = frictionless(robot)
@@ -143,6 +145,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 WAYS = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
 
 
+@ready_made
 def via_points(robot: Manipulator | None = None) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press."""
     robot = frictionless(robot)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+
 import numpy as np
 
 from ..figures import marks
@@ -10,8 +13,21 @@ from ..machine.manipulator import Manipulator, load
 from ..mechanics.actuation import force_polygon
 from ..mechanics.kinematics import inverse_kinematics
 from .controls import slider
+from .explorer import Explorer
 
 TIME = "time in s"
+
+
+def ready_made(make: Callable) -> Callable[..., Explorer]:
+    """An explorer of the package, whose line of code has its name; a machine that was given is called robot there."""
+
+    @wraps(make)
+    def made(robot: Manipulator | None = None) -> Explorer:
+        shown = make(robot)
+        shown.made = f"explore.{make.__name__}({'' if robot is None else 'robot'})"
+        return shown
+
+    return made
 
 
 def frictionless(robot: Manipulator | None) -> Manipulator:

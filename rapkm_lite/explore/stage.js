@@ -5,7 +5,6 @@
 //   from it: {kind: "fixed" | "picture" | "lost", from?, seq?, marks, styles, images, frames, handles, numbers, ...}
 // A mark is [kind, panel, style, points, words?]: style a number in `styles` or an object, points how many pairs of the
 // first buffer, or an array of numbers.  Lengths in styles are points (1/72 inch), colours "#rrggbb" for white paper.
-
 const POINT = 96 / 72;
 const PATIENCE = 5000; // ms after which an answer counts as lost
 const AFLOAT = 2; // questions under way at the same time: three are no faster and lag more
@@ -226,7 +225,6 @@ function stroke({ ctx, theme }, points, { width, color, cap = "butt", dash = [] 
 }
 
 const pixels = (panel, points) => Float64Array.from(points, (v, k) => panel.at(points[k & ~1], points[k | 1])[k & 1]);
-
 const SHAPES = {
   o: Array.from({ length: 64 }, (_, k) => Math.cos((Math.PI * (k >> 1)) / 16 - (k % 2) * (Math.PI / 2))),
   s: [-1, -1, 1, -1, 1, 1, -1, 1],
@@ -381,7 +379,8 @@ export function mount(el, scene, link) {
     if (knob.parentElement !== panel.plot) panel.plot.append(knob);
     const ariaLabel = `${names.map(label).join(" and ")}, in the picture`, ariaValueText = names.map(told).join(", ");
     const className = bare ? "rapkm-knob bare" : "rapkm-knob", ariaValueNow = state.places[names[0]];
-    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueText, hidden: false });
+    const [ariaValueMin, ariaValueMax] = scene.ranges?.[names[0]] ?? [null, null];
+    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
     knob.style.translate = `${x}px ${y}px`;
@@ -485,6 +484,8 @@ export function mount(el, scene, link) {
       }
       if (label?.textContent.includes("_")) rich(label, name);
     }
+    for (const part of around()?.querySelectorAll(".widget-play button") ?? [])
+      part.ariaLabel = part.querySelector("i")?.className.replace(/.*fa-/, "").replace("retweet", "repeat") ?? "";
   }
 
   // A number typed beside a slider may lie between two of its steps.

@@ -18,7 +18,7 @@ from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, over_time
+from .shared import curves, frictionless, over_time, ready_made
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -36,6 +36,7 @@ def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
     return norm
 
 
+@ready_made
 def computed_torque(robot: Manipulator | None = None) -> Explorer:
     """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves."""
     robot = frictionless(robot)

@@ -14,7 +14,9 @@ NAMES = sorted(
     for name, made in vars(explore).items()
     if inspect.isfunction(made) and list(inspect.signature(made).parameters) == ["robot"]
 )
-HANDLED = ("machine", "steady_state", "actuation", "landscape", "animation", "three_opinions")
+HANDLED = (
+    "machine", "steady_state", "actuation", "landscape", "animation", "three_opinions", "allocation", "calibration",
+)  # fmt: skip
 WIDE = {"width": 1400, "height": 1000}
 KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
 FAILING = """from rapkm_lite import explore

@@ -1,6 +1,7 @@
 // Runs and statics of the page's engine for cases on standard input; arrays of doubles travel as base64.
 import { readFileSync } from "node:fs";
-import { Pose, machine, polygon, rest, simulate } from "../../rapkm_lite/explore/engine.js";
+
+const { Pose, machine, polygon, rest, simulate } = await import(process.env.RAPKM_ENGINE);
 
 const packed = (array) => Buffer.from(array.buffer).toString("base64");
 const answers = JSON.parse(readFileSync(0, "utf8")).map(({ robot, corners, points, ...how }) => {

@@ -25,6 +25,7 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
     values of new maps stand in the others.
     """
     styles: dict[int, dict] = {}
+    told, known = known, known.copy()
     images, buffers, parts, rows = {}, [], [], []
 
     def style_of(kind: str, style: dict) -> int:
@@ -58,6 +59,8 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
         parts.append(mark.data.ravel())
     handles = [_handle(handle) for handle in picture.handles]
     numbers = np.concatenate(parts) if parts else np.empty(0)
+    # Only what goes out is known there.
+    told.update(known)
     header = {"marks": rows, "styles": styles, "images": images, "frames": picture.frames, "handles": handles}
     return header, [numbers.astype("<f4").tobytes(), *buffers]
 

@@ -28,6 +28,7 @@ STYLES = {"line": LINE, "bar": PATCH, "polygon": PATCH, "label": WORDS, "words":
 STYLES |= {"image": {"zorder"}}
 MARKERS = ("o", "s", "D", "x", "+")
 _DASHES = {"-": (), "solid": (), "--": (3.7, 1.6), ":": (1.0, 1.65), "-.": (6.4, 1.6, 1.0, 1.6), "none": None, "": None}
+_PLACES = {"ha": ("left", "center", "right"), "va": ("baseline", "bottom", "center", "top")}
 _ORDER = {"image": 0.0, "bar": 1.0, "polygon": 1.0, "line": 2.0}
 
 
@@ -77,6 +78,13 @@ def checked(kind: str, style: dict) -> dict:
     line = style.get("linestyle", "-")
     if line not in _DASHES and not isinstance(line, tuple):
         raise ValueError(f"linestyle = {line!r}; allowed: {', '.join(map(repr, _DASHES))} or (0, (on, off, ...))")
+    for name, places in _PLACES.items():
+        if style.get(name, places[0]) not in places:
+            raise ValueError(f"{name} = {style[name]!r}; allowed: {', '.join(places)}")
+    try:
+        canvas_style(kind, tuple(style.items()))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{kind} cannot be drawn with {short(style)} ({error}); allowed: words and numbers") from None
     return style
 
 

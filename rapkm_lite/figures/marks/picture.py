@@ -188,6 +188,8 @@ class Picture:
 
     def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words: Any = "") -> None:
         self._check(panel)
+        if data.ndim != 2 or data.shape[1] != 2:
+            raise ValueError(f"the points of a {kind} have shape {data.shape}; allowed: (k, 2)")
         self.marks.append(Mark(kind, panel, data, style, words))
 
 
