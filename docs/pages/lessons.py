@@ -73,7 +73,9 @@ def _patterns(anchor: str) -> list[str]:
     n = int(anchor.removeprefix("eq-"))
     pairs = [(a, b) for a in range(max(1, n - 6), n + 1) for b in range(n, n + 7) if a < b]
     ranges = "|".join(rf"\({a}\)–\({b}\)" for a, b in pairs)
-    return [rf"\\tag\{{[^}}]*\b{n}\b", rf"\$\$[^$]*\({n}\)[^$]*\$\$", rf"\({n}\)", ranges, "^# "]
+    displayed = [rf"\\tag\{{[^}}]*\b{n}\b", rf"\$\$[^$]*\({n}\)[^$]*\$\$"]
+    in_the_line = rf"\$[^$\n]+=[^$\n]+\$,? \({n}\)"
+    return [*displayed, in_the_line, rf"\({n}\)", ranges, "^# "]
 
 
 def _first(cells, pattern: str) -> int | None:
