@@ -280,7 +280,7 @@ def test_every_lesson_makes_slides(number, tmp_path):
     done = subprocess.run([sys.executable, script, number, target], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     page = target.read_text(encoding="utf-8")
-    assert page.count("<section") >= 6 and "\\frac" not in page
+    assert page.count("<section") >= 6 and "\\frac" not in page and "\\cr" not in page
     assert not re.search(r"(?:src|href)=[\"'](?!data:)", page)
 
 

@@ -29,6 +29,7 @@ _markdown = mistune.create_markdown(escape=False, plugins=["table", "strikethrou
 def mathml(formula: str, block: bool) -> str:
     """A LaTeX formula as MathML."""
     plain = re.sub(r"\\tag\{(.*?)\}", r"\\qquad\\text{(\1)}", formula.strip())
+    plain = plain.replace("{gather}", "{matrix}")  # latex2mathml knows no lines of formulas
     return convert(plain, display="block" if block else "inline")
 
 
