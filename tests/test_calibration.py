@@ -313,3 +313,35 @@ def test_bad_arguments(change, sentence):
     given = {"robot": TESTBED, "log": rk.mystery_run("offset_a")} | change
     with pytest.raises(ValueError, match=sentence):
         rk.calibrate(**given)
+
+
+def test_nothing_left_over_shows_no_noise():
+    """Three poses of three drives: three equations for three offsets."""
+    robot = MACHINES["testbed"]
+    q = rk.inverse_kinematics(robot, 0.1 * np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]]))[:, :3] + OFFSET[:3]
+    found = rk.calibrate(robot, q)
+    assert_allclose(found.offset, OFFSET[:3], rtol=0, atol=1e-12)
+    assert "pass noise" in found.note
+    with pytest.raises(ValueError, match="no reading was left over"):
+        found.interval()
+    assert np.all(np.diff(rk.calibrate(robot, q, noise=1e-4).interval(), axis=0) > 0)
+
+
+def test_torques_under_a_filter_show_no_gain():
+    robot, logs = MACHINES["testbed"].replace(friction=4.2e-3), []
+    law = rk.AntagonismFilter(rk.PD(7.05, 0.225))
+    for x in ([0.08, 0.0], [-0.05, 0.06], [-0.05, -0.06], [0.0, 0.03]):
+        run = rk.simulate(robot, law, rk.hold(robot, x, 2.0), OFFSET[:3])
+        logs.append(
+            rk.Log("rest", run.t, run.q_a + OFFSET[:3], np.broadcast_to(run.trajectory.q_a, run.c.shape), run.c)
+        )
+    with pytest.raises(ValueError, match="do not follow the errors of the angles, as under an antagonism filter"):
+        rk.calibrate(robot, logs, use="torques")
+
+
+def test_a_log_from_a_spreadsheet(tmp_path):
+    """A mark of the encoding in front, empty lines behind."""
+    text = rk.data_path("mystery_runs/gain.csv").read_text(encoding="utf-8")
+    path = tmp_path / "gain.csv"
+    path.write_text(text + "\n\n", encoding="utf-8-sig")
+    assert rk.read_log(path) == rk.mystery_run("gain")

@@ -130,3 +130,36 @@ def test_what_does_not_compile_says_so():
 
     with pytest.raises(rk.SimulationError, match="not 3 finite numbers"):
         rk.simulate(ROBOT, short, PATH)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("how", ["raises", "writes beyond the end"])
+def test_a_law_that_raises_is_not_taken_for_one_that_answers(how):
+    """The plain function raises at the same sample, and a run that goes on would hold the last torques."""
+    if how == "raises":
+
+        @rk.compiled
+        def law(t, q_a, qd_a, d):
+            if t > 0.15:
+                raise ValueError("mine")
+            return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+
+    else:
+
+        @rk.compiled
+        def law(t, q_a, qd_a, d):
+            c = -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+            if t > 0.15:
+                c[7] = t
+            return c
+
+    with pytest.raises(rk.SimulationError, match="law") as plain:
+        rk.simulate(ROBOT, law.function, PATH)
+    with pytest.raises(
+        rk.SimulationError, match="the law law returned torques that are not 3 finite numbers"
+    ) as caught:
+        rk.simulate(ROBOT, law, PATH)
+    assert caught.value.time == plain.value.time
+    assert len(caught.value.partial.t) == len(plain.value.partial.t)
+    study = rk.sweep(ROBOT, law, PATH, np.zeros((2, 3)), failed="mask")
+    assert study.failed.all()

@@ -7,7 +7,18 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-MADE = {"__pycache__", "_site", "_lite", "build", "dist", "node_modules", "htmlcov", "test-results"}
+MADE = {
+    "__pycache__",
+    "_site",
+    "_work",
+    "jupyter_execute",
+    "_lite",
+    "build",
+    "dist",
+    "node_modules",
+    "htmlcov",
+    "test-results",
+}
 NAMES = {"ids": lambda path: path.relative_to(ROOT).as_posix()}
 
 

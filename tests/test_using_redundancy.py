@@ -195,3 +195,15 @@ def test_clipping_bends_the_path_and_choosing_within_the_limits_does_not():
     speed = np.linalg.norm(path.xd, axis=1).max()
     assert_allclose(chosen.x, free.x, atol=17.2 * 0.072 * speed * path.dt / 2 / (0.7 * 400.0))
     assert error(clipped) > 1.0 > 0.03 > error(chosen)
+
+
+def test_a_corner_of_the_force_polygon_is_reached_exactly():
+    """Where the room beside the one choice is as small as rounding, the force stays that of the demand."""
+    rng = np.random.default_rng(3)
+    for x in rng.uniform(-0.08, 0.08, (60, 2)):
+        A = rk.control_matrix(ROBOT, rk.inverse_kinematics(ROBOT, x))
+        for corner in rk.force_polygon(A, 0.085):
+            for inside in (1e-13, 1e-12, 1e-9):
+                wrench = (1 - inside) * corner
+                c = rk.allocate_torques(A, wrench, 0.085)
+                np.testing.assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-9 * np.abs(wrench).max())

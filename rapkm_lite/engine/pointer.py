@@ -33,7 +33,8 @@ def pointer(function, N: int, matrices: bool, memory: int):
     from numba import cfunc, njit, types
     from numba.core.errors import NumbaError
 
-    law: Any = njit(function, error_model="numpy")
+    # What the user writes stays inside its arrays.
+    law: Any = njit(function, error_model="numpy", boundscheck=True)
     ask: Any = law
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)
@@ -85,6 +86,9 @@ def pointer(function, N: int, matrices: bool, memory: int):
     at_hand = matrices_of if matrices else nothing
 
     def call(buffer):
+        # A law that raises leaves the call without a word, and no answer.
+        for i in range(N):
+            buffer[answer + i] = np.nan
         c = ask(
             buffer[0],
             buffer[1 : 1 + N],

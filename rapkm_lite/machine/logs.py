@@ -79,11 +79,14 @@ def read_log(source: str | Path) -> Log:
         raise ValueError(f"source = {source!r}; allowed: the path of a CSV file")
     path = Path(source)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        # Spreadsheets write a mark before the header, editors an empty line at the end.
+        with path.open(newline="", encoding="utf-8-sig") as file:
             header, *lines = list(csv.reader(file)) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no text in UTF-8"
         raise ValueError(f"the log {str(source)!r} cannot be read ({reason}); allowed: a CSV file") from None
+    while lines and not lines[-1]:
+        lines.pop()
     N, rest = divmod(len(header) - 1, 3)
     wanted = columns(max(N, 2))
     header = [name.strip() for name in header]

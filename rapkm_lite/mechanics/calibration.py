@@ -19,7 +19,7 @@ from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Array, Value
 from .at import at
-from .encoders import changed, closure, gauge, poses, rounding, unknown_names
+from .encoders import cautions, changed, closure, gauge, poses, rounding, unknown_names
 from .rests import Rests, fitted_gain, one_sided, rests
 
 UNKNOWNS = ("offsets", "offsets+lengths", "all")
@@ -81,7 +81,12 @@ class Calibration(Value):
     note: str = field(default="")
 
     def interval(self, level: float = 0.95) -> np.ndarray:
-        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1."""
+        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, for a known noise.
+
+        Raises ValueError where neither the log nor the caller said how large the noise is.
+        """
+        if self.noise == 0.0:
+            raise ValueError("no reading was left over to show the noise; allowed: a calibration with `noise`, in rad")
         level = positive_number("level", level)
         if level >= 1.0:
             raise ValueError(f"level = {level:g}; allowed: above 0 and below 1")
@@ -174,6 +179,12 @@ def _angles_of_torques(
         if gain is None:
             raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
         K_P = gain.K_P
+        left = stand.c + K_P * (stand.q_a - stand.desired)
+        if np.sum(left**2) >= 0.25 * np.sum(stand.c**2):
+            raise ValueError(
+                "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
+                "filter; allowed: the gain of the drives, or use = 'angles'"
+            )
     K_P = bounded("K_P", _per_drive(robot.n_arms, K_P), 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
     notes += one_sided(stand, K_P)
@@ -224,7 +235,9 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     used = max(spread, step) if noise is None else noise
     half = basis @ (Vt.T / sigma)
     condition = float(sigma[0] / sigma[-1])
-    notes = [*notes, *_cautions(guess, robot, condition, spread, step if noise is None else noise)]
+    notes = [*notes, *cautions(guess, robot, condition, spread, step if noise is None else noise)]
+    if used == 0.0:
+        notes.append("no reading is left over to show the noise, so that the covariance is none: pass noise")
     if unknowns == "all":
         notes.append(f"{', '.join(GAUGE)} of the whole machine are held: no reading shows them")
     return Calibration(
@@ -243,22 +256,6 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         corrected=machine,
         note="; ".join(notes),
     )
-
-
-def _cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, noise: float) -> list[str]:
-    """What to mind: a residual (rad) above the noise where that is known, and places x (k, 2) close together."""
-    said = []
-    if noise and spread > 3 * noise:
-        said.append(
-            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else is wrong, "
-            "such as a length or a base point"
-        )
-    extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
-    if extent < 0.25 * robot.lengths.max():
-        said.append(f"all places lie within {extent:.2g} m of their centre, close together: spread them")
-    if condition > 50:
-        said.append(f"the equations have the condition {condition:.3g}, which multiplies what noise there is")
-    return said
 
 
 def _refusal(names, basis, sigma, Vt, explained, rank: int) -> CalibrationError:

@@ -105,3 +105,19 @@ def gauge(robot: Manipulator) -> np.ndarray:
     ones = np.ones(robot.n_arms)
     shifts = (np.outer(ones, axis).ravel() for axis in np.eye(2))
     return np.linalg.qr(np.stack([arm.ravel(), turned.ravel(), *shifts], axis=-1))[0]
+
+
+def cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, noise: float) -> list[str]:
+    """What to mind: a residual (rad) above the noise where that is known, and places x (k, 2) close together."""
+    said = []
+    if noise and spread > 3 * noise:
+        said.append(
+            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else is wrong, "
+            "such as a length or a base point"
+        )
+    extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
+    if extent < 0.25 * robot.lengths.max():
+        said.append(f"all places lie within {extent:.2g} m of their centre, close together: spread them")
+    if condition > 50:
+        said.append(f"the equations have the condition {condition:.3g}, which multiplies what noise there is")
+    return said

@@ -51,8 +51,10 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
     r, slack = G.T @ u, 1.0 - h @ u / size
     # On the edge of the force polygon there is one choice, and nothing to divide by.
-    c = best + n @ r / slack * size if slack > 1e-12 else edge
-    return np.clip(c, -limit, limit)
+    c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
+    # So close to it that rounding was magnified, what was clipped is another force.
+    missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
+    return np.clip(edge, -limit, limit) if missed else c
 
 
 def minimax_torques(A, wrench, limit=1.0) -> np.ndarray:

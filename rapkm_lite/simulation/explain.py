@@ -45,7 +45,9 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         return too_stiff(setup)
     written = _written_by_user(law)
     if status == SINGULAR and written is not None:
-        return f"the law {short(written)} returned torques that are not {setup.robot.n_arms} finite numbers"
+        # What a compiled function raises does not leave it; Numba writes it to the error stream.
+        raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
+        return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, k, written is None), "look at gains, offsets and the path")
     return f"{REASONS[status]} ({words})"
 
@@ -222,7 +224,12 @@ def _written_by_user(law):
     if type(law) in (AntagonismFilter, CommandFilter):
         return _written_by_user(law.law)
     ours = type(law) in (PD, PID, APD, CTC, SwitchedCTC, RedundantAPD, RedundantCTC)
-    return None if ours else law.function if isinstance(law, CompiledLaw) else law
+    return None if ours else law
+
+
+def _name(law) -> str:
+    """What the user called it."""
+    return getattr(getattr(law, "function", law), "__name__", None) or short(law)
 
 
 def growth(setup: Setup, law, k: int) -> float | None:
