@@ -133,3 +133,20 @@ def test_no_log_begins_with_its_offsets(name):
 def test_unknown_log_names_what_is_allowed():
     with pytest.raises(ValueError, match=r"name = 'offset_x'; allowed: 'offset_a', 'offset_b', 'offset_c', 'gain'"):
         rk.mystery_run("offset_x")
+
+
+def test_jitter_costs_the_mean_square_of_the_delay():
+    """(14) with dq = qd_a times the delay: a quadratic form; 0 to 4 ms at random have the mean square 6 ms^2."""
+    robot = rk.load().replace(friction=0.0)
+    path = rk.polygon(robot, [[-0.12, -0.0693], [0.12, -0.0693]], duration=3.0)
+    late = np.random.default_rng(0).integers(0, 5, len(path))
+
+    def cost(delay, rates):
+        k = np.arange(len(path))[:, None] - np.stack([delay, 0 * delay, 0 * delay], axis=-1)
+        given = [np.take_along_axis(a, np.maximum(k, 0), axis=0) for a in (path.q_a, path.qd_a)]
+        return rk.antagonistic_energy(rk.simulate(robot, rk.PD(7.05, 0.225), path.with_set_points(*given[: 1 + rates])))
+
+    none, steady = cost(0 * late, True), cost(0 * late + 2, True)
+    random, jumping = cost(late, True), cost(late, False)
+    np.testing.assert_allclose((random - none) / (steady - none), 6 / 4, rtol=0.05)
+    assert 150 * steady < jumping < 300 * steady
