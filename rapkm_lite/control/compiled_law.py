@@ -68,15 +68,18 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
 
     at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
-    What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants.
+    What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
+    the sampling time of the path, which the function is not told, and which stay what they were at the first run.
+    What it raises ends the run as torques that are not finite do; Numba writes the exception to the error stream.
     Without Numba, and inside laws that run in Python, the function is called as it is.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.
 
     >>> import rapkm_lite as rk
+    >>> dt = 1e-3
     >>> @rk.compiled(memory=3)
     ... def pi(t, q_a, qd_a, d, memory):
     ...     e = q_a - d.q_a
-    ...     memory += 1e-3 * e
+    ...     memory += dt * e
     ...     return -7.0 * e - 0.2 * (qd_a - d.qd_a) - 5.0 * memory
     >>> pi
     compiled(pi, at=None, memory=3)
