@@ -120,9 +120,9 @@ def break_drives(lanes, arms, faults, w, k):
 def record(arms, history, N, w, row):
     """A sample of a single run of N drives: a row in each column of its history, which are flat."""
     W = len(arms)
-    states, q, qd, c, joints = history
-    for i in range(4):
-        states[4 * row + i] = w[of(X + i, 0, W, 1)]
+    x, xd, q, qd, c, joints = history
+    x[2 * row], x[2 * row + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
+    xd[2 * row], xd[2 * row + 1] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
     for i in range(N):
         o = N * row + i
         q[o], qd[o], c[o] = w[Q * W + i], w[QD * W + i], w[C * W + i]
@@ -213,7 +213,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         if study is not None:
             add_up(lanes, drives, arms, w)
         if history is not None:
-            record(arms, history, len(history[1]) // rows, w, row)
+            record(arms, history, len(history[2]) // rows, w, row)
             if k + 1 == clock.samples:
                 last_torque(drives, arms, w, k)
                 return

@@ -30,7 +30,7 @@ def encode(law: Any, model) -> Code | None:
 def single(setup: Setup, code: Code) -> Outcome:
     """One run with its history."""
     samples, N = len(setup.trajectory), setup.robot.n_arms
-    history = [np.zeros((samples, size)) for size in (4, N, N, N)] + [np.zeros((samples, 2), np.int32)]
+    history = [np.zeros((samples, size)) for size in (2, 2, N, N, N)] + [np.zeros((samples, 2), np.int32)]
     w = _run(setup, [code], setup.sensors.offset[None], history)
     return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *all_frozen(history))
 

@@ -38,7 +38,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory), Encoders(sensors, faults, trajectory.dt)
     controller = Controller(law, model, trajectory.dt)
-    states, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
+    x, xd, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
     times, dt = trajectory.t.tolist(), trajectory.dt
     state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
     last = len(times) - 1
@@ -51,7 +51,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
             torque = controller.command(t, angles, rates, trajectory[k], truth)  # pose (if asked for), command
             if faults is not None:
                 torque = faults.act(k, torque)
-            states[k], q_a[k], qd_a[k], c[k] = state, q, qd, torque  # record
+            (x[k], xd[k]), q_a[k], qd_a[k], c[k] = truth, q, qd, torque  # record
             if controller.pair is not None:
                 pairs[k] = controller.pair
             if k < last:

@@ -217,27 +217,13 @@ def complete(setup: Setup, law) -> Run:
 
 def _run(setup: Setup, law, outcome: Outcome) -> Run:
     """The rows of an outcome that hold something."""
-    status, sample, states, *columns = outcome
+    status, sample, *columns = outcome
     rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
     if status != DONE:
-        table = np.concatenate([states, *columns], axis=-1)[rows]
+        table = np.concatenate(columns, axis=-1)[rows]
         rows = slice(int(np.append(np.all(np.isfinite(table), axis=-1), False).argmin()))
-    q_a, qd_a, c, pairs = (column[rows] for column in columns)
-    states = states[rows]
-    return Run(
-        setup.robot,
-        law,
-        setup.trajectory,
-        setup.sensors,
-        setup.broken,
-        setup.trajectory.t[rows],
-        states[:, :2],
-        states[:, 2:],
-        q_a,
-        qd_a,
-        c,
-        pairs,
-    )
+    columns = [column[rows] for column in (setup.trajectory.t, *columns)]
+    return Run(setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns)
 
 
 def hand_over(error, partial, note: str) -> None:

@@ -35,14 +35,15 @@ class Outcome(NamedTuple):
     """How a run ended and its history, rows of samples.
 
     status : DONE, LEFT_WORKSPACE (during the hold after `sample`), or what kept the law from an answer at `sample`.
-    states : (k, 4) true end-effector position and velocity.  q_a, qd_a : (k, N) true base angles and rates.
+    x, xd : (k, 2) true end-effector position and velocity.  q_a, qd_a : (k, N) true base angles and rates.
     c : (k, N) torques that acted.  pairs : (k, 2) independent joints in use, -1 where there are none.
     Rows from `sample` on hold nothing when the run has failed; the row `sample` itself counts for LEFT_WORKSPACE.
     """
 
     status: int
     sample: int
-    states: np.ndarray
+    x: np.ndarray
+    xd: np.ndarray
     q_a: np.ndarray
     qd_a: np.ndarray
     c: np.ndarray
@@ -63,10 +64,15 @@ def friction_steps(robot: Manipulator, x: float, y: float, dt: float) -> int:
     return max(1, math.ceil(dt * np.trace(np.linalg.solve(inertia, drag))))
 
 
+@functools.lru_cache(maxsize=64)
+def _reach(robot: Manipulator, x: float, y: float) -> None:
+    """Raises ValueError where the machine does not reach a point."""
+    inverse_kinematics(robot, [x, y])
+
+
 def blank(samples: int, N: int) -> tuple[np.ndarray, ...]:
-    """Room for the history of a run: states, q_a, qd_a, c and pairs of an `Outcome`."""
-    states, q_a, qd_a, c = np.zeros((samples, 4)), *(np.zeros((samples, N)) for _ in range(3))
-    return states, q_a, qd_a, c, np.full((samples, 2), -1)
+    """Room for the history of a run: x, xd, q_a, qd_a, c and pairs of an `Outcome`."""
+    return *(np.zeros((samples, size)) for size in (2, 2, N, N, N)), np.full((samples, 2), -1)
 
 
 def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=None, faults=()) -> Setup:
@@ -84,7 +90,7 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
         trajectory = trajectory.for_robot(model)
     except ValueError as error:
         raise ValueError(f"model cannot follow the trajectory: {error}") from None
-    inverse_kinematics(robot, trajectory.x[0])
+    _reach(robot, *trajectory.x[0].tolist())
     N = robot.n_arms
     faults = check_faults(faults)
     return Setup(robot, model, trajectory, sensors.of_drives(N), fault_table(faults, trajectory.t, N), faults)
