@@ -15,7 +15,8 @@ if COMPILED:
     from numba import njit, types
 
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
-_OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
+# Kernels write into arrays that they are given: without counts of who refers to them a sample takes up to a third less.
+_OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
 
 
@@ -59,6 +60,11 @@ def _forgiving(dispatcher):
 def leaf(function):
     """Compile a function that only kernels call, and put it into each of them."""
     return njit(forceinline=True, **_INNER)(function) if COMPILED else function
+
+
+def view(function):
+    """A `leaf`, or what calls one, that returns a part of an array."""
+    return njit(**{**_INNER, "_nrt": True})(function) if COMPILED else function
 
 
 def index(function):

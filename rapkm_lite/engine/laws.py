@@ -9,22 +9,69 @@ from __future__ import annotations
 
 import math
 
-from .jit import outlined
+from .jit import leaf, outlined
 from .leaves import accelerations, drag, geometry, inertia, small_angle, solve2
 from .minimal import best_pair, minimal_feedback, reference
 from .rows import *
+from .single import fetch
 from .tables import *
 
 
+@leaf
+def arm_shares(w, p, P, extra, env, vx, vy, ux, uy, bx, by, lx, ly, ad, inv, den):
+    """Write the shares of an arm, entry p of pair rows of P numbers, in M and h, and the accelerations of its joints
+    at zero xdd, with the reference rate u."""
+    base = bx * vx + by * vy
+    base_acc, back_acc = accelerations(
+        base,
+        lx * vx + ly * vy,
+        bx * ux + by * uy,
+        lx * ux + ly * uy,
+        ad,
+        inv,
+        w[(MODEL + L1SQ) * P + p],
+        w[(MODEL + L2SQ) * P + p],
+    )
+    m11, m12, m22, fx, fy = inertia(
+        w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], bx, by, lx, ly, base_acc, back_acc
+    )
+    if len(extra) > 0:
+        place = lx * den, ly * den, bx * den, by * den, ad, inv, 0.0
+        gx, gy = drag(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], w[(MODEL + FRICTION) * P + p], env, place, base)
+        fx, fy = fx + gx, fy + gy
+    w[P11 * P + p], w[P12 * P + p], w[P22 * P + p] = m11, m12, m22
+    w[GX * P + p], w[GY * P + p] = -fx, -fy
+    w[ACC_B * P + p], w[ACC_E * P + p] = base_acc, -base_acc - back_acc
+
+
+@leaf
+def pose_of(w, j, W, L):
+    """Pose of a run, its velocity, and the environment of the model."""
+    return (
+        w[of(PX, j, W, L)],
+        w[of(PY, j, W, L)],
+        w[of(PVX, j, W, L)],
+        w[of(PVY, j, W, L)],
+        (
+            w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
+            w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
+            w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
+        ),
+    )
+
+
 @outlined
-def look(lanes, drives, arms, table, o, w):
-    """The model at the pose: rows b and l of its rates, a.d, a x d and its inverse, and the errors of the elbows."""
+def look(lanes, drives, arms, extra, table, o, w):
+    """The model at the pose: rows b and l of its rates, a.d, a x d and its inverse, and the errors of the elbows; the
+    shares of the arms at the rate of the pose."""
     L, N, W = len(lanes), len(drives), len(arms)
-    far = 0
+    # What the arms of a single run share is read once: read among what is written it would keep the loop from vectors.
+    alone = pose_of(w, 0, W, L)
     for i in range(N):
-        cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
-        rate = want(table, o, ELBOW_RATE, i, W)
+        cos, sin = desired(table, o, w, ELBOW_COS, i, W, L), desired(table, o, w, ELBOW_SIN, i, W, L)
+        rate = desired(table, o, w, ELBOW_RATE, i, W, L)
         for j in range(L):
+            x, y, vx, vy, env = alone if L == 1 else pose_of(w, j, W, L)
             ax, ay, dx, dy, ad, inv, _ = geometry(
                 w[at(MODEL + BX, i, j, W, L)],
                 w[at(MODEL + BY, i, j, W, L)],
@@ -32,8 +79,8 @@ def look(lanes, drives, arms, table, o, w):
                 w[at(MODEL + HALF, i, j, W, L)],
                 w[at(MODEL + MEAN, i, j, W, L)],
                 w[at(MODEL + MODE, i, j, W, L)],
-                w[of(PX, j, W, L)],
-                w[of(PY, j, W, L)],
+                x,
+                y,
             )
             bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
             w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)] = bx, by, lx, ly
@@ -43,9 +90,13 @@ def look(lanes, drives, arms, table, o, w):
             s, t = cos * den - sin * ad, cos * ad + sin * den
             s *= w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
             w[at(ELBOW_E, i, j, W, L)] = small_angle(s)
-            w[at(ELBOW_ED, i, j, W, L)] = -(bx + lx) * w[of(PVX, j, W, L)] - (by + ly) * w[of(PVY, j, W, L)] - rate
-            far += 1 if min(0.1 - abs(s), t) < 0.0 else 0
-    if far > 0:
+            w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
+            w[at(ELBOW_ED, i, j, W, L)] = -(bx + lx) * vx - (by + ly) * vy - rate
+            arm_shares(w, i * L + j, W * L, extra, env, vx, vy, vx, vy, bx, by, lx, ly, ad, inv, den)
+    near = 0.0
+    for p in range(N * L):
+        near = min(near, w[NEAR * W * L + p])
+    if near < 0.0:
         for i in range(N):
             cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
             for j in range(L):
@@ -58,46 +109,33 @@ def look(lanes, drives, arms, table, o, w):
 
 @outlined
 def shares(lanes, drives, arms, extra, w):
-    """Shares of the arms in M and h, and the accelerations of their joints at zero xdd, with the reference rate."""
+    """The shares of the arms at a reference rate of its own, as in APD laws."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            bx, by, lx, ly = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)]
-            vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
-            ad, inv, base = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)], bx * vx + by * vy
-            base_acc, back_acc = accelerations(
-                base,
-                lx * vx + ly * vy,
-                bx * ux + by * uy,
-                lx * ux + ly * uy,
-                ad,
-                inv,
-                w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + L2SQ, i, j, W, L)],
+            env = (
+                w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
+                w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
+                w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
             )
-            m11, m12, m22, fx, fy = inertia(
-                w[at(MODEL + S1, i, j, W, L)], w[at(MODEL + S2, i, j, W, L)], bx, by, lx, ly, base_acc, back_acc
+            arm_shares(
+                w,
+                i * L + j,
+                W * L,
+                extra,
+                env,
+                w[of(PVX, j, W, L)],
+                w[of(PVY, j, W, L)],
+                w[of(REF_X, j, W, L)],
+                w[of(REF_Y, j, W, L)],
+                w[at(A1, i, j, W, L)],
+                w[at(A2, i, j, W, L)],
+                w[at(L1, i, j, W, L)],
+                w[at(L2, i, j, W, L)],
+                w[at(MAD, i, j, W, L)],
+                w[at(MINV, i, j, W, L)],
+                w[at(MDEN, i, j, W, L)],
             )
-            if len(extra) > 0:
-                env = (
-                    w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
-                    w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
-                    w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
-                )
-                den = w[at(MDEN, i, j, W, L)]
-                place = lx * den, ly * den, bx * den, by * den, ad, inv, 0.0
-                gx, gy = drag(
-                    w[at(MODEL + W1, i, j, W, L)],
-                    w[at(MODEL + W2, i, j, W, L)],
-                    w[at(MODEL + FRICTION, i, j, W, L)],
-                    env,
-                    place,
-                    base,
-                )
-                fx, fy = fx + gx, fy + gy
-            w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = m11, m12, m22
-            w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)] = -fx, -fy
-            w[at(ACC_B, i, j, W, L)], w[at(ACC_E, i, j, W, L)] = base_acc, -base_acc - back_acc
 
 
 @outlined
@@ -129,8 +167,8 @@ def redundant_feedback(lanes, drives, arms, law, table, o, w):
                 w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
                 + w[at(ELBOW_D, i, j, W, L)] * w[at(ELBOW_ED, i, j, W, L)]
             )
-            r = want(table, o, ACCELERATION, i, W) - w[at(ACC_B, i, j, W, L)]
-            q = want(table, o, ELBOW_ACCELERATION, i, W) - w[at(ACC_E, i, j, W, L)]
+            r = desired(table, o, w, ACCELERATION, i, W, L) - w[at(ACC_B, i, j, W, L)]
+            q = desired(table, o, w, ELBOW_ACCELERATION, i, W, L) - w[at(ACC_E, i, j, W, L)]
             ad, inv = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)]
             l1sq, l2sq = w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)]
             if force:
@@ -179,14 +217,18 @@ def distribute(lanes, drives, arms, w):
 @outlined
 def computed_torque(lanes, drives, arms, extra, law, table, o, w):
     """Drive torques C of the laws with a model, at the pose PX, PY, PVX, PVY."""
-    look(lanes, drives, arms, table, o, w)
+    if len(lanes) == 1:
+        for block in (ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN):
+            fetch(block, len(arms), table, o, w)
+    look(lanes, drives, arms, extra, table, o, w)
     if law.switched:
         best_pair(lanes, drives, arms, w)
     redundant = law.form >= REDUNDANT_APD
     if redundant:
         gram(lanes, drives, arms, w)
     reference(lanes, drives, arms, law, table, o, w)
-    shares(lanes, drives, arms, extra, w)
+    if law.form == APD or law.form == REDUNDANT_APD:
+        shares(lanes, drives, arms, extra, w)
     if redundant:
         redundant_feedback(lanes, drives, arms, law, table, o, w)
     else:

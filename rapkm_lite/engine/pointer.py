@@ -13,9 +13,9 @@ Matrices = namedtuple("Matrices", "F F_dot A J J_dot N N_dot G C Q minimal redun
 
 
 def matrix_room(N: int) -> int:
-    """How many numbers the matrices of `engine.user` take."""
+    """How many numbers the matrices of `engine.user` take, and the intermediate ones after them."""
     n, r = 2 * N, 2 * N - 2
-    return 4 * n + 2 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n
+    return 4 * n + 2 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 14 * n
 
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:

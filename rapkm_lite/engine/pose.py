@@ -7,7 +7,6 @@ import math
 from .jit import leaf, outlined
 from .leaves import geometry, pose_terms, solve2
 from .rows import *
-from .single import fetch
 from .tables import *
 
 
@@ -105,7 +104,12 @@ def single_step(arms, w, x, y):
             y,
         )
         p11, p12, p22, gx, gy, bx, by, near = pose_terms(
-            w[m + L2SQ * W + i], w[m + SCALE * W + i], place, w[UX * W + i], w[UY * W + i], w[E * W + i]
+            w[m + L2SQ * W + i],
+            w[m + SCALE * W + i],
+            place,
+            w[(MOTION + COS) * W + i],
+            w[(MOTION + SIN) * W + i],
+            w[E * W + i],
         )
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
         w[A1 * W + i], w[A2 * W + i], w[NEAR * W + i] = bx, by, near
@@ -180,8 +184,6 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
     if history is not None:
-        fetch(UX, COS, W, table, o, w)
-        fetch(UY, SIN, W, table, o, w)
         single_newton(drives, arms, w, tolerance)
     if study is not None:
         count = L

@@ -45,12 +45,10 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
     OLD,
     COPPER,
     WORK,
-    WANTED,
-    WANTED_RATE,
-    UX,
-    UY,
-) = range(FY + 1, FY + 32)
-BLOCKS = UY + 1
+) = range(FY + 1, FY + 28)
+# The desired motion of a sample of a single run, in the order of the blocks of `tables.motion_table`.
+MOTION = WORK + 1
+BLOCKS = MOTION + 9
 
 (
     X,
@@ -130,6 +128,12 @@ def of(row, j, W, L):
 def want(table, o, block, i, W):
     """Desired motion of arm i at a sample, from a block of `tables.motion_table`."""
     return table[o + 6 + block * W + i]
+
+
+@index
+def desired(table, o, w, block, i, W, L):
+    """As `want`, of a single run from its work table, into which `single.fetch` has copied it."""
+    return w[(MOTION + block) * W + i] if L == 1 else table[o + 6 + block * W + i]
 
 
 @index

@@ -12,8 +12,12 @@ from .tables import *
 
 
 @index
-def fetch(row, block, W, table, o, w):
-    """Copy a block of the desired motion into a row; four numbers are read before they are written, as one vector."""
+def fetch(block, W, table, o, w):
+    """Copy a block of the desired motion into its row; four numbers are read before they are written, as one vector.
+
+    Beside another array loops over arms would not become vector instructions.
+    """
+    row = MOTION + block
     if W == 4:
         a, b, c, d = (
             want(table, o, block, 0, W),
@@ -32,11 +36,10 @@ def sense(arms, extra, table, o, w, dt):
     """As `plant.sense`."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    # Into the table first: beside another array the loop below would not become vector instructions.
-    fetch(WANTED, ANGLE, W, table, o, w)
-    fetch(UX, COS, W, table, o, w)
-    fetch(UY, SIN, W, table, o, w)
-    fetch(WANTED_RATE, RATE, W, table, o, w)
+    fetch(ANGLE, W, table, o, w)
+    fetch(COS, W, table, o, w)
+    fetch(SIN, W, table, o, w)
+    fetch(RATE, W, table, o, w)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
         place = geometry(
@@ -48,12 +51,12 @@ def sense(arms, extra, table, o, w, dt):
         if extra is not None:
             gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
             fx, fy = fx + gx, fy + gy
-        ax, ay, ux, uy = place[0], place[1], w[UX * W + i], w[UY * W + i]
+        ax, ay, ux, uy = place[0], place[1], desired(table, o, w, COS, i, W, 1), desired(table, o, w, SIN, i, W, 1)
         s, t = (ux * ay - uy * ax) * w[SCALE * W + i], ux * ax + uy * ay
         w[NEAR * W + i] = min(0.1 - abs(s), t)
         angle = small_angle(s)
-        w[Q * W + i], w[QD * W + i] = w[WANTED * W + i] + angle, rate
-        w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - w[WANTED_RATE * W + i]
+        w[Q * W + i], w[QD * W + i] = desired(table, o, w, ANGLE, i, W, 1) + angle, rate
+        w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - desired(table, o, w, RATE, i, W, 1)
         w[AX * W + i], w[AY * W + i], w[AD * W + i] = ax, ay, place[4]
         w[INV * W + i], w[B1 * W + i], w[B2 * W + i] = place[5], bx, by
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from .jit import leaf, outlined
+from .jit import leaf, outlined, view
 from .leaves import geometry, smooth_sign, solve2
 from .rows import *
 from .tables import *
@@ -38,7 +36,7 @@ def transposed(out, A, B, rows, inner, columns):
             out[i, j] = s
 
 
-@leaf
+@view
 def matrix(buffer, start, rows, columns):
     """A matrix that stands in the buffer, and where the next one starts."""
     size = rows * columns
@@ -80,7 +78,7 @@ def fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link):
             J_dot[2 * row, N + i], J_dot[2 * row + 1, N + i] = -sign * link * dx, -sign * link * dy
 
 
-@outlined
+@view
 def fill_matrices(drives, arms, law, table, o, w, room):
     """All matrices of `rapkm_lite.at` at the desired, measured or true pose."""
     N, W = len(drives), len(arms)
@@ -103,7 +101,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     Qn, p = matrix(room, p, n, 1)
     A_tilde, p = matrix(room, p, N, n)
     pinv, p = matrix(room, p, N, n)
-    scratch = np.empty((7, n, 2))
+    scratch = room[p : p + 14 * n].reshape(7, n, 2)
     J[:], J_dot[:], G[:], C_[:] = 0.0, 0.0, 0.0, 0.0
     env = ENVIRONMENT + GRAVITY_X
     gx, gy = w[of(env, 0, W, 1)], w[of(env + 1, 0, W, 1)]
