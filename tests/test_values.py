@@ -1,6 +1,7 @@
 """Values do not change: read-only to the last array, also unpickled and copied; equal by value; printed as typed."""
 
 import copy
+import functools
 import pickle
 from dataclasses import dataclass
 
@@ -143,3 +144,87 @@ def test_equal_machines_and_paths_are_one_key():
     assert rk.triangle(again, dt=0.05) == PATH and {PATH: 1}[rk.triangle(again, dt=0.05)] == 1
     assert rk.triangle(again, dt=0.05, side=0.2) != PATH
     assert repr(PATH[1:3]).startswith("Desired(3, [[")
+
+
+class Spring:
+    """A law as users write them, with whatever state."""
+
+    def __init__(self, gain, **state):
+        self.gain, self.last = np.full(3, gain), None
+        vars(self).update(state)
+
+    def __call__(self, t, q_a, qd_a, d):
+        self.last = q_a
+        return -self.gain * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+
+    pull = __call__
+
+
+@dataclass
+class Table:
+    """A dataclass whose own == asks for the truth of an array."""
+
+    gains: np.ndarray
+
+    def __call__(self, t, q_a, qd_a, d):
+        return -self.gains * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+
+
+class Shared:
+    """What can be copied, but neither pickled nor looked into."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, memo):
+        return self
+
+    def __reduce_ex__(self, protocol):
+        raise TypeError("cannot be pickled")
+
+
+def spring_of(gain):
+    return lambda t, q_a, qd_a, d: -gain * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+
+
+LAWS = {
+    "function": lambda K: spring_of(K),
+    "object": lambda K: Spring(K),
+    "method": lambda K: Spring(K).pull,
+    "partial": lambda K: functools.partial(Spring(K)),
+    "dataclass": lambda K: Table(np.full(3, K)),
+    "filtered": lambda K: rk.AntagonismFilter(Spring(K), pose="true"),
+    "random": lambda K: Spring(K, noise=np.random.default_rng(3), log=[{"a": np.nan}, {K}], helper=spring_of(K)),
+    "unpicklable": lambda K: Spring(K, hidden=SHARED, more=[SHARED]),
+    "cycle": lambda K: circle(Spring(K)),
+}
+SHARED = Shared()
+
+
+def circle(law):
+    law.own = [law]
+    return law
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_runs_with_laws_of_a_user_are_equal_by_value(kind):
+    """Two runs are equal when all that made them is, whoever built the law and how often; a copy is equal, too."""
+    robot = rk.load()
+    path = rk.hold(robot, [0.0, 0.0], 0.003)
+    law = LAWS[kind](7.0)
+    run, again = rk.simulate(robot, law, path), rk.simulate(robot, law, path)
+    assert run == again and hash(run) == hash(again)
+    other = rk.simulate(robot, LAWS[kind](7.0), path)
+    assert run == other and hash(run) == hash(other)
+    assert run == copy.deepcopy(run) and len({run, again, other}) == 1
+    # At rest on the path all torques are zero: only the laws differ.
+    assert run != rk.simulate(robot, LAWS[kind](8.0), path)
+    assert rk.sweep(robot, law, path, [0.0, 0.0, 0.0]) == rk.sweep(robot, LAWS[kind](7.0), path, [0.0, 0.0, 0.0])
+    if kind not in ("function", "random", "unpicklable"):  # no lambda travels
+        assert run == pickle.loads(pickle.dumps(run))
+
+
+def test_what_cannot_be_looked_into_equals_only_itself():
+    assert Sample(np.ones(1), (Shared(),)) != Sample(np.ones(1), (Shared(),))
+    assert Sample(np.ones(1), (np.sin,)) == Sample(np.ones(1), (np.sin,)) != Sample(np.ones(1), (np.cos,))
+    assert Sample(np.ones(1), (Spring,)) != Sample(np.ones(1), (Table,))
+    assert Sample(np.ones(1), (Spring(1.0),)) != Sample(np.ones(1), (Table(np.ones(3)),))

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from .arguments import masked, short
+from .likeness import equal, key
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,7 +112,8 @@ class Value:
 
     `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
     pickling, ``copy.copy`` and ``copy.deepcopy``.  Two values are equal when they have the same type and equal fields
-    (equal shapes and numbers; NaN equals NaN); equal values have equal hashes, computed once.
+    (equal shapes and numbers; NaN equals NaN; functions and objects of a user as `likeness.equal` says); equal values
+    have equal hashes, computed once.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -153,11 +155,11 @@ class Value:
             return True
         if type(self) is not type(other):
             return NotImplemented
-        return all(_equal(self.__dict__[name], other.__dict__[name]) for name in _names(type(self)))
+        return all(equal(self.__dict__[name], other.__dict__[name]) for name in _names(type(self)))
 
     def __hash__(self) -> int:
         if "_hash" not in self.__dict__:
-            self.__dict__["_hash"] = hash((type(self), *map(_key, self._fields().values())))
+            self.__dict__["_hash"] = hash((type(self), *map(key, self._fields().values())))
         return self.__dict__["_hash"]
 
     def __repr__(self) -> str:
@@ -167,7 +169,7 @@ class Value:
             value = self.__dict__[field.name]
             if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
                 parts.append(_typed(value))
-            elif not _equal(value, _frozen(field.default)):
+            elif not equal(value, _frozen(field.default)):
                 parts.append(f"{field.name}={_typed(value)}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
@@ -182,31 +184,6 @@ def _names(cls: type) -> tuple[str, ...]:
     if cls not in _known_names:
         _known_names[cls] = tuple(field.name for field in dataclasses.fields(cls))
     return _known_names[cls]
-
-
-def _equal(a, b) -> bool:
-    if masked(a) or masked(b):
-        masks = np.array_equal(np.ma.getmaskarray(a), np.ma.getmaskarray(b))
-        return masks and _equal(np.ma.filled(a, 0), np.ma.filled(b, 0))
-    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        if a is None or b is None:
-            return a is b
-        a, b = np.asarray(a), np.asarray(b)
-        return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc" and b.dtype.kind in "fc")
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return len(a) == len(b) and all(map(_equal, a, b))
-    return a is b or bool(a == b)
-
-
-def _key(value):
-    """Something hashable that is equal for equal values: 1 and 1.0, 0.0 and -0.0 are equal."""
-    if isinstance(value, np.ndarray):
-        numbers = np.ma.filled(value, 0) if masked(value) else value
-        if numbers.dtype.kind in "biuf":
-            numbers = numbers.astype(float)
-            numbers = np.where(np.isnan(numbers), np.nan, numbers + 0.0)
-        return numbers.item() if value.ndim == 0 else (value.shape, numbers.tobytes())
-    return tuple(map(_key, value)) if isinstance(value, tuple) else value
 
 
 def _typed(value) -> str:
