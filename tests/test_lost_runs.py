@@ -225,6 +225,28 @@ def test_a_sweep_masks_what_failed():
     assert "5 runs, 3 failed" in repr(study)
 
 
+def test_a_sweep_knows_why_each_row_is_masked():
+    """The reason of a row is the one that its run alone gives, whoever ran it and in whatever parts."""
+    laws, faults = [*LAWS, rk.AntagonismFilter(PD)], [rk.OffsetJump(i, 0.1, 2.5 * (-1) ** i) for i in range(3)]
+    model = ROBOT.replace(masses=0.3)
+    with ProcessPoolExecutor(2) as pool:
+        for options in ({}, {"model": model, "velocity_filter": 1e-3}, {"faults": faults, "encoder": 4000}):
+            study = rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", **options)
+            other = rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", executor=pool, chunk=2, **options)
+            assert study.failed[[1, 3, 4]].all() and study.reasons == other.reasons
+            for i in (0, 1, 2, 3, 5):
+                assert study.failed[i] == (study.reasons[i] is not None)
+                if study.failed[i]:
+                    assert study.reasons[i] == lost(ROBOT, laws[i], PATH, OFFSET, **options).reason
+            assert study.reasons[4].startswith("the law raised KeyError: 'gain table' (line ")
+    again = pickle.loads(pickle.dumps(study))
+    assert again == study and hash(again) == hash(study) and again.reasons == study.reasons
+    assert study != rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", faults=faults, encoder=3000)
+    with pytest.raises(AttributeError):
+        study.reasons = ()
+    assert rk.sweep(ROBOT, PD, PATH, [OFFSET] * 2).reasons == (None, None)
+
+
 @pytest.mark.parametrize("in_process", [False, True])
 def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
     pool = ProcessPoolExecutor(2) if in_process else None
@@ -238,6 +260,7 @@ def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
     assert error.run == 1 and isinstance(error.__cause__, KeyError)
     consistent(error, 100)
     assert error.sweep.failed.tolist() == [False, True, False, True]
+    assert error.sweep.reasons[1] == error.reason and "unstable gain" in error.sweep.reasons[3]
     assert_array_equal(error.sweep.energies[0], rk.simulate(ROBOT, pd, PATH, OFFSET).energy)
     with pytest.raises(rk.SimulationError, match=r"run 0: .*unstable gain") as caught:
         rk.sweep(ROBOT, LAWS[3], PATH, [OFFSET, OFFSET])
@@ -280,6 +303,7 @@ def test_finished_chunks_are_on_the_exception_and_the_rest_is_cancelled(law, err
     part = caught.value.partial
     assert isinstance(part, rk.Sweep) and part.failed.tolist() == [False] * 4 + [True] * 4
     assert part.failure_time.mask.all()  # the others did not fail, they never ran
+    assert part.reasons == (None,) * 4 + ("it had not run when the sweep was stopped",) * 4
     assert_array_equal(part.energies[:4], rk.sweep(ROBOT, law, PATH, offsets[:4]).energies)
     assert part.energies.mask[4:].all()
     assert "4 of 8 runs were finished" in caught.value.__notes__[-1]

@@ -9,15 +9,19 @@ import numpy as np
 from ..control.grammar import BadAnswer
 from .compiled import DONE, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
+from .explain import explain
 from .loop import LAW_FAILED
-from .runs import complete
+from .runs import SimulationError, complete
 from .setup import Setup
 
 NOT_RUN = -1
 
 
 class Columns(NamedTuple):
-    """The columns of a sweep while it is made; `status` is NOT_RUN until a row is known."""
+    """The columns of a sweep while it is made; `status` is NOT_RUN until a row is known.
+
+    reason : what stopped a law in Python, else None.
+    """
 
     energies: np.ndarray
     torque_norm: np.ndarray
@@ -27,11 +31,12 @@ class Columns(NamedTuple):
     largest_path_error: np.ndarray
     failure_time: np.ndarray
     status: np.ndarray
+    reason: np.ndarray
 
     @classmethod
     def blank(cls, k: int, N: int) -> Columns:
         sizes = (k, N), k, k, (k, 2), k, k, k
-        return cls._make([*map(np.zeros, sizes), np.full(k, NOT_RUN)])
+        return cls._make([*map(np.zeros, sizes), np.full(k, NOT_RUN), np.full(k, None)])
 
     @property
     def failed(self) -> np.ndarray:
@@ -55,7 +60,7 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
     fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
     if fast:
         own = list(fast)
-        for column, part in zip(rows, many(setup, list(fast.values()), offsets[own]), strict=True):
+        for column, part in zip(rows[:-1], many(setup, list(fast.values()), offsets[own]), strict=True):
             column[own] = part
     for i in sorted(set(range(len(laws))) - set(fast)):
         try:
@@ -64,12 +69,14 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
             raise
         except Exception as error:
             rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
+            known = isinstance(error, SimulationError)
+            rows.reason[i] = error.reason if known else explain(setup, laws[i], LAW_FAILED, 0, error)
             if not errors:
                 errors[i] = error
         else:
             off = run.path_error
             torques = run.energy, root_mean_square_torque(run), antagonistic_energy(run)
             values = *torques, run.x[-1], np.sqrt(np.mean(off**2)), off.max(), 0.0, DONE
-            for column, value in zip(rows, values, strict=True):
+            for column, value in zip(rows[:-1], values, strict=True):
                 column[i] = value
     return rows, errors

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import having, one_of, real_array, switch, whole_number
+from ..machine.arguments import having, one_of, real_array, short, switch, whole_number
 from ..machine.manipulator import Manipulator, manipulator
-from ..machine.values import Value
+from ..machine.values import Value, default
 from ..mechanics.trajectory import Trajectory
 from .chunks import NOT_RUN, Columns, run_chunk
 from .compiled import DONE, compiled, encode
 from .explain import REASONS
-from .faults import FaultsLike
+from .faults import Fault, FaultsLike, check_faults
 from .loop import own_copy
 from .patience import progress_bar
+from .pools import pool_of
 from .runs import SimulationError, complete, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
@@ -38,6 +38,9 @@ class Sweep(Value):
     x_final : (k, 2) end-effector position at the end, m.
     rms_path_error, largest_path_error : (k,) of `Run.path_error` over the samples, root mean square and maximum, m.
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
+    model, sensors, faults : the controller's own manipulator, how all runs measured but for their offsets, and what was
+        broken.
+    stopped : (k,) in few words what stopped each run, None where nothing did; `reasons` says why.
 
     >>> import rapkm_lite as rk
     >>> study = rk.sweep(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), 1e-3 * np.eye(3))
@@ -57,11 +60,44 @@ class Sweep(Value):
     largest_path_error: np.ndarray
     failed: np.ndarray
     failure_time: np.ndarray
+    model: Manipulator = default(None)
+    sensors: Sensors = default(Sensors())
+    faults: tuple[Fault, ...] = ()
+    stopped: tuple[str | None, ...] = ()
 
     def __post_init__(self):
         for law in self.law if isinstance(self.law, list | tuple) else [self.law]:
             as_law(law)
+        self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
         super().__post_init__()
+        words = self.stopped or tuple("it failed" if failed else None for failed in self.failed)
+        if len(words) != len(self) or not all(word is None or isinstance(word, str) for word in words):
+            raise ValueError(f"stopped = {short(self.stopped)}; allowed: a string or None for each of {len(self)} runs")
+        self._set(stopped=words)
+
+    @cached_property
+    def reasons(self) -> tuple[str | None, ...]:
+        """Why each row is masked, (k,): the `SimulationError.reason` of its run; None where nothing failed.
+
+        Found when asked for, and kept: runs of compiled laws are run once more, some milliseconds each.
+
+        >>> import rapkm_lite as rk; robot = rk.load().replace(friction=0.0)
+        >>> laws = [rk.PD(7.05, 0.225), rk.PD(7.05, 30.0)]
+        >>> study = rk.sweep(robot, laws, rk.hold(robot, [0.0, 0.0], 0.1), [1e-3, 0.0, 0.0], failed="mask")
+        >>> [reason and reason[:46] for reason in study.reasons]
+        [None, 'the machine left the workspace (unstable gain:']
+        """
+        words, begun = list(self.stopped), self.failed & ~np.ma.getmaskarray(self.failure_time)
+        for i in np.flatnonzero(begun):
+            law = self.law[i] if isinstance(self.law, tuple) else self.law
+            if encode(law, self.model) is None:
+                continue  # its own run, in Python, knew why
+            sensors = self.sensors.with_offset(self.offsets[i])
+            try:
+                complete(prepare(self.robot, self.trajectory, sensors, self.model, self.faults), law)
+            except SimulationError as error:
+                words[i] = error.reason
+        return tuple(words)
 
     @property
     def energy(self) -> np.ndarray:
@@ -102,7 +138,8 @@ def sweep(
     offsets : calibration offsets (k, N) in rad, or (N,) for all runs; the other arguments are those of `simulate`.
     executor : any `concurrent.futures` executor to spread the chunks of `chunk` runs; default: one thread per core, or
         one thread and run by run for laws in Python.
-    failed : "raise" raises the error of the first run that fails; "mask" masks the rows of such runs.
+    failed : "raise" raises the error of the first run that fails; "mask" masks the rows of such runs, whose `reasons`
+        the result knows.
     progress : show a bar.
     The numbers do not depend on executor, chunk or the order of the rows, to the last bit.
     Raises ValueError for bad arguments; SimulationError naming the run and the time, with the run up to there as
@@ -122,13 +159,13 @@ def sweep(
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)
-    with _pool(executor, 1 if in_python or not compiled() else os.cpu_count() or 1) as pool:
+    with pool_of(executor, 1 if in_python or not compiled() else os.cpu_count() or 1) as pool:
         try:
             errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
             finished = np.count_nonzero(table.status == DONE)
             if finished:
-                partial = _result(table, robot, law, setup.trajectory, offsets, mask=True)
+                partial = _result(table, setup, law, offsets, mask=True)
                 hand_over(
                     error,
                     partial,
@@ -137,11 +174,11 @@ def sweep(
                 )
             raise
     broken = bool(table.failed.any())
-    result = _result(table, robot, law, setup.trajectory, offsets, mask=failed == "mask" or broken)
+    result = _result(table, setup, law, offsets, mask=failed == "mask" or broken)
     if failed == "raise" and broken:
         i = int(np.argmax(result.failed))
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
-        _raise(i, errors.get(i), own, laws[i], result, int(table.status[i]))
+        _raise(i, errors.get(i), own, laws[i], result)
     return result
 
 
@@ -174,12 +211,12 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
     return errors
 
 
-def _raise(i: int, error, setup: Setup, law, result: Sweep, status: int):
+def _raise(i: int, error, setup: Setup, law, result: Sweep):
     """Raise what stopped run i; what the engine stopped runs once more, for its reason and its samples."""
     if error is None:
         try:
             complete(setup, law)
-            error = SimulationError(result.failure_time[i], REASONS[status])
+            error = SimulationError(result.failure_time[i], result.stopped[i])
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):
@@ -188,49 +225,6 @@ def _raise(i: int, error, setup: Setup, law, result: Sweep, status: int):
         )
         raise error
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
-
-
-@contextmanager
-def _pool(executor: Executor | None, threads: int):
-    """The executor of the caller, or threads of our own, which end with the sweep; none where one is enough."""
-    pool = executor or (ThreadPoolExecutor(threads) if threads > 1 and _threads() else Serial())
-    try:
-        yield pool
-    finally:
-        if executor is None:
-            pool.shutdown(cancel_futures=True)
-
-
-def _threads() -> bool:
-    """Can a thread be started here?"""
-    try:
-        thread = threading.Thread(target=int)
-        thread.start()
-        thread.join()
-        return True
-    except Exception:
-        return False
-
-
-class Serial(Executor):
-    """Does a job when its result is asked for, in the thread that asks."""
-
-    def submit(self, function, *arguments, **named):
-        return Job(function, arguments, named)
-
-
-class Job(Future):
-    """A job of `Serial`."""
-
-    def __init__(self, *job):
-        super().__init__()
-        self._job = job
-
-    def result(self, timeout=None):
-        if not self.done():
-            function, arguments, named = self._job
-            self.set_result(function(*arguments, **named))
-        return super().result(timeout)
 
 
 def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
@@ -250,17 +244,18 @@ def _rows(law, offsets, N: int) -> tuple[list, np.ndarray]:
     return laws if several else laws * k, np.array(np.broadcast_to(offsets, (k, N)))
 
 
-def _result(table: Columns, robot, law, trajectory, offsets, mask: bool) -> Sweep:
+def _result(table: Columns, setup: Setup, law, offsets, mask: bool) -> Sweep:
     """The columns as a study, with the rows masked that are not finished."""
     failed = table.failed
 
     def column(v: np.ndarray) -> np.ndarray:
         return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
+    words = REASONS | {DONE: None, NOT_RUN: "it had not run when the sweep was stopped"}
     return Sweep(
-        robot,
+        setup.robot,
         law,
-        trajectory,
+        setup.trajectory,
         offsets,
         column(table.energies),
         column(table.torque_norm),
@@ -270,4 +265,8 @@ def _result(table: Columns, robot, law, trajectory, offsets, mask: bool) -> Swee
         column(table.largest_path_error),
         failed,
         np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN)),
+        setup.model,
+        setup.sensors,
+        setup.broken,
+        tuple(own or words[status] for own, status in zip(table.reason, table.status.tolist(), strict=True)),
     )
