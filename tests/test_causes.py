@@ -89,7 +89,7 @@ SETS = [
     ("the gains do not hold it", HANGING, rk.PD(0.1, 0.01), HOLD, {}),
     ("law returned None", ROBOT, silent, CIRCLE, {}),
     (r"KeyError: 'the gain table' \(line \d+ of test_causes.py: return gains", ROBOT, raising, CIRCLE, {}),
-    ("returned torques that are not 3 finite numbers|nan; allowed", ROBOT, infinite, CIRCLE, {}),
+    ("inf; allowed: finite numbers", ROBOT, infinite, CIRCLE, {}),
     ("friction is too stiff", ROBOT.replace(friction=1e3, friction_velocity=1e-6), PD, CIRCLE, {}),
 ]
 

@@ -1,5 +1,8 @@
 """Laws that a user compiled: the same torques as in Python, against the textbook layer; memory, filters, studies."""
 
+import linecache
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -115,27 +118,128 @@ def test_values():
         rk.compiled(ctc, memory=-1)
 
 
+table = {"gain": 7.0}
+
+
+def helper(e):
+    return -7.0 * e
+
+
+def words(t, q_a, qd_a, d):
+    return "no torque"
+
+
+def silent(t, q_a, qd_a, d):
+    e = q_a - d.q_a
+    e *= 2.0
+
+
+def outside(t, q_a, qd_a, d):
+    e = q_a - d.q_a
+    return -table["gain"] * e
+
+
+def helped(t, q_a, qd_a, d):
+    return helper(q_a - d.q_a)
+
+
+def undefined(t, q_a, qd_a, d):
+    e = q_a - d.q_a
+    return -unknown_gain * e  # noqa: F821
+
+
+def misspelt(t, q_a, qd_a, d):
+    return -7.0 * (q_a - d.qa)
+
+
+def twofold(t, q_a, qd_a, d):
+    c = 0.0
+    if t > 0.1:
+        c = -7.0 * (q_a - d.q_a)
+    return c
+
+
+def managed(t, q_a, qd_a, d):
+    with np.errstate(all="ignore"):
+        return -7.0 * (q_a - d.q_a)
+
+
+def square(t, q_a, qd_a, d):
+    return np.zeros((3, 3))
+
+
+REFUSED = {
+    words: "it returns a string",
+    silent: "it returns nothing: is a return missing?",
+    outside: 'table is of type dict, line # of test_compiled_law.py: return -table["gain"] * e',
+    helped: "helper is a function that is not compiled, line # of test_compiled_law.py: return helper(q_a - d.q_a)",
+    undefined: "name 'unknown_gain' is not defined, line # of test_compiled_law.py: return -unknown_gain * e",
+    misspelt: "d has no qa, line # of test_compiled_law.py: return -7.0 * (q_a - d.qa)",
+    twofold: "c is once a number and once an array, line # of test_compiled_law.py:",
+    managed: 'such a with statement is not known here, line # of test_compiled_law.py: with np.errstate(all="ignore"):',
+    square: "it returns an array with 2 dimensions",
+}
+
+
 @pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")
-def test_what_does_not_compile_says_so():
-    @rk.compiled
-    def words(t, q_a, qd_a, d):
-        return "no torque"
+@pytest.mark.parametrize("function", REFUSED, ids=lambda function: function.__name__)
+def test_what_does_not_compile_is_one_sentence_with_its_line(function):
+    words = re.escape(REFUSED[function]).replace(r"\#", r"(\d+)")
+    with pytest.raises(ValueError, match=rf"^the law {function.__name__} cannot be compiled \({words}") as caught:
+        rk.simulate(ROBOT, rk.compiled(function), PATH)
+    said = str(caught.value)
+    assert said.isprintable() and "nopython" not in said and "1d" not in said and "float64" not in said
+    assert said.endswith("or the same function without @compiled, which runs in Python")
+    assert type(caught.value.__cause__).__module__.startswith("numba")
+    if r"(\d+)" in words:
+        number = int(re.search(words, said)[1])
+        first = function.__code__.co_firstlineno
+        assert first < number <= first + 4
+        assert said.split(".py: ")[-1].split(")); ")[0].split("); ")[0] in linecache.getline(__file__, number)
 
-    with pytest.raises(ValueError, match=r"the law words cannot be compiled .* without @compiled"):
-        rk.simulate(ROBOT, words, PATH)
 
-    @rk.compiled
-    def short(t, q_a, qd_a, d):
-        return -q_a[:2]
-
-    with pytest.raises(rk.SimulationError, match="not 3 finite numbers"):
-        rk.simulate(ROBOT, short, PATH)
+def test_arguments_are_counted_before_the_run():
+    message = r"the law <lambda> takes \(t, q_a, qd_a\); allowed with at = None and memory = 0: \(t, q_a, qd_a, d\)"
+    with pytest.raises(ValueError, match=message):
+        rk.simulate(ROBOT, rk.compiled(lambda t, q_a, qd_a: -q_a), PATH)
+    with pytest.raises(ValueError, match=r"allowed with at = 'true' and memory = 2: \(t, q_a, qd_a, d, at, memory\)"):
+        rk.simulate(ROBOT, rk.compiled(pid.function, at="true", memory=2), PATH)
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("how", ["raises", "writes beyond the end"])
-def test_a_law_that_raises_is_not_taken_for_one_that_answers(how):
-    """The plain function raises at the same sample, and a run that goes on would hold the last torques."""
+FIRST = {
+    "too short": (lambda t, q_a, qd_a, d: -q_a[:2], r"law returned the shape \(2,\); allowed: \(3,\)"),
+    "too long": (lambda t, q_a, qd_a, d: np.zeros(4), r"law returned the shape \(4,\); allowed: \(3,\)"),
+    "not finite": (lambda t, q_a, qd_a, d: np.full(3, np.nan), r"law\(t = 0.0000 s, ...\)\[0\] = nan; allowed: finite"),
+}
+
+
+@pytest.mark.parametrize("kind", FIRST)
+def test_the_first_answer_is_checked_as_that_of_any_law(kind):
+    function, message = FIRST[kind]
+    for law in (function, rk.compiled(function), rk.AntagonismFilter(rk.compiled(function))):
+        with pytest.raises(ValueError, match=message):
+            rk.simulate(ROBOT, law, PATH)
+        with pytest.raises(ValueError, match=message):
+            rk.sweep(ROBOT, [rk.PD(7.05, 0.225), law], PATH, OFFSET, failed="mask")
+
+
+def test_what_it_raises_at_the_first_sample_belongs_to_the_caller():
+    def law(t, q_a, qd_a, d):
+        if t < 1.0:
+            raise ValueError("mine")
+        return -q_a
+
+    for one in (law, rk.compiled(law)):
+        with pytest.raises(ValueError, match=r"^mine$"):
+            rk.simulate(ROBOT, one, PATH)
+        assert "ValueError: mine (line " in rk.sweep(ROBOT, one, PATH, OFFSET, failed="mask").reasons[0]
+
+
+@pytest.mark.filterwarnings("error")  # nothing is written to the error stream
+@pytest.mark.parametrize("wrapped", [False, True])
+@pytest.mark.parametrize("how", ["raises", "writes beyond the end", "answers nothing finite"])
+def test_a_law_that_raises_says_what_the_plain_function_says(how, wrapped):
+    """Same sample, same reason, same cause; a run that went on would hold the last torques."""
     if how == "raises":
 
         @rk.compiled
@@ -144,22 +248,42 @@ def test_a_law_that_raises_is_not_taken_for_one_that_answers(how):
                 raise ValueError("mine")
             return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
 
-    else:
+    elif how == "answers nothing finite":
 
         @rk.compiled
         def law(t, q_a, qd_a, d):
             c = -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
-            if t > 0.15:
-                c[7] = t
+            return c + np.inf if t > 0.15 else c
+
+    else:
+
+        @rk.compiled(memory=3)
+        def law(t, q_a, qd_a, d, memory):
+            c = -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+            memory[0] += 1.0
+            if memory[0] > 151.5:
+                c[int(memory[0])] = t
             return c
 
+    class Plain(rk.Law):
+        pose = None
+
+        def start(self, model, dt):
+            return np.zeros(3)
+
+        def step(self, memory, sample):
+            own = (memory,) if law.memory else ()
+            return law.function(sample.t, sample.q_a, sample.qd_a, sample.desired, *own), memory
+
+    around = rk.AntagonismFilter if wrapped else lambda law: law
     with pytest.raises(rk.SimulationError, match="law") as plain:
-        rk.simulate(ROBOT, law.function, PATH)
-    with pytest.raises(
-        rk.SimulationError, match="the law law returned torques that are not 3 finite numbers"
-    ) as caught:
-        rk.simulate(ROBOT, law, PATH)
-    assert caught.value.time == plain.value.time
-    assert len(caught.value.partial.t) == len(plain.value.partial.t)
-    study = rk.sweep(ROBOT, law, PATH, np.zeros((2, 3)), failed="mask")
-    assert study.failed.all()
+        rk.simulate(ROBOT, around(Plain()), PATH, OFFSET)
+    with pytest.raises(rk.SimulationError, match="law") as caught:
+        rk.simulate(ROBOT, around(law), PATH, OFFSET)
+    one, other = plain.value, caught.value
+    assert one.time == other.time == PATH.t[151] and one.reason == other.reason
+    assert type(one.__cause__) is type(other.__cause__) and str(one.__cause__) == str(other.__cause__)
+    assert len(one.partial) == len(other.partial) == 151
+    assert_allclose(one.partial.c, other.partial.c, rtol=0, atol=1e-11)
+    study = rk.sweep(ROBOT, around(law), PATH, np.tile(OFFSET, (2, 1)), failed="mask")
+    assert study.failed.all() and study.reasons == (one.reason,) * 2

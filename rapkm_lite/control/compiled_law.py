@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -45,7 +46,27 @@ class CompiledLaw(LawValue):
         return self.function(*arguments)
 
     def start(self, model, dt):
+        self.check()
         return np.zeros(self.memory)
+
+    def check(self) -> None:
+        """Raise ValueError when the function does not take what a run gives it."""
+        given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
+        try:
+            signature = inspect.signature(self.function)
+        except ValueError:
+            return  # built-in functions have none
+        try:
+            signature.bind(*given)
+        except TypeError:
+            raise ValueError(
+                f"the law {self._name} takes {signature}; allowed with at = {self.at!r} and memory = {self.memory}: "
+                f"({', '.join(given)})"
+            ) from None
+
+    @property
+    def _name(self) -> str:
+        return getattr(self.function, "__name__", type(self.function).__name__)
 
     def step(self, memory, sample):
         desired, given = sample.desired, []
@@ -57,7 +78,7 @@ class CompiledLaw(LawValue):
         return self.function(sample.t, sample.q_a, sample.qd_a, desired, *given), memory
 
     def __repr__(self):
-        return f"compiled({self.function.__name__}, at={self.at!r}, memory={self.memory})"
+        return f"compiled({self._name}, at={self.at!r}, memory={self.memory})"
 
 
 def compiled(function=None, *, at: str | None = None, memory: int = 0):
@@ -70,8 +91,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
-    What it raises ends the run as torques that are not finite do; Numba writes the exception to the error stream.
-    Without Numba, and inside laws that run in Python, the function is called as it is.
+    Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it
+    raised, when it gave no finite torques, from the start of the run to there.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.
 
     >>> import rapkm_lite as rk

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
+from inspect import isfunction
 from typing import Any
 
 import numpy as np
+
+from .refusal import refusal
 
 Wanted = namedtuple("Wanted", "x xd xdd q qd qdd q_a qd_a qdd_a")
 Matrices = namedtuple("Matrices", "F F_dot A J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv")
@@ -28,13 +31,12 @@ def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
 def pointer(function, N: int, matrices: bool, memory: int):
     """The law ``function(t, q_a, qd_a, d[, at][, memory]) -> c`` as a C function of the buffer.
 
-    Raises ValueError with the compiler's first words when it does not compile.
+    Raises ValueError with a sentence on what is not allowed when it does not compile.
     """
     from numba import cfunc, njit, types
-    from numba.core.errors import NumbaError
 
     # What the user writes stays inside its arrays.
-    law: Any = njit(function, error_model="numpy", boundscheck=True)
+    law: Any = njit(error_model="numpy", boundscheck=True)(function) if isfunction(function) else function
     ask: Any = law
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)
@@ -86,27 +88,31 @@ def pointer(function, N: int, matrices: bool, memory: int):
     at_hand = matrices_of if matrices else nothing
 
     def call(buffer):
-        # A law that raises leaves the call without a word, and no answer.
+        # A law that raises gives no answer; what it raised is found by running it in Python.
         for i in range(N):
             buffer[answer + i] = np.nan
-        c = ask(
-            buffer[0],
-            buffer[1 : 1 + N],
-            buffer[1 + N : 1 + 2 * N],
-            wanted(buffer),
-            at_hand(buffer),
-            buffer[kept : kept + memory],
-        )
-        for i in range(N):
-            # An answer of another length is none.
-            buffer[answer + i] = c[i] if len(c) == N else np.nan
+        try:
+            c = ask(
+                buffer[0],
+                buffer[1 : 1 + N],
+                buffer[1 + N : 1 + 2 * N],
+                wanted(buffer),
+                at_hand(buffer),
+                buffer[kept : kept + memory],
+            )
+            for i in range(N):
+                # An answer of another length is none.
+                buffer[answer + i] = c[i] if len(c) == N else np.nan
+        except Exception:
+            pass
 
     try:
         return cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
-    except NumbaError as error:
-        lines = [line.strip() for line in str(error).splitlines()]
-        words = next((line for line in lines if "Error" in line or "No " in line), lines[0])
+    except Exception as error:
+        found = [signature.return_type for signature in getattr(law, "nopython_signatures", ())]
+        words = refusal(function, error, found[0] if found else None)
+        name = getattr(function, "__name__", type(function).__name__)
         raise ValueError(
-            f"the law {function.__name__} cannot be compiled ({words}); allowed: a function of numbers and NumPy "
-            f"arrays that returns c ({N},), or the same function without @compiled, which runs in Python"
+            f"the law {name} cannot be compiled ({words}); allowed: a function of numbers and NumPy arrays that "
+            f"returns c ({N},), or the same function without @compiled, which runs in Python"
         ) from error

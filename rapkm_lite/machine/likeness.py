@@ -26,7 +26,7 @@ def equal(a: Any, b: Any, begun: frozenset = frozenset()) -> bool:
         return _equal_arrays(a, b)
     if (isinstance(a, tuple) and isinstance(b, tuple)) or type(a) is type(b) is list:
         return len(a) == len(b) and all(equal(x, y, begun) for x, y in zip(a, b, strict=True))
-    if type(a) is type(b) is dict:
+    if isinstance(a, dict) and type(a) is type(b):
         return a.keys() == b.keys() and all(equal(a[name], b[name], begun) for name in a)
     if _decides(a):
         try:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.grammar import BadAnswer
-from .compiled import DONE, compiled, encode, many
+from .compiled import DONE, SINGULAR, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import explain
 from .loop import LAW_FAILED
@@ -62,7 +62,9 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
         own = list(fast)
         for column, part in zip(rows[:-1], many(setup, list(fast.values()), offsets[own]), strict=True):
             column[own] = part
-    for i in sorted(set(range(len(laws))) - set(fast)):
+    # A first answer that does not fit is the caller's, and a compiled law cannot say what is wrong with it.
+    mute = {i for i, code in fast.items() if code.user and rows.status[i] == SINGULAR and rows.failure_time[i] == 0.0}
+    for i in sorted(set(range(len(laws))) - set(fast) | mute):
         try:
             run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
         except BadAnswer:

@@ -173,6 +173,7 @@ def _user(law: CompiledLaw | None, N: int):
         return None, tables.plain(np.empty(0)), tables.NOTHING
     from ..engine.pointer import places, pointer
 
+    law.check()
     matrices = law.at is not None
     buffer = np.zeros(places(N, matrices, law.memory)[-1])
     asks = tables.NOTHING if not matrices else tables.DESIRED if law.at == "desired" else tables.POSED

@@ -45,7 +45,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         return too_stiff(setup)
     written = _written_by_user(law)
     if status == SINGULAR and written is not None:
-        # What a compiled function raises does not leave it; Numba writes it to the error stream.
+        # In Python it did neither; what a compiled function raises does not leave it.
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, k, written is None), "look at gains, offsets and the path")
@@ -204,13 +204,8 @@ def _steadies(setup: Setup, law, k: int, factor: float | None) -> bool:
 
 def _runs(setup: Setup, law, k: int) -> bool:
     """Does this run go on well beyond sample k?"""
-    trajectory = setup.trajectory.for_robot(setup.model)
-    rows = slice(k + k // 2 + 100)
-    motion = {name: getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
-    faults = setup.faults
-    if faults is not None:
-        faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
-    setup = setup._replace(trajectory=dataclasses.replace(trajectory, robot=setup.model, **motion), faults=faults)
+    trajectory = dataclasses.replace(setup.trajectory.for_robot(setup.model), robot=setup.model)
+    setup = setup._replace(trajectory=trajectory).begin(k + k // 2 + 100)
     try:
         code = encode(law, setup.model)
         outcome = closed_loop(setup, law)[0] if code is None else single(setup, code)

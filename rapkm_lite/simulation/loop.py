@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import copy
 
+import numpy as np
+
 from ..control.sample import Controller, NoPose
 from .compiled import DONE, NO_POSE, Plant
 from .sensors import Encoders
@@ -65,3 +67,16 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
             raise
         return Outcome(LAW_FAILED, k, *history), error
     return Outcome(DONE, last, *history), None
+
+
+def again_in_python(setup: Setup, law, outcome: Outcome) -> tuple[Outcome, BaseException | None]:
+    """How a run ended in which a compiled law gave no finite torques, and what the law raised in Python there.
+
+    The compiled law cannot say it, so the same run is repeated up to there; at the first sample the law belongs to the
+    caller, as in `closed_loop`.
+    """
+    with np.errstate(all="ignore"):
+        again, cause = closed_loop(setup.begin(outcome.sample + 1), law)
+    if again.status == LAW_FAILED and again.sample == outcome.sample:
+        return outcome._replace(status=LAW_FAILED), cause
+    return outcome, None if isinstance(cause, Exception) else cause

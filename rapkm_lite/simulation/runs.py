@@ -16,11 +16,11 @@ from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
 from ..mechanics.trajectory import Trajectory
-from .compiled import DONE, LEFT_WORKSPACE, TOO_STIFF, encode, single
+from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
 from .energy import electric_energy
 from .explain import explain
 from .faults import Fault, FaultsLike, check_faults
-from .loop import closed_loop, own_copy
+from .loop import again_in_python, closed_loop, own_copy
 from .patience import patience
 from .sensors import Sensors
 from .setup import Outcome, Setup, friction_steps, prepare
@@ -201,6 +201,8 @@ def complete(setup: Setup, law) -> Run:
     with patience(text=words) if steps > MANY_STEPS else nullcontext():
         if code is not None:
             outcome = single(setup, code)
+            if code.user is not None and outcome.status == SINGULAR:
+                outcome, cause = again_in_python(setup, law, outcome)
         else:
             law = own_copy(law)
             outcome, cause = closed_loop(setup, law)

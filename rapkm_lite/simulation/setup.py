@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from typing import NamedTuple
@@ -29,6 +30,14 @@ class Setup(NamedTuple):
     sensors: Sensors
     faults: FaultTable | None
     broken: tuple[Fault, ...] = ()
+
+    def begin(self, samples: int) -> Setup:
+        """The first samples of the run, two at least."""
+        path, faults, rows = self.trajectory, self.faults, slice(max(samples, 2))
+        motion = {name: getattr(path, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
+        if faults is not None:
+            faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
+        return self._replace(trajectory=dataclasses.replace(path, **motion), faults=faults)
 
 
 class Outcome(NamedTuple):

@@ -87,11 +87,9 @@ class Sweep(Value):
         >>> [reason and reason[:46] for reason in study.reasons]
         [None, 'the machine left the workspace (unstable gain:']
         """
-        words, begun = list(self.stopped), self.failed & ~np.ma.getmaskarray(self.failure_time)
-        for i in np.flatnonzero(begun):
+        words = list(self.stopped)
+        for i in np.flatnonzero([word in REASONS.values() for word in words]):  # what ran in Python knows why
             law = self.law[i] if isinstance(self.law, tuple) else self.law
-            if encode(law, self.model) is None:
-                continue  # its own run, in Python, knew why
             sensors = self.sensors.with_offset(self.offsets[i])
             try:
                 complete(prepare(self.robot, self.trajectory, sensors, self.model, self.faults), law)
@@ -216,7 +214,7 @@ def _raise(i: int, error, setup: Setup, law, result: Sweep):
     if error is None:
         try:
             complete(setup, law)
-            error = SimulationError(result.failure_time[i], result.stopped[i])
+            error = SimulationError(result.failure_time[i], str(result.stopped[i]))
         except SimulationError as found:
             error = found
     if not isinstance(error, SimulationError):

@@ -1,0 +1,86 @@
+"""Why a law does not compile, in one sentence: the compiler's words without its colours, names of steps and types."""
+
+from __future__ import annotations
+
+import dis
+import linecache
+import re
+from pathlib import Path
+
+# What Numba says, what is said instead; the first that fits.
+_WORDS = (
+    (r"name '(\w+)': Cannot determine Numba type of <class 'function'>", r"\1 is a function that is not compiled"),
+    (r"name '(\w+)': Cannot determine Numba type of <class '(?:\w+\.)*(\w+)'>", r"\1 is of type \2"),
+    (r"NameError: (name '\w+' is not defined)", r"\1"),
+    (r"Unknown attribute '(\w+)' of type (.+)", r"\2 has no \1"),
+    (r"Cannot unify (.+) and (.+) for '([^.'$]+)(?:\.\d+)?'", r"\3 is once \1 and once \2"),
+    (r"unsupported NumPy function '([\w.]+)'", r"\1 is not known here"),
+    (r"No implementation of function [^\0]*?>>> (.+)", r"\1 is not known here"),
+    (r"Unsupported context manager", "such a with statement is not known here"),
+    (r"(?:Use of )?(.+ not supported yet|unsupported opcode \(\w+\))", r"\1"),
+    (r"The decorated object is not a function", "it is not a function"),
+)
+_TYPES = (
+    (r"Wanted\([^()]*(?:\([^()]*\)[^()]*)*\)", "d"),
+    (r"Matrices\(.*\)", "at"),
+    (r"[Aa]rray\(\w+, (\d)d, \w+(?:, [^()]*)?\)", "an array"),
+    (r"Literal\[int\]\((.*?)\)", r"\1"),
+    (r"Literal\[str\]\(.*?\)|unicode_type", "a string"),
+    (r"\b(?:float|int|uint)\d+\b", "a number"),
+    (r"\bcomplex\d+\b", "a complex number"),
+    (r"\b(?:reflected )?list\(.*\)", "a list"),
+    (r"\bnone\b", "nothing"),
+)
+
+
+def refusal(function, error: Exception, answer=None) -> str:
+    """The sentence on a law that does not compile; `answer` is the type it returns, where that was still found."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    return f"{_what(text) if answer is None else _returned(answer)}{_where(function, text)}"
+
+
+def _what(text: str) -> str:
+    for pattern, words in _WORDS:
+        found = re.search(pattern, text)
+        if found:
+            return _plain(found.expand(words))
+    lines = [line.strip() for line in text.splitlines()]
+    return _plain(next((line for line in lines if line and not line.startswith("Failed in")), "no reason given"))[:160]
+
+
+def _plain(words: str) -> str:
+    for pattern, plain in _TYPES:
+        words = re.sub(pattern, plain, words)
+    return words
+
+
+def _returned(answer) -> str:
+    """What it returns instead of torques."""
+    kind = str(answer)
+    if kind == "none":
+        return "it returns nothing: is a return missing?"
+    if "generator" in kind:
+        return "it yields: a return is needed"
+    size = re.match(r"array\((\w+), (\d)d", kind)
+    if size and "complex" in kind:
+        return "it returns complex numbers"
+    return f"it returns an array with {size[2]} dimensions" if size else f"it returns {_plain(kind)[:60]}"
+
+
+def _where(function, text: str) -> str:
+    """The line of the user's file that the compiler stopped at, as far as it is known."""
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return ""
+    undefined = re.search(r"NameError: name '(\w+)' is not defined", text)
+    lines = [int(n) for file, n in re.findall(_PLACE, text) if Path(file).name == Path(code.co_filename).name]
+    if undefined:
+        marks = (step.positions.lineno for step in dis.get_instructions(function) if step.argval == undefined[1])
+        lines = [line for line in marks if line is not None]
+    if not lines:
+        return ""
+    line = linecache.getline(code.co_filename, lines[0]).strip()
+    return f", line {lines[0]} of {Path(code.co_filename).name}{f': {line}' if line else ''}"
+
+
+_PLACE = r"""(?:File "|Raised from |at )([^"\n]+?)(?:", line | \()(\d+)"""
