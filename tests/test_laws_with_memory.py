@@ -229,6 +229,37 @@ def test_weighted_filter_makes_the_least_heat_at_the_same_force():
         rk.AntagonismFilter(PD, W=-1.0)
 
 
+class Watch(rk.Law):
+    """Holds the path by its angles, and keeps what it measures and where it believes to be."""
+
+    def __init__(self):
+        self.rows = []
+
+    def step(self, memory, sample):
+        self.rows.append((sample.q_a, *sample.pose()))
+        e, ed = sample.errors()
+        return -7.05 * e - 0.225 * ed, memory
+
+
+@pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms", "asymmetric"])
+@pytest.mark.parametrize(("offset", "encoder"), [(4e-3, None), (0.3, None), (4e-3, 500)])
+def test_the_measured_pose_is_the_least_squares_pose_of_the_model(name, offset, encoder):
+    """A^T (q_a - q_a(x)) = 0 at the minimum; where Newton's steps do not serve, `estimate_pose` does (0.3 rad)."""
+    robot = rk.load(name)
+    model = robot.replace(lengths=1.01 * robot.lengths)
+    signs = np.where(np.arange(robot.n_arms) % 2, -offset, offset)
+    path = rk.hold(robot, [0.01, 0.02], 0.02)
+    law = rk.simulate(robot, Watch(), path, signs, encoder, model).law
+    assert len(law.rows) == len(path)
+    for q_a, q, qd in law.rows:
+        x = rk.forward_kinematics(model, q)
+        A, N = rk.control_matrix(model, q), robot.n_arms
+        assert np.abs(rk.loop_constraints(model, q)).max() < 1e-14
+        assert_allclose(A.T @ (q_a - q[:N]), 0.0, atol=1e-12)
+        assert_allclose(q, rk.estimate_pose(model, q_a, x), rtol=0, atol=1e-13)
+        assert_allclose(qd[:N], A @ np.linalg.lstsq(A, qd[:N], rcond=None)[0], atol=1e-12)
+
+
 def test_a_bare_law_finds_no_pose():
     """A law that does not ask for a pose does not care that the angles fit none."""
     far = 2.5 * np.array([1.0, -1.0, 1.0])

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
 from ..machine.manipulator import Manipulator, manipulator
-from ..mechanics.actuation import control_matrix
+from ..mechanics.at import at
 from ..mechanics.closure import estimate_pose
-from ..mechanics.kinematics import ee_complement, forward_kinematics, inverse_kinematics
+from ..mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
 from .grammar import as_law, ask, coordinates, measured
 
@@ -66,8 +69,8 @@ class Sample:
             return None, None
         if source not in self._found:
             one_of("pose", source, ("measured", "true"))
-            q, xd = self._true() if source == "true" else self._measured()
-            qd = matvec(ee_complement(self.model, q), xd)
+            here, xd = self._true() if source == "true" else self._measured()
+            q, qd = here.q.copy(), matvec(here.F, xd)
             q.setflags(write=False)
             qd.setflags(write=False)
             self._found[source] = q, qd
@@ -77,17 +80,20 @@ class Sample:
         if self._truth is None:
             raise ValueError("truth = None for a law with pose = 'true'; allowed: the true motion (x, xd)")
         x, xd = self._truth
-        return inverse_kinematics(self.model, x), np.asarray(xd, dtype=float)
+        return at(self.model, inverse_kinematics(self.model, x)), np.asarray(xd, dtype=float)
 
     def _measured(self):
         model, keeper = self.model, self._keeper
-        try:
-            q = estimate_pose(model, self.q_a, self.desired.x if keeper.x is None else keeper.x)
-        except ConvergenceError as error:
-            raise NoPose(str(error)) from error
-        keeper.x = forward_kinematics(model, q)
-        A = control_matrix(model, q)
-        return q, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
+        guess = self.desired.x if keeper.x is None else keeper.x
+        keeper.x = None if keeper.nearest is None else keeper.nearest(self.q_a, guess)
+        if keeper.x is None:
+            try:
+                keeper.x = forward_kinematics(model, estimate_pose(model, self.q_a, guess))
+            except ConvergenceError as error:
+                raise NoPose(str(error)) from error
+        here = at(model, inverse_kinematics(model, keeper.x))
+        A = here.A
+        return here, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
 
 
 class Controller:
@@ -99,6 +105,9 @@ class Controller:
     dt : sampling time in s.
     Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
 
+    nearest : a faster way than `estimate_pose` from angles and guess to the end-effector position, or None; it may
+        answer None.
+
     >>> import rapkm_lite as rk
     >>> robot = rk.load()
     >>> path, controller = rk.hold(robot, [0.0, 0.0]), Controller(rk.PD(7.0, 0.2), robot)
@@ -108,7 +117,8 @@ class Controller:
 
     def __init__(self, law, model: Manipulator, dt: float = 1e-3):
         self.law, self.model, self.dt = law, manipulator(model, "model"), positive_number("dt", dt)
-        self.x: np.ndarray | None = None
+        self.x: ArrayLike | None = None
+        self.nearest: Callable[..., tuple[float, float] | None] | None = None
         self.memory = as_law(law).start(model, self.dt)
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .jit import leaf, outlined
+from .jit import kernel, leaf, outlined
 from .leaves import geometry, pose_terms, solve2
 from .rows import *
 from .tables import *
@@ -137,6 +137,19 @@ def single_newton(drives, arms, w, tolerance):
             break
         x, y = x + sx, y + sy
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
+
+
+@kernel
+def nearest(drives, arms, w, q_a, x, y):
+    """Least-squares pose of measured base angles (N,) from a guess, for a controller in Python; and was it found?"""
+    W = len(arms)
+    for i in range(W):
+        angle = q_a[min(i, len(drives) - 1)]
+        w[(MOTION + COS) * W + i], w[(MOTION + SIN) * W + i] = math.cos(angle), math.sin(angle)
+        w[E * W + i] = 0.0
+    w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] = x, y, 0.0
+    single_newton(drives, arms, w, 1e-13 / w[(MODEL + SCALE) * W])
+    return w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] + w[of(TODO, 0, W, 1)] == 0.0
 
 
 @outlined

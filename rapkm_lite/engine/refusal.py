@@ -75,8 +75,8 @@ def _where(function, text: str) -> str:
     undefined = re.search(r"NameError: name '(\w+)' is not defined", text)
     lines = [int(n) for file, n in re.findall(_PLACE, text) if Path(file).name == Path(code.co_filename).name]
     if undefined:
-        marks = (step.positions.lineno for step in dis.get_instructions(function) if step.argval == undefined[1])
-        lines = [line for line in marks if line is not None]
+        marks = (step.positions for step in dis.get_instructions(function) if step.argval == undefined[1])
+        lines = [mark.lineno for mark in marks if mark is not None and mark.lineno is not None]
     if not lines:
         return ""
     line = linecache.getline(code.co_filename, lines[0]).strip()

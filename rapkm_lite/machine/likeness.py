@@ -24,16 +24,15 @@ def equal(a: Any, b: Any, begun: frozenset = frozenset()) -> bool:
     begun |= {(id(a), id(b))}
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return _equal_arrays(a, b)
-    if (isinstance(a, tuple) and isinstance(b, tuple)) or type(a) is type(b) is list:
-        return len(a) == len(b) and all(equal(x, y, begun) for x, y in zip(a, b, strict=True))
-    if isinstance(a, dict) and type(a) is type(b):
-        return a.keys() == b.keys() and all(equal(a[name], b[name], begun) for name in a)
+    if isinstance(a, list | tuple | dict) and isinstance(b, list | tuple | dict):
+        return _equal_items(a, b, begun)
     if _decides(a):
         try:
-            return bool(a == b) or (isinstance(a, float) and bool(a != a and b != b))
+            return bool(a == b) or bool(isinstance(a, float) and a != a and b != b)
         except Exception:
             pass  # such as the truth of an array
-    return type(a) is type(b) and _equal_parts(_parts(a), _parts(b), begun)
+    parts = _parts(a) if type(a) is type(b) else None
+    return parts is not None and equal(parts, _parts(b), begun)
 
 
 def key(value: Any) -> Any:
@@ -72,6 +71,15 @@ def _equal_arrays(a, b) -> bool:
         return False
 
 
+def _equal_items(a, b, begun) -> bool:
+    """Tuples of whatever kind; lists and dictionaries of the same kind."""
+    if not (isinstance(a, tuple) and isinstance(b, tuple)) and type(a) is not type(b):
+        return False
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(equal(a[name], b[name], begun) for name in a)
+    return len(a) == len(b) and all(equal(x, y, begun) for x, y in zip(a, b, strict=True))
+
+
 def _decides(value) -> bool:
     """Has its class an ``__eq__`` that is more than the identity, or than that of a dataclass, which arrays break?"""
     if isinstance(value, type | types.ModuleType):
@@ -80,10 +88,6 @@ def _decides(value) -> bool:
         return False
     made = getattr(type(value), "__dataclass_params__", None)
     return made is None or not made.eq
-
-
-def _equal_parts(a, b, begun) -> bool:
-    return a is not None and equal(a, b, begun)
 
 
 def _parts(value) -> tuple | None:

@@ -54,17 +54,8 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
 
     A function of values only, so that any executor can send it to another process.
     """
-    # Without a compiler nothing runs side by side, and sums are sooner made at the end of a run.
-    codes = {id(law): encode(law, setup.model) if compiled() else None for law in laws}
     rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
-    fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
-    if fast:
-        own = list(fast)
-        for column, part in zip(rows[:-1], many(setup, list(fast.values()), offsets[own]), strict=True):
-            column[own] = part
-    # A first answer that does not fit is the caller's, and a compiled law cannot say what is wrong with it.
-    mute = {i for i, code in fast.items() if code.user and rows.status[i] == SINGULAR and rows.failure_time[i] == 0.0}
-    for i in sorted(set(range(len(laws))) - set(fast) | mute):
+    for i in _alone(setup, laws, offsets, rows):
         try:
             run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
         except BadAnswer:
@@ -82,3 +73,17 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
             for column, value in zip(rows[:-1], values, strict=True):
                 column[i] = value
     return rows, errors
+
+
+def _alone(setup: Setup, laws: list, offsets: np.ndarray, rows: Columns) -> list[int]:
+    """Enter the rows of compiled laws, side by side; returns which rows have to run alone, in Python."""
+    # Without a compiler nothing runs side by side, and sums are sooner made at the end of a run.
+    codes = {id(law): encode(law, setup.model) if compiled() else None for law in laws}
+    fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
+    own = list(fast)
+    if fast:
+        for column, part in zip(rows[:-1], many(setup, list(fast.values()), offsets[own]), strict=True):
+            column[own] = part
+    # A first answer that does not fit is the caller's, and a compiled law cannot say what is wrong with it.
+    mute = {i for i in own if fast[i].user and rows.status[i] == SINGULAR and rows.failure_time[i] == 0.0}
+    return sorted(set(range(len(laws))) - set(fast) | mute)

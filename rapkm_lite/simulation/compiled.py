@@ -202,17 +202,20 @@ def _motion(trajectory, width: int, count: int, part: slice):
 
 
 class Plant:
-    """The machine alone, for a controller in Python; a state is (x, y, vx, vy)."""
+    """The machine alone, for a controller in Python, and its pose in the model; a state is (x, y, vx, vy)."""
 
-    def __init__(self, robot, trajectory):
+    def __init__(self, robot, trajectory, model=None):
         from ..engine import rows
+        from ..engine.pose import nearest
         from ..engine.single import advance, observe
 
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
+        self._nearest, self._drives = nearest, tables.sizes(robot.n_arms)
         W = tables.width(robot.n_arms, True)
         work = tables.aligned(rows.BLOCKS * W + rows.SINGLES)
         table, environment = _made_for(robot, W, _arms)
         work[: rows.MODEL * W] = table.ravel()
+        work[rows.MODEL * W : 2 * rows.MODEL * W] = _made_for(model or robot, W, _arms)[0].ravel()
         start = rows.BLOCKS * W + rows.GRAVITY_X
         work[start : start + rows.ENVIRONMENT] = environment
         self._w, self._arms = tables.plain(work), tables.sizes(W)
@@ -230,6 +233,18 @@ class Plant:
         q, qd = np.empty(self._N), np.empty(self._N)
         self._observe(self._arms, self._extra, self._table[k], *state, self._w, q, qd)
         return q, qd
+
+    def nearest(self, q_a: np.ndarray, guess) -> tuple[float, float] | None:
+        """End-effector position whose base angles in the model are nearest to q_a (N,), as `estimate_pose` finds it.
+
+        None where Newton's steps from the guess lead nowhere, or where the angles fit badly.
+        """
+        try:
+            with patience("pose", self._drives, self._arms):
+                x, y, found = self._nearest(self._drives, self._arms, self._w, q_a, *guess)
+        except (ArithmeticError, ValueError):
+            return None
+        return (x, y) if found else None
 
     def hold(self, state, c: np.ndarray, dt: float):
         """The state after the torques c (N,) were held for dt; None when the machine was lost: `status` says how."""

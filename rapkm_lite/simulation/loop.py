@@ -38,8 +38,9 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
     """
     robot, model, trajectory, sensors, faults, _ = setup
-    plant, encoders = Plant(robot, trajectory), Encoders(sensors, faults, trajectory.dt)
+    plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
     controller = Controller(law, model, trajectory.dt)
+    controller.nearest = plant.nearest
     x, xd, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
     times, dt = trajectory.t.tolist(), trajectory.dt
     state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
