@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.explain import growth
+from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
 HANGING = ROBOT.replace(gravity=[0.0, -9.81])
@@ -92,6 +94,37 @@ SETS = [
     ("inf; allowed: finite numbers", ROBOT, infinite, CIRCLE, {}),
     ("friction is too stiff", ROBOT.replace(friction=1e3, friction_velocity=1e-6), PD, CIRCLE, {}),
 ]
+
+
+FOUR = rk.load("four_arms").replace(friction=0.0)
+HOLD_FOUR = rk.hold(FOUR, [0.02, 0.03], 2.0)
+UNSTABLE = "unstable gain K_I = .* of the integral: .*; without an integral it is not lost"
+SETS += [
+    (UNSTABLE, FOUR, rk.PID(7.0, 1e5, 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
+    (UNSTABLE, FOUR, rk.PID(7.0, [1e3, 2e3, 1e3, 1e3], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
+    (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
+    ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
+    ("DeadDrive", HANGING, rk.PID(20.0, 10.0, 0.4), HOLD, fault(*(rk.DeadDrive(i, 0.1) for i in range(3)))),
+]
+
+
+@pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
+def test_growth_of_an_integral_against_routh(name):
+    """m s^3 + K_D s^2 + K_P s + K_I has its roots in the left half plane for K_I < K_P K_D / m and no longer.
+
+    At rest and without friction, equal gains decouple the motion into two such, m the eigenvalues of
+    (A^T A)^-1 Gbar; sampling at 10 kHz shifts that by less than a hundredth.
+    """
+    robot = rk.load(name).replace(friction=0.0)
+    path = rk.hold(robot, [0.02, 0.03], 0.01, dt=1e-4)
+    at = rk.at(robot, path.q[0])
+    mass = np.linalg.eigvals(np.linalg.solve(at.A.T @ at.A, at.F.T @ at.G @ at.F)).real.max()
+    bound = 7.0 * 0.2 / mass
+    setup = prepare(robot, path, rk.Sensors())
+    for around in (lambda law: law, rk.AntagonismFilter):
+        factors = [growth(setup, around(rk.PID(7.0, part * bound, 0.2)), 0) for part in (0.5, 0.98, 1.02, 2.0)]
+        # What only prestresses is integrated and moves nothing: the factor of that is one.
+        assert max(factors[:2]) < 1.0 + 1e-9 and 1.0 + 1e-6 < factors[2] < factors[3]
 
 
 @pytest.mark.parametrize(("cause", "robot", "law", "path", "options"), SETS, ids=range(len(SETS)))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from ..control.grammar import BadAnswer, coordinates
+from ..control.grammar import BadAnswer, as_law, coordinates
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 from ..control.sample import Controller
 from ..machine.arguments import short
@@ -97,6 +97,7 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
     if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
         yield f"the controller's model has {wrong}; with the machine's own it is not lost"
     yield from _broken(setup, law, k, begun)
+    yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, k)
     if factor is not None and factor > 1.05:
         yield (
@@ -120,11 +121,23 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
             yield f"{_words(fault)}; without that it is not lost"
     if len(begun) > 1 and _runs(_with(setup, []), law, k):
         yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
-    inner = getattr(law, "law", law)
+    inner = _inner(law)
     if isinstance(inner, PID) and np.isfinite(inner.limit).any():
-        free = dataclasses.replace(inner, limit=math.inf)
-        if _runs(setup, free if inner is law else dataclasses.replace(law, law=free), k):
+        if _runs(setup, _replaced(law, limit=math.inf), k):
             yield f"the law's own limit of {inner.limit.min():g} N m; without it it is not lost"
+
+
+def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
+    """An integral gain beyond what K_P and K_D hold (Routh: K_I < K_P K_D / m for a mass m), or a wound-up integral."""
+    inner = _inner(law)
+    if isinstance(inner, PID) and np.any(inner.K_I) and _runs(setup, _replaced(law, K_I=0.0), k):
+        words = f"K_I = {short(inner.K_I.tolist())} of the integral, which winds up"
+        if factor is not None and factor > 1.0 + 1e-6:
+            words = (
+                f"unstable gain K_I = {short(inner.K_I.tolist())} of the integral: near the desired state the sampled "
+                f"loop magnifies an error {factor:.5g}-fold per sample of {setup.trajectory.dt:g} s"
+            )
+        yield f"{words}; without an integral it is not lost"
 
 
 def _singular(setup: Setup, law, k: int) -> Iterator[str]:
@@ -230,22 +243,37 @@ def _name(law) -> str:
 def growth(setup: Setup, law, k: int) -> float | None:
     """Factor per sample by which the sampled loop magnifies a small error near the desired state of sample k.
 
-    The spectral radius of the linearized map from one sample to the next, with ideal sensors, a healthy machine and a
-    law that remembers nothing yet; None where there is none.
+    The spectral radius of the linearized map of the state, and of the integral of a law that has one, from one sample
+    to the next, with ideal sensors, a healthy machine and a law that remembers nothing yet; None where there is none.
     """
     robot, model, trajectory = setup[:3]
     plant, dt, desired = Plant(robot, trajectory), trajectory.dt, trajectory[k]
-    centre = np.concatenate([trajectory.x[k], trajectory.xd[k]])
+    start = as_law(law).start(model, dt)
+    integral = start if isinstance(_inner(law), PID) else np.zeros(0)
+    centre = np.concatenate([trajectory.x[k], trajectory.xd[k], integral])
     step, columns = 1e-6, []
 
     def following(state):
-        q, qd = plant.observe(k, state)
-        c = Controller(law, model, dt).command(trajectory.t[k], q, qd, desired, (state[:2], state[2:]))
-        return np.array(plant.hold(state, c, dt))
+        controller, (x, xd, memory) = Controller(law, model, dt), np.split(state, (2, 4))
+        controller.memory = memory if len(memory) else start
+        q, qd = plant.observe(k, state[:4])
+        c = controller.command(trajectory.t[k], q, qd, desired, (x, xd))
+        return np.append(plant.hold(state[:4], c, dt), controller.memory if len(memory) else memory)
 
     try:
-        for direction in step * np.eye(4):
+        for direction in step * np.eye(len(centre)):
             columns.append((following(centre + direction) - following(centre - direction)) / (2 * step))
         return float(np.max(np.abs(np.linalg.eigvals(np.array(columns)))))
     except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
         return None
+
+
+def _inner(law):
+    """The law within a filter, or the law itself."""
+    return getattr(law, "law", law)
+
+
+def _replaced(law, **changes):
+    """A law with changes to the law within its filter, or to itself."""
+    inner = dataclasses.replace(_inner(law), **changes)
+    return inner if law is _inner(law) else dataclasses.replace(law, law=inner)
