@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
-from rapkm_lite.simulation.explain import growth
+from rapkm_lite.simulation.growth import growth
 from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
@@ -83,6 +83,7 @@ SETS = [
     ("unstable gain", ROBOT, rk.CTC(100.0, 5000.0), CIRCLE, {"offset": OFFSET}),
     ("unstable gain", ROBOT, rk.AntagonismFilter(rk.PD(1e4, 0.225)), CIRCLE, {"offset": OFFSET, "encoder": 2000}),
     ("unstable gain", ROBOT, rk.RedundantCTC(9e6, 60.0), CIRCLE, {"offset": OFFSET}),
+    ("encoder = 6 counts per turn are 1 rad each", ROBOT, rk.AntagonismFilter(mine), TRIANGLE, {"encoder": 6}),
     ("encoder = 4 counts", ROBOT, TASK, TRIANGLE, {"encoder": 4}),
     ("encoder = 5 counts", ROBOT, FILTER, TRIANGLE, {"encoder": 5}),
     ("drives 2 and 3", ROBOT, rk.CTC(900.0, 60.0, (1, 2)), TRIANGLE, {"offset": OFFSET}),
@@ -98,11 +99,12 @@ SETS = [
 
 FOUR = rk.load("four_arms").replace(friction=0.0)
 HOLD_FOUR = rk.hold(FOUR, [0.02, 0.03], 2.0)
-UNSTABLE = "unstable gain K_I = .* of the integral: .*; without an integral it is not lost"
+UNSTABLE = "unstable gain K_I = .* of the integral: .*; without it it is not lost"
 SETS += [
     (UNSTABLE, FOUR, rk.PID(7.0, 1e5, 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, FOUR, rk.PID(7.0, [1e3, 2e3, 1e3, 1e3], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
+    ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
     ("DeadDrive", HANGING, rk.PID(20.0, 10.0, 0.4), HOLD, fault(*(rk.DeadDrive(i, 0.1) for i in range(3)))),
 ]

@@ -15,14 +15,14 @@ import numpy as np
 
 from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
-from ..control.grammar import BadAnswer, as_law, coordinates
+from ..control.grammar import BadAnswer, coordinates
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
-from ..control.sample import Controller
 from ..machine.arguments import short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
-from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, Plant, encode, single
+from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
 from .faults import Fault, TorqueLimit, blank_table
+from .growth import growth, inner_law
 from .loop import closed_loop
 from .setup import Setup
 
@@ -88,10 +88,7 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
     t, wrong = float(setup.trajectory.t[k]), _difference(setup.model, setup.robot)
     begun = sorted((fault for fault in setup.broken if _begin(fault) <= t), key=_begin)
     if not ours:
-        # Without repeating it: a model that is far off was so from the start, a fault since it began.
-        yield from [f"the controller's model has {wrong}"] if _far_off(setup.model, setup.robot) else []
-        yield from map(_words, begun)
-        yield from [f"{_offsets(setup)}, is large"] if np.abs(setup.sensors.offset).max() > 0.1 else []
+        yield from _seen(setup, begun)
         return
     factor = growth(setup, law, k)
     if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
@@ -99,7 +96,7 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
     yield from _broken(setup, law, k, begun)
     yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, k)
-    if factor is not None and factor > 1.05:
+    if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
         yield (
             f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
             f"sample of {setup.trajectory.dt:g} s"
@@ -114,6 +111,18 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
         )
 
 
+def _seen(setup: Setup, begun: list[Fault]) -> Iterator[str]:
+    """Without repeating the run: a model that is far off was so from the start, a fault since it began."""
+    if _far_off(setup.model, setup.robot):
+        yield f"the controller's model has {_difference(setup.model, setup.robot)}"
+    yield from map(_words, begun)
+    if np.abs(setup.sensors.offset).max() > 0.1:
+        yield f"{_offsets(setup)}, is large"
+    count = setup.sensors.count
+    if count is not None and count > 0.1:
+        yield f"encoder = {setup.sensors.encoder} counts per turn are {count:.2g} rad each"
+
+
 def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
     """Faults that have begun, the first one first, and a limit of the law's own."""
     for fault in begun:
@@ -121,23 +130,20 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
             yield f"{_words(fault)}; without that it is not lost"
     if len(begun) > 1 and _runs(_with(setup, []), law, k):
         yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
-    inner = _inner(law)
+    inner = inner_law(law)
     if isinstance(inner, PID) and np.isfinite(inner.limit).any():
         if _runs(setup, _replaced(law, limit=math.inf), k):
             yield f"the law's own limit of {inner.limit.min():g} N m; without it it is not lost"
 
 
 def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
-    """An integral gain beyond what K_P and K_D hold (Routh: K_I < K_P K_D / m for a mass m), or a wound-up integral."""
-    inner = _inner(law)
-    if isinstance(inner, PID) and np.any(inner.K_I) and _runs(setup, _replaced(law, K_I=0.0), k):
-        words = f"K_I = {short(inner.K_I.tolist())} of the integral, which winds up"
-        if factor is not None and factor > 1.0 + 1e-6:
-            words = (
-                f"unstable gain K_I = {short(inner.K_I.tolist())} of the integral: near the desired state the sampled "
-                f"loop magnifies an error {factor:.5g}-fold per sample of {setup.trajectory.dt:g} s"
-            )
-        yield f"{words}; without an integral it is not lost"
+    """An integral gain beyond what K_P and K_D hold; Routh: K_I < K_P K_D / m for a mass m."""
+    inner, grows = inner_law(law), factor is not None and factor > 1.0 + 1e-6
+    if grows and isinstance(inner, PID) and np.any(inner.K_I) and _runs(setup, _replaced(law, K_I=0.0), k):
+        yield (
+            f"unstable gain K_I = {short(inner.K_I.tolist())} of the integral: near the desired state the sampled loop "
+            f"magnifies an error {factor:.5g}-fold per sample of {setup.trajectory.dt:g} s; without it it is not lost"
+        )
 
 
 def _singular(setup: Setup, law, k: int) -> Iterator[str]:
@@ -240,40 +246,7 @@ def _name(law) -> str:
     return getattr(getattr(law, "function", law), "__name__", None) or short(law)
 
 
-def growth(setup: Setup, law, k: int) -> float | None:
-    """Factor per sample by which the sampled loop magnifies a small error near the desired state of sample k.
-
-    The spectral radius of the linearized map of the state, and of the integral of a law that has one, from one sample
-    to the next, with ideal sensors, a healthy machine and a law that remembers nothing yet; None where there is none.
-    """
-    robot, model, trajectory = setup[:3]
-    plant, dt, desired = Plant(robot, trajectory), trajectory.dt, trajectory[k]
-    start = as_law(law).start(model, dt)
-    integral = start if isinstance(_inner(law), PID) else np.zeros(0)
-    centre = np.concatenate([trajectory.x[k], trajectory.xd[k], integral])
-    step, columns = 1e-6, []
-
-    def following(state):
-        controller, (x, xd, memory) = Controller(law, model, dt), np.split(state, (2, 4))
-        controller.memory = memory if len(memory) else start
-        q, qd = plant.observe(k, state[:4])
-        c = controller.command(trajectory.t[k], q, qd, desired, (x, xd))
-        return np.append(plant.hold(state[:4], c, dt), controller.memory if len(memory) else memory)
-
-    try:
-        for direction in step * np.eye(len(centre)):
-            columns.append((following(centre + direction) - following(centre - direction)) / (2 * step))
-        return float(np.max(np.abs(np.linalg.eigvals(np.array(columns)))))
-    except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
-        return None
-
-
-def _inner(law):
-    """The law within a filter, or the law itself."""
-    return getattr(law, "law", law)
-
-
 def _replaced(law, **changes):
     """A law with changes to the law within its filter, or to itself."""
-    inner = dataclasses.replace(_inner(law), **changes)
-    return inner if law is _inner(law) else dataclasses.replace(law, law=inner)
+    inner = dataclasses.replace(inner_law(law), **changes)
+    return inner if law is inner_law(law) else dataclasses.replace(law, law=inner)

@@ -1,0 +1,44 @@
+"""How a sampled loop lets small errors grow or shrink, near the desired state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..control.grammar import as_law
+from ..control.laws import PID
+from ..control.sample import Controller
+from .compiled import Plant
+from .setup import Setup
+
+
+def growth(setup: Setup, law, k: int) -> float | None:
+    """Factor per sample by which the sampled loop magnifies a small error near the desired state of sample k.
+
+    The spectral radius of the linearized map of the state, and of the integral of a law that has one, from one sample
+    to the next, with ideal sensors, a healthy machine and a law that remembers nothing yet; None where there is none.
+    """
+    robot, model, trajectory = setup[:3]
+    plant, dt, desired = Plant(robot, trajectory), trajectory.dt, trajectory[k]
+    start = as_law(law).start(model, dt)
+    integral = start if isinstance(inner_law(law), PID) else np.zeros(0)
+    centre = np.concatenate([trajectory.x[k], trajectory.xd[k], integral])
+    step, columns = 1e-6, []
+
+    def following(state):
+        controller, (x, xd, memory) = Controller(law, model, dt), np.split(state, (2, 4))
+        controller.memory = memory if len(memory) else start
+        q, qd = plant.observe(k, state[:4])
+        c = controller.command(trajectory.t[k], q, qd, desired, (x, xd))
+        return np.append(plant.hold(state[:4], c, dt), controller.memory if len(memory) else memory)
+
+    try:
+        for direction in step * np.eye(len(centre)):
+            columns.append((following(centre + direction) - following(centre - direction)) / (2 * step))
+        return float(np.max(np.abs(np.linalg.eigvals(np.array(columns)))))
+    except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
+        return None
+
+
+def inner_law(law):
+    """The law within a filter, or the law itself."""
+    return getattr(law, "law", law)
