@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fminbound
 
 import rapkm_lite as rk
 
@@ -169,8 +169,281 @@ def numbers() -> list[Number]:
         Number("06", "energy by the form at (4, -2, 5) mrad, J", lambda: OFFSET @ small() @ OFFSET, RUN),
         Number("07", "via points every 3.75 mm, rad", lambda: gap(64), 1e-6, "0.11"),
         Number("07", "inherent antagonism at 1 kHz, share", _inherent(frictionless), 1e-3, "0.1 % of the energy"),
+        *calibration(),
+        *allocation(),
+        *imperfections(),
+        *controllers(),
+        *another_machine(),
     ]
     return rows
+
+
+def calibration() -> list[Number]:
+    """Lesson 08: what places and torques tell of the offsets."""
+    rng = np.random.default_rng(7)
+    angle, reach = rng.uniform(0, 2 * np.pi, 24), np.sqrt(rng.uniform(0, 1, 24))
+    disc = reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
+
+    def null_vectors(x):
+        return rk.null_vector(robot(), rk.inverse_kinematics(robot(), x))
+
+    def three(radius, turn):
+        """Condition of three places on a circle, the first at `turn` degrees."""
+        angle = np.radians(turn + np.array([0.0, 120.0, 240.0]))
+        return np.linalg.cond(null_vectors(radius * np.stack([np.cos(angle), np.sin(angle)], -1)))
+
+    def rounding(radius):
+        """Standard deviation in rad of the worst offset from 24 rests: that of a count is its size over sqrt(12)."""
+        eta = null_vectors(radius * disc)
+        return 2 * np.pi / 2000 / np.sqrt(12) * np.sqrt(np.linalg.inv(eta.T @ eta).diagonal().max())
+
+    def by_torques():
+        """Error in rad of the offsets that the torques at rest show, one gain being other than it is said to be."""
+        log = rk.mystery_run("gain")
+        rests = np.linalg.norm(np.gradient(log.q_a, log.t, axis=0), axis=1) < 1e-9
+        eta = rk.null_vector(robot(), rk.estimate_pose(robot(), log.q_a[rests], np.zeros((rests.sum(), 2))))
+        shown = np.linalg.lstsq(eta, -np.sum(eta * log.c[rests], axis=1) / 7.05, rcond=None)[0]
+        return np.abs(shown - rk.calibrate(robot(), log).offset).max()
+
+    def unseen():
+        q_a = rk.inverse_kinematics(robot(), 0.1 * disc)[:, :3] + OFFSET
+        return float(15 - rk.calibrate(robot(), q_a, "all").rank)
+
+    return [
+        Number("08", "three places on 120 mm, condition", lambda: three(0.12, 0), EXACT, "from 8.6 to 1.4"),
+        Number("08", "the same, turned by 60 degrees", lambda: three(0.12, 60), EXACT, "from 8.6 to 1.4"),
+        Number("08", "three places on 137 mm, least condition", lambda: three(0.137, 65), EXACT, "reach 1.01"),
+        Number("08", "24 rests, small disc, worst offset, rad", lambda: rounding(0.03), EXACT, "4 mrad in the small"),
+        Number("08", "24 rests, large disc, worst offset, rad", lambda: rounding(0.12), EXACT, "0.7 mrad"),
+        Number("08", "offsets from torques, wrong gain, rad", by_torques, 1e-6, "wrong by 1.6 mrad"),
+        Number("08", "unknowns that stay unseen", unseen, EXACT, "Of 15 unknowns"),
+    ]
+
+
+def allocation() -> list[Number]:
+    """Lesson 09: the carriage, the workspace, the hot drive."""
+    limit = 0.085
+    free = functools.cache(lambda: robot().replace(friction=0.0))
+    carriage = functools.cache(lambda: free().replace(load=0.7))
+    up = functools.cache(lambda: rk.polygon(carriage(), [[0, -0.06], [0, 0.06]], duration=2.0, dt=5e-3))
+    ctc = rk.CTC(400.0, 40.0, independent=None)
+
+    def demanded():
+        return np.abs(rk.inverse_dynamics(carriage(), up().q, up().qd, up().qdd)[:, 0]).max()
+
+    def clipped():
+        return rk.simulate(carriage(), ctc, up(), faults=[rk.TorqueLimit(limit)]).path_error.max()
+
+    def heat():
+        run = rk.simulate(carriage(), ctc, up())
+        return rk.copper_loss(run.robot, run.c[:-1], run.dt).sum()
+
+    def dearer(allocate):
+        """Heat of a rule over that of the least size, for the exact torques at every fourth sample."""
+        A = rk.control_matrix(carriage(), up().q)
+        f = rk.required_wrench(carriage(), up().q, up().qd, up().qdd)
+        least = rk.inverse_dynamics(carriage(), up().q, up().qd, up().qdd)
+        c = np.array([allocate(*pair) for pair in zip(A[::4], f[::4], strict=True)])
+        return np.sum(c**2) / np.sum(least[::4] ** 2)
+
+    @functools.cache
+    def everywhere():
+        x, y, inside = rk.workspace_grid(robot(), 201)
+        places = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+        return rk.control_matrix(robot(), rk.inverse_kinematics(robot(), places))
+
+    def conditions(rows):
+        large, small = rk.singular_values(everywhere()[:, rows]).T
+        return large / small
+
+    def area():
+        """Area of all forces over that of the rule of least size, by Gauss's formula and by rays."""
+        x, y = rk.force_polygon(at().A, limit).T
+        angle = np.linspace(0, 2 * np.pi, 20000, endpoint=False)
+        way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        reach = limit / np.abs(way @ rk.weighted_pseudoinverse(at().A).T).max(axis=1)
+        return np.abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 / (np.mean(reach**2) * np.pi)
+
+    def hot(weighted):
+        odd = free().replace(resistance=[0.05, 0.05, 3.0])
+        W, motion = odd.resistance / odd.torque_constant**2, rk.triangle(odd)
+        c = rk.inverse_dynamics(odd, motion.q, motion.qd, motion.qdd, W=W if weighted else None)
+        return rk.copper_loss(odd, c[:-1], motion.dt).sum()
+
+    def softer():
+        """Stiffness in N/m that a prestress of 1 N m along the null vector takes away in the centre."""
+        n = rk.null_basis(at().A)[:, 0]
+        before, after = (rk.endeffector_stiffness(robot(), at().q, 7.05, mu * n)[0, 0] for mu in (0.0, 1.0))
+        return abs(before - after)
+
+    return [
+        Number("09", "largest torque of drive 1 for 0.7 kg, N m", demanded, EXACT, "112 mN m"),
+        Number("09", "error of the clipped run, m", clipped, RUN, "1.3 mm, sixty times"),
+        Number("09", "heat without limits, J", heat, RUN, "12.3 J"),
+        Number(
+            "09",
+            "heat within the limits over the least",
+            lambda: dearer(lambda A, f: rk.allocate_torques(A, f, limit)),
+            1e-6,
+            "rises by 7 %",
+        ),
+        Number("09", "heat of the least peak over the least", lambda: dearer(rk.minimax_torques), 1e-6, "17 %"),
+        Number("09", "area of forces over that of least size", area, 1e-6, "4 / 3"),
+        Number(
+            "09", "share of the workspace with one sign", lambda: rk.common_sign(everywhere()).mean(), 1e-6, "56 % of"
+        ),
+        Number(
+            "09", "condition of a fixed pair, 95 %", lambda: np.percentile(conditions([0, 1]), 95), 1e-6, "of 22 that"
+        ),
+        Number("09", "heat of least size, J", lambda: hot(False), EXACT, "1.52 J against 2.98 J"),
+        Number("09", "heat of least heat, J", lambda: hot(True), EXACT, "1.52 J against 2.98 J"),
+        Number("09", "stiffness for a prestress, 1/m", softer, EXACT, "17.2 N/m for each N m"),
+    ]
+
+
+def imperfections() -> list[Number]:
+    """Lesson 10: links that are not those of the drawing, and drives that die."""
+    drawing = functools.cache(lambda: robot().replace(friction=0.0))
+    place = np.array([0.03, 0.02])
+    pd = rk.PD(7.05, 0.225)
+
+    def longer(eps, machine=drawing):
+        return machine().replace(lengths=(1 + eps) * machine().lengths)
+
+    def control(machine, x=place):
+        return rk.control_matrix(machine, rk.inverse_kinematics(machine, x))
+
+    def still_fights():
+        return np.linalg.norm(rk.prestress_projector(control(longer(1e-3))) @ rk.antagonism_filter(control(drawing())))
+
+    def leak():
+        motion = rk.triangle(drawing())
+        force = control(longer(1e-3), motion.x).mT @ rk.null_vector(drawing(), motion.q)[..., None]
+        return np.linalg.norm(force, axis=1).max()
+
+    def fight(K_P):
+        wanted = rk.inverse_kinematics(drawing(), place)[:3]
+        return K_P * (wanted - rk.estimate_pose(longer(1e-2), wanted, place)[:3])
+
+    def left(K_P):
+        share = np.linalg.norm(rk.weighted_pseudoinverse(control(drawing())), axis=1)
+        return np.min((0.12 - np.abs(fight(K_P))) / share)
+
+    def dead(eps, law):
+        motion = rk.triangle(drawing(), side=0.12, duration=2.5)
+        run = rk.simulate(longer(eps, robot), law, motion, model=drawing(), faults=rk.DeadDrive(0, 0.5))
+        return run.path_error.max()
+
+    filtered = rk.AntagonismFilter(pd)
+    return [
+        Number(
+            "10", "share that the filter leaves, links 0.1 % longer", still_fights, EXACT, "two parts in ten thousand"
+        ),
+        Number("10", "leak of a prestress, links 0.1 % longer, 1/m", leak, EXACT, "10 mN for each N m"),
+        Number("10", "fight, links 1 % longer, N m", lambda: _size(fight(7.05)), 1e-6),
+        Number("10", "force left at 15 N m/rad, N", lambda: left(15.0), 1e-4, "almost no force is left"),
+        Number("10", "drive 1 dead, filter, m", lambda: dead(0.0, filtered), RUN, "lag by 13 mm"),
+        Number("10", "drive 1 dead, PD, links 0.5 % longer, m", lambda: dead(5e-3, pd), RUN, "9 mm at +5 ‰"),
+        Number("10", "drive 1 dead, PD, links 0.5 % shorter, m", lambda: dead(-5e-3, pd), RUN, "17 mm at −5 ‰"),
+        Number("10", "drive 1 dead, filter, 0.5 % longer, m", lambda: dead(5e-3, filtered), RUN, "12 to 14 mm"),
+        Number("10", "drive 1 dead, filter, 0.5 % shorter, m", lambda: dead(-5e-3, filtered), RUN, "12 to 14 mm"),
+    ]
+
+
+def controllers() -> list[Number]:
+    """Lesson 11: laws that are equally fast, 5 Hz at the centroid."""
+    w = 10 * np.pi
+    small = functools.cache(lambda: rk.triangle(robot(), 0.12, 2.5))
+
+    @functools.cache
+    def pull():
+        """A^T A over the inertia at the centroid, in 1/(kg m^2): squares of frequencies for springs of 1 N m/rad."""
+        inertia = rk.minimal_dynamics(robot(), at().q, 0 * at().q, None)[0]
+        return np.linalg.solve(inertia, at().A.T @ at().A)
+
+    @functools.cache
+    def raced(name):
+        gain = 2 / np.trace(pull())
+        laws = {
+            "PD": rk.PD(gain * w**2, gain * 2 * w),
+            "CTC": rk.CTC(w**2, 2 * w, None),
+            "switched": rk.SwitchedCTC(w**2, 2 * w),
+        }
+        return rk.simulate(robot(), laws[name], small(), OFFSET)
+
+    def rms(name):
+        return np.sqrt(np.mean(raced(name).path_error ** 2))
+
+    return [
+        Number("11", "frequency of PD, centroid, Hz", lambda: np.sqrt(_top_of(pull()) * 7.05) / (2 * np.pi), EXACT),
+        Number("11", "gains that (29) must be raised by", lambda: 1 / _centroid_gain(), EXACT, "7/3"),
+        Number("11", "mean miss of computed torque, m", lambda: rms("CTC"), RUN, "0.84 mm"),
+        Number("11", "largest miss of PD, m", lambda: raced("PD").path_error.max(), RUN, "2 mm it is"),
+        Number("11", "antagonistic energy of PD, J", lambda: rk.antagonistic_energy(raced("PD")), RUN, "2.4 J on"),
+        Number("11", "largest jump of the switched law, N m", lambda: _jump(raced("switched")), RUN, "over 50 mN m"),
+    ]
+
+
+def another_machine() -> list[Number]:
+    """Lesson 12: the platform on four legs, from what SymPy derives, and the testbed with a load."""
+
+    @functools.cache
+    def legs():
+        from rapkm_lite.lessons.lesson12 import four_rrr
+
+        return four_rrr, four_rrr.four_rrr(), four_rrr.with_pose()
+
+    def pressed():
+        legs4, machine, _ = legs()
+        A = rk.complement(machine.J(legs4.angles([0, 0, 0])), independent=(0, 1, 2))[:4]
+        return 40 * abs(rk.null_basis(A)[:, 0] @ (1e-3 * np.array([4, -2, 5, -3])))
+
+    def apex():
+        """Angle of the platform in rad at which the four distal links meet in one point."""
+        legs4, machine, _ = legs()
+
+        def weakest(angle):
+            return np.linalg.svd(rk.projector(machine.J(legs4.angles([0, 0, angle])))[:4])[1][2]
+
+        return fminbound(weakest, 0.5, 0.7, xtol=1e-10)
+
+    def condition(length):
+        legs4, _, loops = legs()
+        J = loops.J(np.r_[legs4.angles([0, 0, 0]), 0.0, 0.0, 0.0])
+        return np.linalg.cond(rk.complement(J, independent=(9, 10, 11))[:4] / [1, 1, length])
+
+    def effective_on_circle():
+        legs4, machine, _ = legs()
+        F = rk.complement(machine.J(legs4.swing(dt=2e-3).q), independent=(0, 1, 2))
+        return np.linalg.eigvals(rk.effective_gain(F, np.diag([1.0] * 4 + [0.0] * 5))).real.min(axis=-1)
+
+    def carried():
+        heavy = robot().replace(load=0.5, friction=0.0)
+        motion = rk.triangle(heavy)
+        return np.abs(rk.inverse_dynamics(heavy, motion.q, motion.qd, motion.qdd)).max()
+
+    def wasted():
+        heavy = robot().replace(load=0.5)
+        return rk.antagonistic_energy(rk.simulate(heavy, rk.PD(7.05, 0.225), rk.triangle(heavy), OFFSET))
+
+    return [
+        Number("12", "fight of four offsets, K_P = 40 N m/rad, N m", pressed, EXACT),
+        Number("12", "angle at which all four let go, rad", apex, 1e-6, "0.59724 rad"),
+        Number("12", "condition in metres", lambda: condition(1.0), EXACT, '(7, "in SI units")'),
+        Number("12", "condition in millimetres", lambda: condition(1e-3), EXACT, "141, in millimetres"),
+        Number("12", "lowest effective gain on the circle", lambda: effective_on_circle().min(), 1e-6, "0.03 to 0.18"),
+        Number("12", "highest of the lowest gains", lambda: effective_on_circle().max(), 1e-6, "0.03 to 0.18"),
+        Number("12", "torque of the testbed with 0.5 kg, N m", carried, EXACT, "75 mN m"),
+        Number("12", "antagonism of the testbed with 0.5 kg, J", wasted, RUN, "wastes 3.3 J"),
+    ]
+
+
+def _top_of(matrix):
+    return np.linalg.eigvals(matrix).real.max()
+
+
+def _jump(run):
+    return np.abs(np.diff(run.c, axis=0)).max()
 
 
 def _top(matrix):
