@@ -2,52 +2,14 @@
 
 import re
 
+import hypothesis
 import numpy as np
 import pytest
+from drawn import machines, motion, scaled, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import rapkm_lite as rk
-
-hypothesis = pytest.importorskip("hypothesis")
-from hypothesis import strategies as st  # noqa: E402
-
-settings = hypothesis.settings(max_examples=40, deadline=None, derandomize=True, database=None)
-
-
-@st.composite
-def machines(draw, friction=False):
-    """A machine and an inner pose: its arms are hung on a point that each of them reaches with a bend."""
-    N, rng = draw(st.integers(2, 6)), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    x = rng.uniform(-0.3, 0.3, 2)
-    lengths = rng.uniform(0.1, 0.3, (N, 2))
-    elbow = rng.uniform(0.4, np.pi - 0.4, N) * rng.choice([-1, 1], N)
-    base_angle = np.sort(rng.uniform(0.0, 2 * np.pi, N)) + np.arange(N) * 0.1
-    link = base_angle + elbow
-    a = lengths[:, :1] * np.stack([np.cos(base_angle), np.sin(base_angle)], -1)
-    d = lengths[:, 1:] * np.stack([np.cos(link), np.sin(link)], -1)
-    robot = rk.Manipulator(
-        base=x - a - d,
-        lengths=lengths,
-        masses=rng.uniform(0.05, 0.5, (N, 2)),
-        centers=lengths * rng.uniform(0.2, 0.8, (N, 2)),
-        inertias=rng.uniform(1e-4, 2e-3, (N, 2)),
-        rotor_inertia=rng.uniform(0.0, 1e-5, N),
-        friction=rng.uniform(0.0, 0.01, N) if friction else 0.0,
-        gravity=rng.normal(0.0, 5.0, 2),
-        load=rng.uniform(0.0, 0.3),
-        mode=np.sign(elbow),
-    )
-    q = rk.inverse_kinematics(robot, x)
-    hypothesis.assume(np.linalg.svd(rk.control_matrix(robot, q), compute_uv=False)[-1] > 0.5)
-    return robot, x, q, rng
-
-
-def motion(robot, q, rng):
-    """Rates and accelerations on V, and those of the end-effector."""
-    xd, xdd = rng.normal(0, 0.3, 2), rng.normal(0, 2.0, 2)
-    F = rk.orthogonal_complement(robot, q)
-    qd = F @ xd
-    return xd, xdd, qd, F @ xdd + rk.orthogonal_complement_dot(robot, q, qd) @ xd
 
 
 @settings
@@ -114,17 +76,7 @@ def test_length_mass_and_time_scale(drawn, length, mass):
     """The torques of the same motion, s times as large with m times the mass, are m s^2 times as large; ranks stay."""
     robot, x, q, rng = drawn
     _, _, qd, qdd = motion(robot, q, rng)
-    big = rk.Manipulator(
-        base=robot.base * length,
-        lengths=robot.lengths * length,
-        masses=robot.masses * mass,
-        centers=robot.centers * length,
-        inertias=robot.inertias * mass * length**2,
-        rotor_inertia=robot.rotor_inertia * mass * length**2,
-        gravity=robot.gravity * length,
-        load=robot.load * mass,
-        mode=robot.mode,
-    )
+    big = scaled(robot, length, mass)
     c = rk.inverse_dynamics(robot, q, qd, qdd)
     assert_allclose(
         rk.inverse_dynamics(big, q, qd, qdd), mass * length**2 * c, atol=1e-8 * mass * length**2 * (1 + np.abs(c).max())
