@@ -4,6 +4,9 @@ Draws places in the rooms mechanics, control and simulation, changes one thing a
 number, a sign, a truth value) in a copy of the package, and runs the fast tests that come by that line: which ones
 those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.  Words
 of errors and docstrings are left alone; changes that change nothing stand with their reason in ``equivalents.txt``.
+
+Exit status 1 when less than nine tenths of the changes that change something are noticed (``--least`` another share),
+or when there were none.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("mechanics", "control", "simulation")
+LEAST = 0.9
 KNOWN = Path(__file__).with_name("equivalents.txt")
 SWAPS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.GtE, ast.LtE: ast.Gt,
@@ -251,13 +255,14 @@ def equivalents() -> dict[str, str]:
     return {name.strip(): reason.strip() for name, reason in (line.rsplit(" | ", 1) for line in lines)}
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=1e6, help="draw no more mutants after that time")
     parser.add_argument("--modules", nargs="*", default=[], help="change these only, such as calibration")
     parser.add_argument("--tests", nargs="*", default=[], help="run these files only, such as test_calibration")
+    parser.add_argument("--least", type=float, default=LEAST, help="share that has to be noticed, or exit status 1")
     given = parser.parse_args()
     end = time.monotonic() + 60.0 * given.minutes
     survivors, equal, judged, reasons = [], [], 0, equivalents()
@@ -301,7 +306,13 @@ def main() -> None:
     real = judged - len(equal)
     print(f"{real - len(survivors)} of {real} killed; {len(survivors)} survive:", *survivors, sep="\n")
     print(f"{len(equal)} more change nothing:", *equal, sep="\n")
+    return 0 if enough(real - len(survivors), real, given.least) else 1
+
+
+def enough(noticed: int, real: int, least: float = LEAST) -> bool:
+    """Were so many of the changes noticed as have to be?"""
+    return real > 0 and noticed >= least * real
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
