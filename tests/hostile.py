@@ -174,6 +174,7 @@ OTHER: dict[tuple[str, str], Any] = {
     **{(name, "low"): 1.0 for name in ("slider", "log_slider")},
     **{(name, "high"): 9.0 for name in ("slider", "log_slider")},
     **{(name, "frames"): 12 for name in ("film_force_polygon", "film_three_lines")},
+    **{(name, "frames"): 4 for name in ("film_filter", "film_loops", "film_mirror", "film_workshop")},
     **{(name, "ax"): plt.figure().add_subplot() for name in ("lines_per_drive", "plane_axes")},
     ("plot_lyapunov", "rate"): 0.5,
     ("choice", "value"): "a", ("switch", "value"): True, ("draw_machine", "names"): True, ("Picture", "setup"): None,

@@ -13,7 +13,11 @@ from ..machine.manipulator import Manipulator
 
 
 def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
-    """A slider; whole numbers when all four are.  The label names the unit."""
+    """A slider; whole numbers when all four are.  The label names the unit.
+
+    >>> slider("offset in mrad", -10, 10, 1, 4).value
+    4
+    """
     _within(low, high, value)
     positive_number("step", step)
     whole = all(isinstance(v, int) for v in (low, high, step, value))
@@ -23,7 +27,11 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 
 
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
-    """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`."""
+    """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`.
+
+    >>> round(log_slider("K_P in N m/rad", 0.1, 100.0, 7.05).value, 2)
+    7.05
+    """
     positive_number("low", low)
     _within(low, high, value)
     step = math.log10(high / low) / whole_number("steps", steps, 1)
@@ -34,7 +42,11 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
 
 
 def choice(label: str, options, value=None) -> widgets.Widget:
-    """A drop-down list of words, or of (word, value) pairs."""
+    """A drop-down list of words, or of (word, value) pairs.
+
+    >>> choice("drive", ["1", "2", "3"]).value
+    '1'
+    """
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
         raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
     options = list(options)
@@ -46,12 +58,21 @@ def choice(label: str, options, value=None) -> widgets.Widget:
 
 
 def switch(label: str, value: bool = False) -> widgets.Widget:
-    """A box to tick."""
+    """A box to tick.
+
+    >>> switch("filter").value
+    False
+    """
     return widgets.Checkbox(value, description=label, indent=False, **_common())
 
 
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
-    """One slider per drive, offset_1, offset_2, ..., in mrad."""
+    """One slider per drive, offset_1, offset_2, ..., in mrad.
+
+    >>> import rapkm_lite as rk
+    >>> sorted(offset_sliders(rk.load(), [4, -2, 5]))
+    ['offset_1', 'offset_2', 'offset_3']
+    """
     return {
         f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(v))
         for i, v in enumerate((tuple(values) * robot.n_arms)[: robot.n_arms])

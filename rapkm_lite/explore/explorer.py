@@ -83,6 +83,9 @@ class Explorer:
 
     controls : name -> widget.  picture : the `Picture`.  numbers : name -> text of the last step.
     problem : the sentence shown instead of a result, or "".  made : the call that makes it, in `code`.
+
+    >>> from rapkm_lite import explore; explore.machine().set(x=0).code
+    'explore.machine().set(x=0)'
     """
 
     def __init__(self, draw, controls: dict, picture: Picture, play: str | None, live: bool, about: str = ""):
@@ -95,8 +98,7 @@ class Explorer:
         maker = getattr(sys.modules[draw.__module__], self.name, draw)
         self.about = about or (inspect.getdoc(draw) or inspect.getdoc(maker) or "").split("\n")[0]
         self._defaults = self._first = self.values
-        self.made, self.problem, self._told = "explorer", "", {}
-        self._held, self._watched, self._slow = False, False, 0
+        self.made, self.problem, self._told, self._held, self._watched, self._slow = "explorer", "", {}, False, False, 0
         named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
         self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, **named})
         self.canvas.on_msg(lambda _, content, buffers: self._message(content))
@@ -161,8 +163,7 @@ class Explorer:
         said = widgets.HTML(f"<p>{answer}</p>", layout={"display": "none"})
         show.observe(lambda change: setattr(said.layout, "display", "block" if change["new"] else "none"), "value")
         beside = widgets.VBox([bar, show, said], layout={"flex": "0 0 300px"})
-        body = widgets.HBox([beside, canvas])
-        self.widget.children = [widgets.HTML(f"<h2>{question}</h2>"), body]
+        self.widget.children = [widgets.HTML(f"<h2>{question}</h2>"), widgets.HBox([beside, canvas])]
         self.widget.add_class("rapkm-screen")
         return self
 
@@ -173,8 +174,7 @@ class Explorer:
     def update(self) -> None:
         """Draw the present setting; a setting that cannot be computed is explained in the picture."""
         self.picture.begin()
-        self.problem = ""
-        start = time.perf_counter()
+        self.problem, start = "", time.perf_counter()
         try:
             self.numbers = self.draw(self.picture, **self.values) or {}
         except (ValueError, SimulationError, ConvergenceError) as error:

@@ -34,7 +34,11 @@ OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, k
 
 @ready_made
 def imperfections(robot: Manipulator | None = None) -> Explorer:
-    """Distance from the path and torques that act, with links too long, weak drives and one fault."""
+    """Distance from the path and torques that act, with links too long, weak drives and one fault.
+
+    >>> imperfections().set(longer=0).numbers["largest torque"]
+    '59 mN m'
+    """
     robot = load() if robot is None else robot
     path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
 
@@ -68,7 +72,11 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
 @ready_made
 def controller_choice(robot: Manipulator | None = None) -> Explorer:
-    """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders."""
+    """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders.
+
+    >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
+    '1.22 mm'
+    """
     robot = frictionless(robot)
     path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), 2.5, centre=robot.base.mean(axis=0))
     q = path.q[0]
@@ -107,7 +115,11 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
 
 @ready_made
 def own_machine(robot: Manipulator | None = None) -> Explorer:
-    """A machine in the middle of the triangle, the torques that move it, and those that offsets only press."""
+    """A machine in the middle of the triangle, the torques that move it, and those that offsets only press.
+
+    >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
+    '3.58 J'
+    """
     robot = frictionless(robot)
     N, middle = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - middle

@@ -26,7 +26,11 @@ LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command fo
 
 @ready_made
 def decentralized_run(robot: Manipulator | None = None) -> Explorer:
-    """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1."""
+    """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1.
+
+    >>> decentralized_run().set(filter="force form (16)").numbers["largest torque"]
+    '37 mN m'
+    """
     robot = frictionless(robot)
     N = robot.n_arms
     friction = robot.friction if np.any(robot.friction) else load().friction[0]
@@ -83,7 +87,11 @@ SCALE, UNIT = 0.4, 0.25
 
 @ready_made
 def animation(robot: Manipulator | None = None) -> Explorer:
-    """The machine moves along the triangle; arrows are the forces of the drives at the end-effector."""
+    """The machine moves along the triangle; arrows are the forces of the drives at the end-effector.
+
+    >>> animation().set(filter="force form (16)").numbers["torque that moves nothing"]
+    '0.1 mN m'
+    """
     robot = frictionless(robot)
     N = robot.n_arms
     path = triangle(robot)
@@ -147,7 +155,11 @@ WAYS = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle":
 
 @ready_made
 def via_points(robot: Manipulator | None = None) -> Explorer:
-    """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press."""
+    """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
+
+    >>> via_points().set(filter=True).numbers["largest torque that only presses"]
+    '0.0 mN m'
+    """
     robot = frictionless(robot)
     N, middle = robot.n_arms, robot.base.mean(axis=0)
     ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4

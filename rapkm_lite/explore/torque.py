@@ -38,7 +38,11 @@ def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
 
 @ready_made
 def computed_torque(robot: Manipulator | None = None) -> Explorer:
-    """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves."""
+    """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves.
+
+    >>> computed_torque().numbers["largest feedback map"]
+    '0.0476 N m s²/rad'
+    """
     robot = frictionless(robot)
     N = robot.n_arms
     pairs = act.drive_pairs(robot)

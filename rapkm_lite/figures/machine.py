@@ -85,6 +85,10 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     """Keywords of ``Axes.set``: equal scales, units, and a frame that holds the machine in any pose.
 
     margin : room around the elbows, as a share of the longest link.
+
+    >>> import rapkm_lite as rk
+    >>> plane_limits(rk.load())["aspect"]
+    'equal'
     """
     room = robot.lengths[:, 0].max() + margin * robot.lengths.max()
     low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
@@ -98,6 +102,11 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
 
 
 def plane_axes(robot, ax):
-    """The axes with the frame of `plane_limits`."""
+    """The axes with the frame of `plane_limits`.
+
+    >>> import rapkm_lite as rk; from matplotlib.figure import Figure
+    >>> plane_axes(rk.load(), Figure().add_subplot()).get_xlabel()
+    'x in m'
+    """
     ax.set(**plane_limits(robot))
     return ax

@@ -36,7 +36,12 @@ def mode_name(mode) -> str:
 
 
 def pair_line(robot: Manipulator, pair) -> dict:
-    """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve."""
+    """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve.
+
+    >>> import rapkm_lite as rk; robot = rk.load()
+    >>> pair_line(robot, (1, 2)) == arm_line(0)
+    True
+    """
     left_out = [i for i in range(robot.n_arms) if i not in pair]
     return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
 

@@ -27,7 +27,13 @@ def plot_errors(run, ax=None, title: str = ""):
 
 
 def lines_per_drive(run, values, ax, ylabel: str, title: str):
-    """One line per drive; the margin keeps the legend off the curves, also on shared axes."""
+    """One line per drive; the margin keeps the legend off the curves, also on shared axes.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> run, ax = rk.simulate(path.robot, rk.PD(7.05, 0.225), path), axes_or_new()
+    >>> lines_per_drive(run, run.c, ax, "torque in N m", "PD").get_ylabel()
+    'torque in N m'
+    """
     ax = axes_or_new(ax)
     for i, line in enumerate(values.T):
         ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))

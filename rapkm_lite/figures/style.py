@@ -18,27 +18,46 @@ BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
 
 
 def use_style() -> None:
-    """Make the collection's look the default from now on; called by the first cell of a lesson."""
+    """Make the collection's look the default from now on; called by the first cell of a lesson.
+
+    >>> import matplotlib.pyplot as plt
+    >>> with plt.rc_context(): use_style()
+    """
     plt.style.use(STYLE)
 
 
 def arm_colour(i: int) -> str:
-    """Colour of arm i (0-based)."""
+    """Colour of arm i (0-based).
+
+    >>> arm_colour(0)
+    '#004488'
+    """
     return ARM_COLOURS[i % len(ARM_COLOURS)]
 
 
 def arm_text_colour(i: int) -> str:
-    """Colour of text that belongs to arm i (0-based), readable on white."""
+    """Colour of text that belongs to arm i (0-based), readable on white.
+
+    >>> arm_text_colour(0)
+    '#004488'
+    """
     return ARM_TEXT_COLOURS[i % len(ARM_TEXT_COLOURS)]
 
 
 def arm_line(i: int) -> dict:
-    """Colour and dashes of arm i (0-based), as keywords for ``ax.plot``."""
+    """Colour and dashes of arm i (0-based), as keywords for ``ax.plot``.
+
+    >>> arm_line(0)
+    {'color': '#004488', 'linestyle': '-'}
+    """
     return {"color": arm_colour(i), "linestyle": ARM_LINES[i % len(ARM_LINES)]}
 
 
 def axes_or_new(ax=None, **figure):
-    """The given axes, or the axes of a new figure in the collection's style."""
+    """The given axes, or the axes of a new figure in the collection's style.
+
+    >>> ax = axes_or_new(figsize=(4.0, 3.0))
+    """
     if ax is not None:
         return ax
     # The figure comes first: a backend that is loaded inside a style context is not interactive when the context ends,

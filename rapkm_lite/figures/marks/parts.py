@@ -12,7 +12,12 @@ from .plane import workspace_outline
 
 
 def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -> None:
-    """The arms at one pose q (2N,): filled circles are drives with their numbers, open ones passive joints."""
+    """The arms at one pose q (2N,): filled circles are drives with their numbers, open ones passive joints.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
+    >>> draw_machine(picture, "a", robot, q)
+    """
     chains = arm_points(robot, q)
     open_joint = {"markersize": 6.5, "markerfacecolor": "white", "markeredgewidth": 2}
     for i in range(robot.n_arms) if arms is None else arms:
@@ -28,7 +33,11 @@ def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -
 
 
 def draw_workspace(picture, panel: str, robot, colour: str = "#EEF2F6") -> None:
-    """Shade the points that all arms reach."""
+    """Shade the points that all arms reach.
+
+    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
+    >>> import rapkm_lite as rk; draw_workspace(picture, "a", rk.load())
+    """
     look = {"facecolor": colour, "edgecolor": NEUTRAL, "linewidth": 0.8}
     picture.polygon(panel, workspace_outline(robot), zorder=0.2, **look)
 
@@ -45,12 +54,20 @@ def pair_lines(robot) -> list:
 
 
 def drive_legend(picture, panel: str, robot) -> None:
-    """A legend of the arms' lines."""
+    """A legend of the arms' lines.
+
+    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}}); import rapkm_lite as rk
+    >>> drive_legend(picture, "a", rk.load())
+    """
     picture.legend(panel, drive_lines(robot))
 
 
 def pair_legend(picture, panel: str, robot) -> None:
-    """A legend of the first pairs' lines."""
+    """A legend of the first pairs' lines.
+
+    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}}); import rapkm_lite as rk
+    >>> pair_legend(picture, "a", rk.load())
+    """
     picture.legend(panel, pair_lines(robot))
 
 
@@ -71,7 +88,11 @@ def drive_axis(n: int) -> dict:
 
 
 def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") -> None:
-    """One or more bars per drive with their numbers; groups are (values per drive, keywords of the bar)."""
+    """One or more bars per drive with their numbers; groups are (values per drive, keywords of the bar).
+
+    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}})
+    >>> bars(picture, "a", [([1.0, 2.0, 1.5], {})])
+    """
     zero_line(picture, panel)
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):

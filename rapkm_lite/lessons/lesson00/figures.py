@@ -16,7 +16,11 @@ from ...simulation.runs import simulate
 
 
 def plot_working_modes(robot, x, axes=None):
-    """The machine at the point x (2,) in m, once per working mode; returns the axes."""
+    """The machine at the point x (2,) in m, once per working mode; returns the axes.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_working_modes(rk.load(), [0.0, 0.0])
+    """
     modes = working_modes(robot)
     if axes is None:
         axes = plt.subplots(2, len(modes) // 2, figsize=(2.5 * len(modes) // 2, 5.2), sharex=True, sharey=True)[1]
@@ -41,10 +45,14 @@ def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""
     return ax
 
 
-def film_workshop(robot, offset):
+def film_workshop(robot, offset, frames: int = 36):
     """Two machines with a lap of the triangle and five seconds of rest: encoders right, and wrong by offset (N,), rad.
 
     The meters count the electric energy since the start.
+
+    >>> import rapkm_lite as rk
+    >>> film_workshop(rk.load(), [4e-3, -2e-3, 5e-3], frames=3).size
+    (729, 307)
     """
     lap = triangle(robot)
     still = np.zeros((len(lap.t) - 1, 2))
@@ -65,7 +73,7 @@ def film_workshop(robot, offset):
 
     return film(
         draw,
-        np.linspace(0, len(path.t) - 1, 36).astype(int),
+        np.linspace(0, len(path.t) - 1, frames).astype(int),
         "Two equal machines with three arms take their tool around the same triangle in five seconds and then stand "
         f"still for five more. The meter of machine A stops at {meters[0][-1]:.1f} J. That of machine B rises faster, "
         f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J.",

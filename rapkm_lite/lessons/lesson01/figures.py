@@ -17,7 +17,11 @@ from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reac
 
 
 def plot_joint_angles(robot, q, ax=None):
-    """Fig. 1: the closed machine at q (2N,) with its joint angles: base angles from the x axis, elbow relative."""
+    """Fig. 1: the closed machine at q (2N,) with its joint angles: base angles from the x axis, elbow relative.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plot_joint_angles(robot, q)
+    """
     ax = plot_machine(robot, q, ax, labels=False)
     N, size = robot.n_arms, 0.28 * robot.lengths.max()
     for i in range(N):
@@ -50,7 +54,11 @@ def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: st
 
 
 def plot_cut_tree(robot, q, ax=None, title: str = ""):
-    """Fig. 2: the tree of N free arms at any q (2N,), and the gaps h_i from the tip of arm 2 to the other tips."""
+    """Fig. 2: the tree of N free arms at any q (2N,), and the gaps h_i from the tip of arm 2 to the other tips.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plot_cut_tree(robot, q + [0.1, 0.2, 0, 0, 0, 0])
+    """
     ax = plot_machine(robot, q, ax, labels=False)
     p = tips(robot, q)
     for i in range(robot.n_arms):
@@ -71,7 +79,11 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
 
 
 def plot_topology(robot, ax=None):
-    """Bodies (boxes) and revolute joints (lines) of the machine; dashed lines are the joints that are cut."""
+    """Bodies (boxes) and revolute joints (lines) of the machine; dashed lines are the joints that are cut.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_topology(rk.load())
+    """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     N = robot.n_arms
     ax.plot([-0.25, N - 0.75], [0, 0], color="#DDDDDD", lw=20, solid_capstyle="round")
@@ -132,6 +144,9 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     """The c-space V in the space of the first three base angles, in degrees: one sheet per working mode in `modes`.
 
     q (2N,) marks a configuration, F (2N, 2) a patch of the tangent plane there, `trajectory` draws its path on V.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_configuration_space(rk.load(), [(1, 1, 1)])
     """
     if ax is None:
         with matplotlib.style.context(STYLE):
@@ -172,6 +187,9 @@ def plot_complement_size(trajectory, pairs, ax=None):
     """Largest singular value of F along a path for pairs of base joints (0-based) as independent coordinates, rad/rad.
 
     With three arms a pair has the colour of the arm it leaves out.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plot_complement_size(path, [(0, 1), (0, 2)])
     """
     ax = axes_or_new(ax)
     for pair in pairs:
@@ -187,7 +205,10 @@ def plot_complement_size(trajectory, pairs, ax=None):
 
 
 def plot_loop_gaps(t, gaps: dict, ax=None):
-    """Largest loop gap over time on a logarithmic axis; `gaps` maps a label to (k,) gaps in m."""
+    """Largest loop gap over time on a logarithmic axis; `gaps` maps a label to (k,) gaps in m.
+
+    >>> ax = plot_loop_gaps([0.0, 1.0], {"10 ms": [1e-6, 1e-4]})
+    """
     ax = axes_or_new(ax)
     for k, (label, gap) in enumerate(gaps.items()):
         colour, dash = (ALARM, BEFORE, AFTER)[k % 3], ("-", "--", "-")[k % 3]
@@ -198,10 +219,14 @@ def plot_loop_gaps(t, gaps: dict, ax=None):
 
 
 def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, title: str = ""):
-    """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, as arrows from the pin."""
+    """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, as arrows from the pin.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])
+    """
     ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
-    for i, force in enumerate(forces):
+    for i, force in enumerate(np.asarray(forces)):
         ax.annotate(
             "",
             tuple(x + force / newton_per_metre),
@@ -215,9 +240,14 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     return ax
 
 
-def film_loops(robot, t, gaps: dict, poses: dict):
-    """A film of poses (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,)."""
-    size = 1e3 * max(gap.max() for gap in gaps.values())
+def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
+    """A film of poses (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,).
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> film_loops(robot, [0.0, 1.0], {"a": [0, 1e-3], "b": [0, 0]}, {"a": [q, q], "b": [q, q]}, frames=2).size
+    (844, 288)
+    """
+    size = 1e3 * max(np.max(gap) for gap in gaps.values())
 
     def draw(axes, k):
         for ax, (name, q) in zip(axes, poses.items(), strict=False):
@@ -226,14 +256,14 @@ def film_loops(robot, t, gaps: dict, poses: dict):
             ax.set(xlim=(-0.27, 0.36), ylim=(-0.25, 0.32))
             ax.set_axis_off()
         for (name, gap), (colour, dash) in zip(gaps.items(), ((ALARM, "-"), (AFTER, "--")), strict=True):
-            axes[-1].plot(t[: k + 1], 1e3 * gap[: k + 1], color=colour, ls=dash, label=name)
+            axes[-1].plot(t[: k + 1], 1e3 * np.asarray(gap[: k + 1]), color=colour, ls=dash, label=name)
         axes[-1].set(xlabel="time in s", ylabel="largest gap in mm", xlim=(0, t[-1]), ylim=(-0.03 * size, 1.1 * size))
         axes[-1].legend(loc="upper left")
 
     names = list(poses)
     return film(
         draw,
-        np.linspace(0, len(t) - 1, 26).astype(int),
+        np.linspace(0, len(t) - 1, frames).astype(int),
         f"Two simulations of the machine on its circle. {names[0]}: the tips drift apart, to {size:.0f} mm after "
         f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero.",
         panels=3,

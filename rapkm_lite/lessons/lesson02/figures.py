@@ -21,13 +21,7 @@ from ...figures.maps import (
 )
 from ...figures.style import ALARM, NEUTRAL, arm_line, arm_text_colour, axes_or_new
 from ...machine.arguments import exact_array
-from ...mechanics.actuation import (
-    control_matrix,
-    distal_cross_products,
-    drive_pairs,
-    force_polygon,
-    singular_values,
-)
+from ...mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, force_polygon, singular_values
 from ...mechanics.kinematics import arm_vectors, inverse_kinematics, working_modes
 from ..own import draw_own
 
@@ -36,6 +30,9 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
     """Maps sigma (2^N, n, n) of the visible share σ_min(Ã) for all working modes, with the curves of all pairs on top.
 
     x, y : samples (n,) in m.  marks : a point (2,) in m to mark, or None, for each mode.
+
+    >>> import rapkm_lite as rk; import numpy as np; x = np.linspace(-0.1, 0.1, 5)
+    >>> ax = plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
     """
     modes = working_modes(robot)
     if axes is None:
@@ -53,7 +50,11 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
 
 
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
-    """A pose as in fig. 8: the five-bar of one pair, distal links parallel at x (2,) in m; the curves of all pairs."""
+    """A pose as in fig. 8: the five-bar of one pair, distal links parallel at x (2,) in m; the curves of all pairs.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load())
+    >>> ax = plot_parameterization_singularities(path, [0.094, 0.064])
+    """
     robot = trajectory.robot
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
@@ -62,16 +63,9 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     plot_pair_curves(robot, axes[0], pairs=[pair])
     plot_machine(robot, q, axes[0], arms=pair, labels=False)
     for i in pair:
-        axes[0].annotate(
-            f"drive {i + 1}",
-            robot.base[i],
-            xytext=(10, 10 * np.sign(robot.base[i, 1])),
-            va="center",
-            textcoords="offset points",
-            color=arm_text_colour(i),
-            fontweight="bold",
-            fontsize=9,
-        )
+        place = {"xytext": (10, 10 * np.sign(robot.base[i, 1])), "textcoords": "offset points", "va": "center"}
+        look = {"color": arm_text_colour(i), "fontweight": "bold", "fontsize": 9}
+        axes[0].annotate(f"drive {i + 1}", robot.base[i], **place, **look)
     _, d = arm_vectors(robot, q)
     axes[0].axline(x, np.add(x, d[pair[0]]), color=ALARM, lw=1.0, ls=":", zorder=2)
     plot_workspace(robot, axes[1])
@@ -89,7 +83,10 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
 
 
 def plot_prestress_maps(robot, axes=None, n: int = 161):
-    """Share |eta_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs."""
+    """Share |eta_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs.
+
+    >>> import rapkm_lite as rk; ax = plot_prestress_maps(rk.load(), n=21)
+    """
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
     x, y, inside, points = grid_points(robot, n)
@@ -109,6 +106,9 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
     """Forces at the end-effector that torques up to `torque` N m can produce at one pose q, and each drive's own share.
 
     guaranteed : radius in N of a disc to draw, the force that is available in every direction.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plot_available_forces(robot, q, torque=0.1)
     """
     ax = axes_or_new(ax, figsize=(3.6, 3.6))
     A = control_matrix(robot, exact_array("q", q, robot.n_joints))
@@ -151,8 +151,7 @@ def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: floa
 
     radius_of : function of A (m, 2) and the torque limit in N m that gives the radius in N.
 
-    >>> import rapkm_lite as rk
-    >>> robot = rk.load()
+    >>> import rapkm_lite as rk; robot = rk.load()
     >>> ax = plot_guaranteed_force(robot, {"": rk.inverse_kinematics(robot, [0, 0])}, lambda A, c: 0.5, n=9)
     """
     if axes is None:
@@ -211,7 +210,10 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
 
 
 def plot_pair_measures(trajectory, ax=None):
-    """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path."""
+    """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path.
+
+    >>> import rapkm_lite as rk; ax = plot_pair_measures(rk.triangle(rk.load(), dt=5e-3))
+    """
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
     robot, A = trajectory.robot, control_matrix(trajectory.robot, trajectory.q)
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
@@ -226,8 +228,7 @@ def plot_pair_measures(trajectory, ax=None):
 def plot_torque_choices(trajectory, choices: dict, axes=None):
     """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m.
 
-    >>> import rapkm_lite as rk
-    >>> path = rk.triangle(rk.load(), dt=5e-3)
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
     >>> ax = plot_torque_choices(path, {"least torque": rk.inverse_dynamics(path.robot, path.q, path.qd, path.qdd)})
     """
     if axes is None:

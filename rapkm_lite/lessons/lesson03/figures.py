@@ -22,6 +22,9 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 
     A line per drive: the points where its measured angle would be right.  Thick bars: how far the rest point misses
     each line, with the torque that this costs.
+
+    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plot_disagreement(robot, q, [4e-3, -2e-3, 5e-3], 7.05)
     """
     ax = axes_or_new(ax, figsize=(4.6, 4.4))
     A, offset = control_matrix(robot, q), np.asarray(offset, dtype=float)
@@ -54,7 +57,11 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 
 
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
-    """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots."""
+    """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_rest_torques(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), [0.0, 0.01, 0.0])
+    """
     ax = plot_torques(run, ax, title)
     dots: dict[str, Any] = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
     look: dict[str, Any] = dots if np.ndim(theory) == 2 else {"lw": 0.9}
@@ -64,7 +71,10 @@ def plot_rest_torques(run, theory, ax=None, title: str = ""):
 
 
 def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
-    """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m)."""
+    """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m).
+
+    >>> ax = plot_gain_ratio([0.5, 1.0], [0.03, 0.05], {"printed": [0.04, 0.04], "corrected": [0.03, 0.05]})
+    """
     ax = axes_or_new(ax)
     looks: list[dict[str, Any]] = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
     for look, (label, values) in zip(looks, theories.items(), strict=True):
@@ -88,7 +98,11 @@ def _plain_ticks(ax, values) -> None:
 
 
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
-    """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all."""
+    """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_fight_map(rk.load(), [4e-3, -2e-3, 5e-3], 7.05, n=21)
+    """
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
     x, y, inside, points = grid_points(robot, n)
     q = inverse_kinematics(robot, points)
@@ -107,6 +121,8 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
     """Torque of one drive with a stepped angle against its true angle, and the band that friction can hold.
 
     K_P in N m/rad, quantum in rad, friction in N m; `target` is where the desired angle lies between two counts.
+
+    >>> ax = plot_torque_steps(7.05, 3.14e-3, 4.2e-3)
     """
     ax = axes_or_new(ax, figsize=(4.4, 3.4))
     angle = np.linspace(-2.0, 3.0, 4001)
@@ -126,6 +142,8 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     """Torque jumps per second of many runs (k,) against K_P quantum / (2 f_c) (k,).
 
     can_rest : (k,); open circles where a place of rest exists, crosses where none does.
+
+    >>> ax = plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
     """
     ax = axes_or_new(ax)
     ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
@@ -148,7 +166,11 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
 
 
 def plot_log(log, axes=None):
-    """A log: measured minus desired angles above, drive torques in mN m below, over time; returns both axes."""
+    """A log: measured minus desired angles above, drive torques in mN m below, over time; returns both axes.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_log(rk.mystery_run("gain"))
+    """
     if axes is None:
         axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True)
     for i in range(log.c.shape[1]):

@@ -33,6 +33,8 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
 
     Left: both five-bars as their measured angles say, the offsets magnified.  Right: in mm about x, the end-effector
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
+
+    >>> import rapkm_lite as rk; ax = plot_synchronization(rk.load(), [0.0, 0.0], [4e-3, -2e-3, 5e-3])
     """
     axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
@@ -106,9 +108,12 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
     Left: what the pairs (1,2) and (2,3) make of such a move from `start` to `stop` (2,) in m, and the straight line.
     Right: largest contradiction `gap` (k,) in rad over the distance of the via points, `spacing` (k,) in m, a line of
     slope two, and the level `marked` in rad to compare with.  Returns both axes.
+
+    >>> import rapkm_lite as rk; robot, far = rk.load(), [0.015, 0.03]
+    >>> ax = plot_joint_moves(robot, [-0.05, 0.0], [0.05, 0.0], far, [2e-3, 7e-3], 5e-3)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.3), width_ratios=(1.35, 1))[1] if axes is None else axes
-    ends = inverse_kinematics(robot, np.stack([start, stop]))
+    ends, spacing, gap = inverse_kinematics(robot, np.stack([start, stop])), np.asarray(spacing), np.asarray(gap)
     part = np.linspace(0, 1, 61)[:, None]
     q = ends[0] + part * (ends[1] - ends[0])
     line = np.add(start, part * np.subtract(stop, start))
@@ -140,7 +145,11 @@ _RUN_LINES: tuple[dict[str, Any], ...] = (
 
 
 def plot_antagonism(run, ax=None, title: str = ""):
-    """The part N_{A^T} c of the drive torques that moves nothing, over time."""
+    """The part N_{A^T} c of the drive torques that moves nothing, over time.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_antagonism(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
+    """
     return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
 
 
@@ -148,6 +157,9 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
     """Norm of the drive torques over time, one line per run; `runs` maps a label to a run.
 
     antagonism : show only the part that moves nothing.  log : logarithmic axis, cut off at 1e-9 N m.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(9.8, 3.3))
     for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
@@ -168,6 +180,9 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     """Every sample of a run as a point: torque that moves over torque along the null vector of A^T.
 
     The squared distance from the origin times R_el / k_t^2 is the copper loss in W.  For three arms with equal drives.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_torque_plane({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(5.4, 3.4))
     for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
@@ -188,9 +203,8 @@ def plot_filter_share(run, share: float, axes=None):
     share : 0 without, 1 with the filter.  Left the torques of every drive, right each sample as in `plot_torque_plane`;
     pale the samples without filter.  Returns both axes.
 
-    >>> import rapkm_lite as rk
-    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
-    >>> ax = plot_filter_share(run, 0.5)
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_filter_share(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 0.5)
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.2))[1] if axes is None else axes
     fight = antagonistic_torque(run)
@@ -213,11 +227,16 @@ def plot_filter_share(run, share: float, axes=None):
     return axes
 
 
-def film_filter(run):
-    """A film of `plot_filter_share`: the torque points of a log land on the axis while the filter is turned on."""
+def film_filter(run, frames: int = 18):
+    """A film of `plot_filter_share`: the torque points of a log land on the axis while the filter is turned on.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
+    (768, 307)
+    """
     return film(
         lambda axes, share: plot_filter_share(run, share, axes),
-        [0.0, 0.0, 0.0, *np.linspace(0, 1, 18)],
+        [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)],
         "Left the torques of the three drives over time, lopsided at first, right every sample as a point, antagonism "
         "to the side and torque that moves upwards. While the filter is turned on the curves draw together, and all "
         "points travel sideways onto the vertical axis and keep their height.",
@@ -228,7 +247,10 @@ def film_filter(run):
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):
-    """Grouped bars of energies per drive; `rows` maps a label to (N,) energies in J, plain bars before hatched ones."""
+    """Grouped bars of energies per drive; `rows` maps a label to (N,) energies in J, plain bars before hatched ones.
+
+    >>> ax = plot_energies({"no filter": [1.3, 1.5, 1.7], "filter": [0.5, 0.7, 1.0]})
+    """
     ax = axes_or_new(ax)
     count = len(rows)
     width = 0.8 / count
@@ -248,7 +270,10 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
 
 
 def plot_table1(table, ax=None, title: str = "Table 1"):
-    """Measured and simulated energies of Table 1 side by side, without and with filter."""
+    """Measured and simulated energies of Table 1 side by side, without and with filter.
+
+    >>> import rapkm_lite as rk; ax = plot_table1(rk.table1())
+    """
     rows = {}
     for k, when in enumerate(("without filter", "with filter")):
         rows |= {f"measured, {when}": table.measured[k], f"simulated, {when}": table.simulated[k]}

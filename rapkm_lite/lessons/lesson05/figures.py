@@ -38,6 +38,9 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     """Fig. 8 with the poses of a path: the five-bar of a pair, in colour, where the path crosses the pair's curve.
 
     The arrow is the direction in which the end-effector moves while both base joints of the pair stand still.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_singular_poses(rk.triangle(rk.load()))
     """
     robot = trajectory.robot
     poses = [(pair, k) for pair in pairs for k in curve_crossings(trajectory)[drive_pairs(robot).index(pair)]]
@@ -59,7 +62,11 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
 
 
 def plot_feedback_map(robot, pair, ax=None, n: int = 220):
-    """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic."""
+    """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_feedback_map(rk.load(), (0, 1), n=21)
+    """
     x, y, inside, points = grid_points(robot, n)
     level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
     ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
@@ -68,7 +75,11 @@ def plot_feedback_map(robot, pair, ax=None, n: int = 220):
 
 
 def plot_feedback_along(trajectory, ax=None):
-    """Norm of the feedback map along a path, for each fixed pair and for redundant coordinates."""
+    """Norm of the feedback map along a path, for each fixed pair and for redundant coordinates.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plot_feedback_along(path)
+    """
     ax = axes_or_new(ax)
     robot = trajectory.robot
     for pair in drive_pairs(robot):
@@ -85,7 +96,11 @@ def plot_feedback_along(trajectory, ax=None):
 
 
 def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
-    """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve."""
+    """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_torques_and_errors(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
+    """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
     plot_torques(run, axes[0], title, milli=False)
@@ -104,6 +119,9 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
     """True end-effector paths of several runs and the curve of a pair: the workspace, and the box `zoom` in m.
 
     runs : label -> run; a cross marks where a run shorter than the longest one ends.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_ee_paths({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)}, pair=(0, 1))
     """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1]
@@ -128,9 +146,8 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
     Left the machine, the third arm pale; right the box `zoom` in m: the wanted point and the run up to here, the pair's
     curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both axes.
 
-    >>> import rapkm_lite as rk
-    >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
-    >>> ax = plot_mirror(run, 1400, (0, 1))
+    >>> import rapkm_lite as rk; robot = rk.load()
+    >>> ax = plot_mirror(rk.simulate(robot, rk.PD(7.05, 0.225), rk.triangle(robot)), 1400, (0, 1))
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.6), width_ratios=[1, 1.2])[1] if axes is None else axes
     robot, desired = run.robot, run.trajectory.x
@@ -153,10 +170,15 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
     return axes
 
 
-def film_mirror(run, pair):
-    """A film of `plot_mirror` from just before the first crossing of the pair's curve to just after the second."""
+def film_mirror(run, pair, frames: int = 23):
+    """A film of `plot_mirror` from just before the first crossing of the pair's curve to just after the second.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load())
+    >>> film_mirror(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), (0, 1), frames=4).size
+    (768, 345)
+    """
     first, second = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)][:2]
-    steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, 23).astype(int)
+    steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, frames).astype(int)
     return film(
         lambda axes, k: plot_mirror(run, k, pair, axes),
         steps,
@@ -166,12 +188,16 @@ def film_mirror(run, pair):
         panels=2,
         figsize=(8.0, 3.6),
         seconds=6,
-        poster=10,
+        poster=frames // 2 - 1,
     )
 
 
 def plot_pairs(run, ax=None):
-    """The pair of independent joints in use over time, one bar per pair."""
+    """The pair of independent joints in use over time, one bar per pair.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_pairs(rk.simulate(path.robot, rk.SwitchedCTC(400.0, 40.0), path))
+    """
     ax = axes_or_new(ax, figsize=(8.0, 1.6))
     pairs = drive_pairs(run.robot)
     for k, pair in enumerate(pairs):
@@ -183,7 +209,11 @@ def plot_pairs(run, ax=None):
 
 
 def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: int = 200):
-    """Smallest singular value of the block A~_1 that each partition rule of (27) picks, over the workspace."""
+    """Smallest singular value of the block A~_1 that each partition rule of (27) picks, over the workspace.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_partition_rules(rk.load(), n=21)
+    """
     if axes is None:
         axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1]
     x, y, inside, points = grid_points(robot, n)
@@ -199,7 +229,11 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
 
 
 def plot_effective_gain(trajectory, K, ax=None):
-    """Both eigenvalues of the effective gain (F^T F)^-1 F^T K F of (35) along a path; K (2N, 2N) without unit."""
+    """Both eigenvalues of the effective gain (F^T F)^-1 F^T K F of (35) along a path; K (2N, 2N) without unit.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3); import numpy as np
+    >>> ax = plot_effective_gain(path, np.diag([1, 1, 1, 0, 0, 0]))
+    """
     ax = axes_or_new(ax)
     values = np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)).real
     low, high = np.sort(values, axis=-1).T
@@ -212,13 +246,17 @@ def plot_effective_gain(trajectory, K, ax=None):
 
 
 def plot_step_response(t, measured: dict, predicted: dict, ax=None):
-    """Simulated lines and predicted points (every 25th sample) of a deviation in mm, by label."""
+    """Simulated lines and predicted points (every 25th sample) of a deviation in mm, by label.
+
+    >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1.0, 0.4, 0.1]}, {"theory": [1.0, 0.4, 0.1]})
+    """
     ax = axes_or_new(ax)
     marks = (("o", AFTER), ("s", AFTER), ("x", ALARM))
     for (label, y), line in zip(measured.items(), ("-", "--", ":"), strict=False):
-        ax.plot(t, 1e3 * y, line, color=AFTER, label=f"simulated, {label}")
+        ax.plot(t, 1e3 * np.asarray(y), line, color=AFTER, label=f"simulated, {label}")
     for (label, y), (marker, colour) in zip(predicted.items(), marks, strict=False):
-        ax.plot(t[::25], 1e3 * y[::25], marker, color=colour, mfc="white", ms=5, label=f"predicted, {label}")
+        look = {"color": colour, "mfc": "white", "ms": 5}
+        ax.plot(t[::25], 1e3 * np.asarray(y[::25]), marker, label=f"predicted, {label}", **look)
     ax.axhline(0.0, color=NEUTRAL, lw=0.8)
     ax.set(xlabel="time in s", ylabel="deviation in mm", xlim=(0, t[-1]))
     ax.legend(loc="upper right")
@@ -226,7 +264,10 @@ def plot_step_response(t, measured: dict, predicted: dict, ax=None):
 
 
 def plot_lyapunov(t, functions: dict, rate, axes=None):
-    """Lyapunov functions in J by label on a logarithmic axis, and their rates of decay; a line at `rate` in 1/s."""
+    """Lyapunov functions in J by label on a logarithmic axis, and their rates of decay; a line at `rate` in 1/s.
+
+    >>> ax = plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
+    """
     if axes is None:
         axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1]
     for (label, V), line in zip(functions.items(), ({"color": BEFORE}, {"color": AFTER, "ls": "--"}), strict=False):

@@ -13,6 +13,9 @@ def plot_landscape(values, cube, theory, axes=None):
     """Slices of an energy over three offsets: `cube` and `theory` (k, k, k) in J over `values` (k,) in mrad.
 
     One panel per slice of constant third offset (lowest, middle, highest): colours simulation, dashed lines theory.
+
+    >>> import numpy as np; cube = np.ones((3, 3, 3))
+    >>> ax = plot_landscape([-1.0, 0.0, 1.0], cube, cube)
     """
     if axes is None:
         axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1]
@@ -28,7 +31,10 @@ def plot_landscape(values, cube, theory, axes=None):
 
 
 def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
-    """Total energies (k,) in J over the gain K_P (k,) in N m/rad, and the antagonistic part."""
+    """Total energies (k,) in J over the gain K_P (k,) in N m/rad, and the antagonistic part.
+
+    >>> ax = plot_gain_curve([1.0, 7.0], [2.2, 5.5], [2.0, 2.1], [0.2, 3.5])
+    """
     ax = axes_or_new(ax, figsize=(6.2, 3.6))
     ax.loglog(gains, without, "o-", color=BEFORE, label="without filter")
     ax.loglog(gains, with_filter, "s-", color=AFTER, label="with filter")
@@ -42,7 +48,11 @@ def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
 
 
 def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J", path=None):
-    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace, and one path."""
+    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace, and one path.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_placement(rk.load(), [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02], [0.02, 0.02]], [1.0, 2.0, 3.0, 4.0])
+    """
     ax = axes_or_new(ax, figsize=(5.6, 4.4))
     plot_workspace(robot, ax, colour="#F7F7F7")
     plot_machine(robot, np.zeros(robot.n_joints), ax, arms=[])
@@ -68,7 +78,10 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
 
 
 def plot_bands(samples: dict, ax=None):
-    """Distribution functions of energies in J with their means; `samples` maps a label to (k,)."""
+    """Distribution functions of energies in J with their means; `samples` maps a label to (k,).
+
+    >>> ax = plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
+    """
     ax = axes_or_new(ax, figsize=(6.6, 3.5))
     for (label, values), colour in zip(samples.items(), (BEFORE, AFTER), strict=False):
         values = np.sort(values)
@@ -81,7 +94,10 @@ def plot_bands(samples: dict, ax=None):
 
 
 def plot_readings(names, low, high, readings, reference=None, ax=None):
-    """Parameter sets (k, p) as dots in their search ranges low, high (p,), one row per parameter; one line per set."""
+    """Parameter sets (k, p) as dots in their search ranges low, high (p,), one row per parameter; one line per set.
+
+    >>> ax = plot_readings(["K_P", "K_D"], [0.0, 0.0], [10.0, 1.0], [[7.05, 0.225], [6.0, 0.3]])
+    """
     ax = axes_or_new(ax, figsize=(8.0, 3.8))
     share = (np.asarray(readings) - low) / (np.asarray(high) - low)
     rows = np.arange(len(names))

@@ -17,6 +17,9 @@ def plot_five_bar_curves(robot, start, end, axes=None):
 
     Left: the end-effector of the pairs (1,2) and (2,3), and the straight line.  Right: the two joint subspaces, the
     moves as they are commanded and as the straight line in the plane would need them (dotted).  Returns both axes.
+
+    >>> import rapkm_lite as rk
+    >>> ax = plot_five_bar_curves(rk.load(), [-0.05, 0.0], [0.05, 0.0])
     """
     axes = plt.subplots(1, 2, figsize=(9.6, 3.7), width_ratios=(1.25, 1))[1] if axes is None else axes
     part = np.linspace(0, 1, 81)[:, None]
@@ -53,8 +56,10 @@ def plot_spacing(spacing, gap, marked=None, ax=None):
     """Largest contradiction `gap` (k,) in rad over the distance of via points (k,) in m, with a line of slope two.
 
     marked : a level in rad to compare with, as (words, number).
+
+    >>> ax = plot_spacing([0.015, 0.03], [1.7e-3, 7e-3], ("offsets", 5e-3))
     """
-    ax = axes_or_new(ax, figsize=(6.4, 3.4))
+    ax, spacing, gap = axes_or_new(ax, figsize=(6.4, 3.4)), np.asarray(spacing), np.asarray(gap)
     ax.loglog(1e3 * spacing, 1e3 * gap[-1] * (spacing / spacing[-1]) ** 2, "--", color=NEUTRAL, label="slope two")
     ax.loglog(1e3 * spacing, 1e3 * gap, "o", color=AFTER, label="this edge")
     if marked is not None:
@@ -69,10 +74,12 @@ def plot_demand(part, demand, points: dict, ax=None):
     """|eta^T q_a''| (k,) in rad along an edge, at the shares `part` (k,) of the way, and via points as ticks on it.
 
     points : dict of label -> shares of the way between 0 and 1.
+
+    >>> ax = plot_demand([0.0, 0.5, 1.0], [0.1, 0.05, 0.1], {"equal distances": [0.25, 0.5, 0.75]})
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.2))
     ax.plot(part, demand, color=AFTER)
-    top = demand.max()
+    top = np.max(demand)
     for row, ((label, shares), colour) in enumerate(zip(points.items(), (BEFORE, ALARM), strict=False)):
         level = -(row + 1) * 0.13 * top
         ax.plot(shares, np.full(len(shares), level), "o", ms=6, color=colour, label=label)

@@ -17,6 +17,9 @@ def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
     """Norm of the rest torques of PD drives over the workspace, one map for each wrong model.
 
     models : dict of title -> Manipulator, which demands the angles.  K_P in N m/rad.  Returns the axes.
+
+    >>> import rapkm_lite as rk; robot = rk.load()
+    >>> ax = plot_geometry_maps(robot, {"longer": robot.replace(lengths=0.2002)}, 7.05, n=21)
     """
     axes = plt.subplots(1, len(models), figsize=(4.8 * len(models), 3.9))[1] if axes is None else axes
     for ax, (title, model) in zip(np.atleast_1d(axes), models.items(), strict=True):
@@ -40,8 +43,11 @@ def plot_model_share(eps, share, t, leak, axes=None):
 
     Right, the force leak (j,) in N per N m at the end-effector of a prestress along a path, over time t (j,) in s.
     Returns both axes.
+
+    >>> ax = plot_model_share([1e-3, 1e-2], [2e-4, 2e-3], [0.0, 1.0], [0.01, 0.02])
     """
     axes = plt.subplots(1, 2, figsize=(9.6, 3.4))[1] if axes is None else axes
+    eps, share, leak = np.asarray(eps), np.asarray(share), np.asarray(leak)
     axes[0].loglog(eps, share[0] * eps / eps[0], "--", color=NEUTRAL, label="slope one")
     axes[0].loglog(eps, share, "o", color=AFTER, label="filter with the wrong model")
     axes[0].set(xlabel="all links too long by the share ε", ylabel="share that still fights", title="in motion")
@@ -62,6 +68,8 @@ def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
 
     jumps : dict of title -> (j, k) jumps per second.  friction : f_c in N m; the line is K_P 2 pi / counts = 2 f_c.
     Returns the axes.
+
+    >>> ax = plot_hunting_maps([1.0, 7.0], [500.0, 2000.0], {"sharp": [[0.0, 9.0], [0.0, 5.0]]}, 4.2e-3)
     """
     axes = plt.subplots(1, len(jumps), figsize=(3.6 * len(jumps), 3.4), sharey=True)[1] if axes is None else axes
     axes, steps = np.atleast_1d(axes), [-0.5, 0.5, 10.0, 100.0, 1e4]
@@ -84,10 +92,13 @@ def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
 
 
 def plot_saturation(limit, shifts, ax=None):
-    """Largest shift (k,) in m that a torque limit (k,) in N m causes; shifts: dict of label -> (k,)."""
+    """Largest shift (k,) in m that a torque limit (k,) in N m causes; shifts: dict of label -> (k,).
+
+    >>> ax = plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
+    """
     ax = axes_or_new(ax, figsize=(6.6, 3.4))
     for (label, shift), colour, mark in zip(shifts.items(), (ALARM, AFTER, BEFORE), "os^", strict=False):
-        ax.semilogy(1e3 * limit, 1e3 * shift, color=colour, marker=mark, ms=4.5, label=label)
+        ax.semilogy(1e3 * np.asarray(limit), 1e3 * np.asarray(shift), color=colour, marker=mark, ms=4.5, label=label)
     ax.set(xlabel="torque limit of each drive in mN m", ylabel="largest shift by the limit in mm")
     ax.legend(loc="upper right")
     return ax
@@ -97,6 +108,9 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
     """Distance of the end-effector from its path over time, in mm, a line for each of up to five runs (label -> Run).
 
     The first run is the broad one; distances below `least` in mm are drawn there.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plot_faulty_runs({"healthy": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.4))
     looks = (("#CCCCCC", "-"), (ALARM, "-"), (AFTER, (0, (5, 1.2))), (ALARM, (0, (1.5, 1.2))), (NEUTRAL, "-"))
