@@ -17,6 +17,7 @@ from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
 from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
+from ..simulation.energy import copper_loss
 from .controls import choice, slider
 from .explorer import Explorer, explorer
 from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders, ready_made
@@ -196,7 +197,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             marks.traces(picture, panel, t.t, 1e3 * torque)
             picture.fit(panel, 1e3 * c, 1e3 * least)
             marks.zero_line(picture, panel)
-        energy = [t.dt * np.sum(robot.resistance * (v / robot.torque_constant) ** 2) for v in (least, c)]
+        energy = [copper_loss(robot, v, t.dt).sum() for v in (least, c)]
         return {
             "changes of sign without": marks.per_drive(sign_changes(least), 0),
             "with": marks.per_drive(sign_changes(c), 0),

@@ -16,7 +16,7 @@ from ..mechanics.actuation import control_matrix, required_wrench, singular_valu
 from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics, working_modes
 from ..mechanics.trajectory import triangle
-from ..simulation.energy import antagonistic_energy, antagonistic_torque
+from ..simulation.energy import antagonistic_energy, antagonistic_torque, copper_loss
 from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
@@ -142,7 +142,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)
-        heat = np.sum(own.resistance * (pressing[:-1] / own.torque_constant) ** 2) * path.dt
+        heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
             "cost of the offsets, at rest everywhere": f"{heat:.2f} J",

@@ -15,7 +15,7 @@ from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
-from ..simulation.energy import antagonism_form
+from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
@@ -57,7 +57,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
             "simulated": marks.per_drive(error[-1], 2) + " mrad",
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
             "rest torque": marks.per_drive(torque, 1) + " mN m",
-            "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W",
+            "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
         }
 
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
@@ -119,7 +119,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             "rest": f"({rest[0] + 0.0:.2f}, {rest[1] + 0.0:.2f}) mm beside the desired point",
             "distances from the lines": marks.per_drive(apart, 2) + " mm",
             "torque at rest": marks.per_drive(torque, 1) + " mN m",
-            "heat at rest": f"{np.sum(robot.resistance * (1e-3 * torque / robot.torque_constant) ** 2):.3f} W",
+            "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
         }
 
     away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": (-3, 3), "ylim": (-3, 3)}

@@ -193,6 +193,11 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     return _polygon(robot, corners, duration, dt, rest, {"corners": corners.tolist()})
 
 
+def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The way from 0 to 1 at the shares s (...,) of the time, from rest to rest, and its derivatives by s."""
+    return s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+
+
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
     t = sample_times(duration, dt)
     rest = float(exact_array("rest", rest))
@@ -206,7 +211,7 @@ def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given:
         phase = np.clip((t[rows] - rest) / edge_time, 0.0, edges)
         edge = np.minimum(np.floor(phase).astype(int), edges - 1)
         s = phase - edge
-        way, rate, rate_dot = s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+        way, rate, rate_dot = quintic(s)
         first, step = corners.T[:, edge], (ends - corners).T[:, edge]
         return (first + way * step).T, (rate * step / edge_time).T, (rate_dot * step / edge_time**2).T
 
@@ -252,10 +257,8 @@ def circle(
     full, middle = 2 * np.pi * positive_number("turns", turns), exact_array("centre", centre, 2)[:, None]
 
     def motion(rows: slice):
-        s = t[rows] / duration
-        angle = full * s**3 * (10 - 15 * s + 6 * s * s)
-        rate = full / duration * 30 * (s * (1 - s)) ** 2
-        rate_dot = full / duration**2 * 60 * s * (1 - s) * (1 - 2 * s)
+        way, rate, rate_dot = quintic(t[rows] / duration)
+        angle, rate, rate_dot = full * way, full / duration * rate, full / duration**2 * rate_dot
         u = np.stack([np.cos(angle), np.sin(angle)])
         v = np.stack([-u[1], u[0]])
         return (middle + radius * u).T, (radius * rate * v).T, (radius * (rate_dot * v - rate**2 * u)).T

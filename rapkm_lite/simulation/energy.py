@@ -14,6 +14,16 @@ from ..mechanics.antagonism import steady_state_torque
 from ..mechanics.trajectory import Trajectory
 
 
+def joule_heat(c, dt: float, resistance, torque_constant) -> np.ndarray:
+    """Heat R (c / k_t)^2 dt of each hold, of the shape of c, in J."""
+    return resistance * (c / torque_constant) ** 2 * dt
+
+
+def work_of_holds(c, q_a) -> np.ndarray:
+    """Work c[k] (q_a[k+1] - q_a[k]) of each hold (..., k - 1, m) in J, for torques and angles (..., k, m)."""
+    return c[..., :-1, :] * np.diff(q_a, axis=-2)
+
+
 def copper_loss(robot, c, dt) -> np.ndarray:
     """Joule heat R (c / k_t)^2 dt of torques c (..., k, N) in N m, each held for dt in s: (..., N) in J per drive.
 
@@ -24,7 +34,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
     c = real_array("c", c, manipulator(robot).n_arms)
     if c.ndim < 2:
         raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
-    return positive_number("dt", dt) * np.sum(robot.resistance * (c / robot.torque_constant) ** 2, axis=-2)
+    return np.sum(joule_heat(c, positive_number("dt", dt), robot.resistance, robot.torque_constant), axis=-2)
 
 
 def mechanical_work(run) -> np.ndarray:
@@ -38,7 +48,7 @@ def mechanical_work(run) -> np.ndarray:
     True
     """
     _run(run, "q_a", "c", "dt")
-    return np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=0)
+    return np.sum(work_of_holds(run.c, run.q_a), axis=0)
 
 
 def electric_energy(run) -> np.ndarray:

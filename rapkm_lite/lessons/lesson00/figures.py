@@ -12,6 +12,7 @@ from ...figures.maps import mode_name
 from ...figures.style import NEUTRAL
 from ...mechanics.kinematics import inverse_kinematics, working_modes
 from ...mechanics.trajectory import follow, triangle
+from ...simulation.energy import joule_heat, work_of_holds
 from ...simulation.runs import simulate
 
 
@@ -59,12 +60,11 @@ def film_workshop(robot, offset, frames: int = 36):
     x, xd, xdd = (np.concatenate([part, still + end]) for part, end in ((lap.x, lap.x[-1]), (lap.xd, 0), (lap.xdd, 0)))
     path = follow(robot, lap.dt * np.arange(len(x)), x, xd, xdd)
     runs = [simulate(robot, PD(7.05, 0.225), path, error) for error in (np.zeros(robot.n_arms), offset)]
-    weight = robot.resistance / robot.torque_constant**2
     meters = []
     for run in runs:
-        held = run.c[:-1]
-        power = weight * held**2 * run.dt + held * np.diff(run.q_a, axis=0)
-        meters.append(np.concatenate([[0.0], np.cumsum(power.sum(axis=1))]))
+        heat = joule_heat(run.c[:-1], run.dt, robot.resistance, robot.torque_constant)
+        energy = np.sum(heat + work_of_holds(run.c, run.q_a), axis=1)
+        meters.append(np.concatenate([[0.0], np.cumsum(energy)]))
     most = max(meter.max() for meter in meters)
 
     def draw(axes, k):

@@ -15,6 +15,7 @@ import numpy as np
 from ...machine.arguments import matvec
 from ...mechanics.cores import wrap
 from ...mechanics.matrices import complement, complement_dot
+from ...mechanics.trajectory import quintic
 from .mechanism import Mechanism, derive
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -132,10 +133,8 @@ def swing(radius: float = 0.1, angle: float = 0.3, duration: float = 4.0, dt: fl
     (41, 9)
     """
     t = np.arange(round(duration / dt) + 1) * dt
-    s = t / duration
-    turn = 2 * np.pi * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    rate = 2 * np.pi * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
-    accel = 2 * np.pi * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
+    way, way_dot, way_ddot = quintic(t / duration)
+    turn, rate, accel = 2 * np.pi * way, 2 * np.pi * way_dot / duration, 2 * np.pi * way_ddot / duration**2
     size = np.array([radius, radius, angle])
     cos, sin = np.cos(turn), np.sin(turn)
     pose = size * np.stack([cos, sin, sin], axis=-1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...machine.arguments import matvec
 from ...mechanics import cores
+from ...simulation.energy import joule_heat, work_of_holds
 from ...simulation.patience import progress
 from .mechanism import Mechanism, accelerations
 
@@ -61,9 +62,8 @@ def electric_energy(q, c, dt: float, resistance: float, torque_constant: float) 
     >>> float(electric_energy(np.zeros((3, 1)), np.ones((3, 1)), 0.5, 2.0, 1.0))
     2.0
     """
-    held = c[..., :-1, :]
-    moved = np.diff(q[..., : c.shape[-1]], axis=-2)
-    return np.sum(resistance * (held / torque_constant) ** 2 * dt + held * moved, axis=(-2, -1))
+    heat = joule_heat(c[..., :-1, :], dt, resistance, torque_constant)
+    return np.sum(heat + work_of_holds(c, q[..., : c.shape[-1]]), axis=(-2, -1))
 
 
 def _fit(mechanism: Mechanism, q_a, guess) -> np.ndarray:
