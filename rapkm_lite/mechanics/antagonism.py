@@ -74,12 +74,13 @@ def null_basis(A) -> np.ndarray:
     anywhere = np.linalg.qr(A, mode="complete")[0][..., delta:]
     if m > delta:
         # Any orthonormal basis, turned by U: the columns of U but the last from its components along the references.
-        U, R = np.linalg.qr(product(anywhere.mT, _references(m)[:, : m - delta - 1]), mode="complete")
+        # With @ one pose takes the steps of many; `product` would round otherwise.
+        U, R = np.linalg.qr(anywhere.mT @ _references(m)[:, : m - delta - 1], mode="complete")
         size = np.diagonal(R, axis1=-2, axis2=-1)
         if np.any(np.abs(size) < 1e-12):
             raise ValueError("A has no reference left in its null space; allowed: any other pose, also one close by")
         U[..., :-1] *= np.sign(size)[..., None, :]
-        anywhere = product(anywhere, U)
+        anywhere = anywhere @ U
         unit = A / np.linalg.norm(A, axis=-2, keepdims=True)
         anywhere[..., -1] *= np.sign(np.linalg.det(np.concatenate([unit, anywhere], axis=-1)))[..., None]
     return anywhere
