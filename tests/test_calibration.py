@@ -61,6 +61,7 @@ def test_base_points_are_found_but_for_a_similarity_of_the_plane(name):
 
 def test_intervals_are_those_of_a_normal_distribution():
     found = rk.calibrate(TESTBED, readings(TESTBED), noise=1e-4)
+    assert found.freedom == np.inf
     sigma = np.sqrt(np.diagonal(found.covariance))
     for given, width in (((), 1.959964), ((0.5,), 0.674490), ((0.6826895,), 1.0)):  # tables of the normal distribution
         assert_allclose(found.interval(*given), found.estimate + width * np.array([-sigma, sigma]), rtol=0, atol=1e-9)
@@ -153,6 +154,29 @@ def test_covariance_is_that_of_a_hundred_repetitions():
     low, high = np.array([c.interval(0.9) for c in found]).swapaxes(0, 1)
     inside = np.mean((low < OFFSET[:3]) & (OFFSET[:3] < high))
     assert abs(inside - 0.9) < 4 * np.sqrt(0.09 / 300)
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_intervals_from_few_poses_cover_what_they_say(count):
+    """The noise is estimated from one or two spare readings: Student's t; three offsets of one draw count as one."""
+    x = np.array([[0.06, 0.03], [-0.05, 0.05], [0.01, -0.08], [0.0, 0.02], [0.07, -0.04]])[:count]
+    exact, rng, draws = rk.inverse_kinematics(TESTBED, x)[:, :3] + OFFSET[:3], np.random.default_rng(9), 300
+    found = [rk.calibrate(TESTBED, exact + rng.normal(0, 1e-5, exact.shape)) for _ in range(draws)]
+    assert {c.freedom for c in found} == {count - 3}
+    for level in (0.5, 0.9, 0.95):
+        low, high = np.array([c.interval(level) for c in found]).swapaxes(0, 1)
+        inside = np.mean((low < OFFSET[:3]) & (OFFSET[:3] < high), axis=0)
+        assert np.all(np.abs(inside - level) < 4 * np.sqrt(level * (1 - level) / draws))
+
+
+def test_interval_of_one_spare_reading_is_that_of_cauchy():
+    """Student's t with one degree of freedom has the quantile tan(pi level / 2); the spread is that of one reading."""
+    found = rk.calibrate(TESTBED, readings(TESTBED, 4) + 1e-5 * np.random.default_rng(1).normal(size=(4, 3)))
+    assert found.freedom == 1 and found.noise == pytest.approx(2 * found.residual)
+    sigma = np.sqrt(np.diagonal(found.covariance))
+    for level in (0.5, 0.95):
+        half = np.tan(np.pi * level / 2) * sigma
+        assert_allclose(found.interval(level), found.estimate + np.array([-half, half]), rtol=0, atol=1e-12)
 
 
 def test_a_moving_triangle_beats_coarse_counts():

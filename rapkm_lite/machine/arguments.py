@@ -80,6 +80,14 @@ def exact_array(name: str, value, *shape: int) -> np.ndarray:
     return array
 
 
+def drive_values(name: str, value, N: int) -> np.ndarray:
+    """Return one number, or one for each drive, as a finite (N,) array."""
+    array = real_array(name, value)
+    if array.shape not in ((), (N,)):
+        raise ValueError(f"{name} has shape {array.shape}; allowed: one number or ({N},)")
+    return np.broadcast_to(array, (N,))
+
+
 def joint_vectors(size: int, **vectors) -> list[np.ndarray]:
     """Each vector as a finite (..., size) array, after a check that their leading axes fit together."""
     arrays = [real_array(name, value, size) for name, value in vectors.items()]

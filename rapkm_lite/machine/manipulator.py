@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, exact_array, joint_indices, of_kind, positive_number, real_array
+from .arguments import bounded, drive_values, exact_array, joint_indices, of_kind, positive_number, real_array
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
@@ -75,13 +75,13 @@ class Manipulator(Value):
         if np.any((given["centers"] < 0.0) | (given["centers"] > lengths)):
             raise ValueError(f"centers = {given['centers'].tolist()} m; allowed: on the link, 0 to {lengths.tolist()}")
         for key in ("rotor_inertia", "friction"):
-            given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=False)
+            given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=False)
         for key in ("resistance", "torque_constant"):
-            given[key] = bounded(key, _per_drive(key, getattr(self, key), N), 0.0, strict=True)
+            given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=True)
         given["gravity"] = exact_array("gravity", self.gravity, 2)
         given["friction_velocity"] = positive_number("friction_velocity", self.friction_velocity)
         given["load"] = float(bounded("load", exact_array("load", self.load), 0.0, strict=False))
-        given["mode"] = _per_drive("mode", self.mode, N)
+        given["mode"] = drive_values("mode", self.mode, N)
         if not np.all(np.abs(given["mode"]) == 1.0):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
         self._set(**given)
@@ -201,13 +201,6 @@ def _per_link(name: str, value, N: int) -> np.ndarray:
     if array.shape not in ((), (2,), (N, 2)):
         raise ValueError(f"{name} has shape {array.shape}; allowed: one number, (2,) or ({N}, 2)")
     return np.broadcast_to(array, (N, 2))
-
-
-def _per_drive(name: str, value, N: int) -> np.ndarray:
-    array = real_array(name, value)
-    if array.shape not in ((), (N,)):
-        raise ValueError(f"{name} has shape {array.shape}; allowed: one number or ({N},)")
-    return np.broadcast_to(array, (N,))
 
 
 def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, bounded, one_of, positive_number, real_array
+from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number, real_array
 from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Array, Value
@@ -54,6 +54,7 @@ class Calibration(Value):
     offset : (N,) rad, measured minus true base angle.  lengths : (N, 2) m.  base : (N, 2) m.
     covariance : (p, p) of the estimate for independent noise of the readings, by first order.
     noise : rad, standard deviation of one reading that the covariance uses.
+    freedom : how many readings were left over to estimate the noise from; infinite where it was given.
     rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
     unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.
     residual : rad, root mean square of the closure that is left.  K_P : (N,) N m/rad fitted to the rests, or None.
@@ -72,6 +73,7 @@ class Calibration(Value):
     base: Array
     covariance: Array
     noise: float
+    freedom: float
     rank: int
     condition: float
     unseen: tuple[str, ...]
@@ -81,8 +83,9 @@ class Calibration(Value):
     note: str = field(default="")
 
     def interval(self, level: float = 0.95) -> np.ndarray:
-        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, for a known noise.
+        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, each for itself.
 
+        Student's t where the residual showed the noise, with `freedom` degrees; normal where the noise was given.
         Raises ValueError where neither the log nor the caller said how large the noise is.
         """
         if self.noise == 0.0:
@@ -90,9 +93,15 @@ class Calibration(Value):
         level = positive_number("level", level)
         if level >= 1.0:
             raise ValueError(f"level = {level:g}; allowed: above 0 and below 1")
-        from statistics import NormalDist
+        from scipy.special import ndtri, stdtrit
 
-        half = NormalDist().inv_cdf(0.5 + level / 2) * np.sqrt(np.diagonal(self.covariance))
+        outside = (1.0 - level) / 2
+        half = -ndtri(outside)
+        if 0 < self.freedom < math.inf:
+            # Readings that are counts wander by their rounding at least, however well they seem to agree.
+            spread = self.residual * math.sqrt(1.0 + self.rank / self.freedom)
+            half = max(half, -stdtrit(self.freedom, outside) * spread / self.noise)
+        half = half * np.sqrt(np.diagonal(self.covariance))
         return np.stack([self.estimate - half, self.estimate + half])
 
     def __repr__(self):
@@ -134,7 +143,7 @@ def calibrate(
     angles, logs = _read(robot, log)
     stand = rests(logs) if logs else None
     gain = fitted_gain(stand) if stand else None
-    notes = [] if gain is None or K_P is None else gain.objections(_per_drive(robot.n_arms, K_P))
+    notes = [] if gain is None or K_P is None else gain.objections(drive_values("K_P", K_P, robot.n_arms))
     if use == "torques":
         angles, step = _angles_of_torques(robot, stand, gain, K_P, notes)
     else:
@@ -162,13 +171,6 @@ def _read(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
     return angles, []
 
 
-def _per_drive(N: int, K_P) -> np.ndarray:
-    K_P = real_array("K_P", K_P)
-    if K_P.shape not in ((), (N,)):
-        raise ValueError(f"K_P has shape {K_P.shape}; allowed: one number or ({N},)")
-    return np.broadcast_to(K_P, (N,))
-
-
 def _angles_of_torques(
     robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]
 ) -> tuple[np.ndarray, float]:
@@ -185,7 +187,7 @@ def _angles_of_torques(
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
                 "filter; allowed: the gain of the drives, or use = 'angles'"
             )
-    K_P = bounded("K_P", _per_drive(robot.n_arms, K_P), 0.0, strict=True)
+    K_P = bounded("K_P", drive_values("K_P", K_P, robot.n_arms), 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
@@ -248,6 +250,7 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         base=machine.base,
         covariance=half @ half.T * used**2 / len(angles),
         noise=used,
+        freedom=spare if noise is None else math.inf,
         rank=rank,
         condition=condition,
         unseen=GAUGE if unknowns == "all" else (),
