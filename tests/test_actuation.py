@@ -1,6 +1,7 @@
 """Actuation: degree, singularities, inverse dynamics, filters, explicit pseudoinverse, steady state, maps."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -152,10 +153,10 @@ def test_null_basis_refuses_what_has_no_basis_to_face():
 
 def positive_prestress(A):
     """The largest t with A^T n = 0, n_i >= t, n_i <= 1, by linear programming."""
-    m = len(A)
-    rows = np.concatenate([A.T / np.abs(A).max(), np.zeros((2, 1))], axis=1)
+    m, delta = A.shape
+    rows = np.concatenate([A.T / np.abs(A).max(), np.zeros((delta, 1))], axis=1)
     below = np.concatenate([-np.eye(m), np.ones((m, 1))], axis=1)
-    found = linprog(np.append(np.zeros(m), -1.0), below, np.zeros(m), rows, np.zeros(2), [(-1, 1)] * m + [(-1, 1)])
+    found = linprog(np.append(np.zeros(m), -1.0), below, np.zeros(m), rows, np.zeros(delta), [(-1, 1)] * (m + 1))
     return -found.fun
 
 
@@ -172,6 +173,52 @@ def test_common_sign_against_linear_programming(name):
     if robot.n_arms == 3:
         n = rk.null_vector(robot, rk.inverse_kinematics(robot, random_points(robot, 60, seed=8)))
         assert np.array_equal(possible, np.abs(np.sign(n).sum(axis=-1)) == 3)
+
+
+SHAPES = [(3, 1), (4, 1), (3, 2), (5, 2), (3, 3), (4, 3), (5, 3), (7, 3), (8, 5)]
+
+
+@pytest.mark.parametrize(("m", "delta"), SHAPES)
+def test_common_sign_of_any_mechanism(m, delta):
+    """A linear programme in the torques themselves; rows of any length, columns of any unit."""
+    rng = np.random.default_rng(10 * m + delta)
+    A = rng.normal(size=(4, 10, m, delta))
+    possible = rk.common_sign(A)
+    margin = np.array([positive_prestress(M) for M in A.reshape(-1, m, delta)]).reshape(4, 10)
+    assert np.array_equal(possible, margin > 1e-6) and (possible.any() or m == delta)
+    assert possible.dtype == bool and rk.common_sign(A[0, 0]) == possible[0, 0] and rk.common_sign(A[0, 0]).shape == ()
+    scaled = np.logspace(-4, 4, m)[:, None] * A @ (np.eye(delta) + np.triu(rng.normal(size=(delta, delta)), 1))
+    assert np.array_equal(rk.common_sign(scaled), possible)
+    assert rk.common_sign(A[:0]).shape == (0, 10) and rk.common_sign(A[:0]).dtype == bool
+
+
+@pytest.mark.parametrize(("m", "delta"), SHAPES)
+def test_share_of_random_machines_with_a_common_sign(m, delta):
+    """Wendel's theorem: m directions drawn evenly lie in a half space with 2^(1-m) sum_(k<delta) C(m-1, k)."""
+    draws = 400
+    share = rk.common_sign(np.random.default_rng(m + 10 * delta).normal(size=(draws, m, delta))).mean()
+    expected = 1 - sum(math.comb(m - 1, k) for k in range(delta)) / 2 ** (m - 1)
+    assert abs(share - expected) <= 4 * np.sqrt(expected * (1 - expected) / draws)
+
+
+@pytest.mark.parametrize(("m", "delta"), [(m, delta) for m, delta in SHAPES if m > delta])
+def test_common_sign_of_made_up_prestress_and_of_rows_in_a_half_space(m, delta):
+    rng = np.random.default_rng(m * delta)
+    n = rng.uniform(0.01, 1.0, m)
+    A = rng.normal(size=(m, delta))
+    assert rk.common_sign(A - np.outer(n, n @ A) / (n @ n))
+    A[:, 0] = np.abs(A[:, 0])
+    assert not rk.common_sign(A)
+    # On the edge of it: no drive but those that see none of the first column could press.
+    A[0, 0] = 0.0
+    assert not rk.common_sign(A)
+
+
+@pytest.mark.parametrize("delta", [1, 2, 3])
+def test_a_drive_that_moves_nothing_has_any_sign(delta):
+    A = np.random.default_rng(3).normal(size=(6, delta + 2, delta))
+    A[:, -1] = 0.0
+    assert np.array_equal(rk.common_sign(A), rk.common_sign(A[:, :-1]))
 
 
 def test_share_of_the_workspace_without_backlash():
@@ -242,6 +289,16 @@ def test_singular_values_in_closed_form_match_lapack():
     sigma = np.linalg.svd(A, compute_uv=False)
     assert_allclose(rk.singular_values(A), sigma, rtol=1e-8)
     assert_allclose(rk.singular_values(np.zeros((3, 2))), 0)
+
+
+@pytest.mark.parametrize("delta", [1, 2, 3, 5])
+def test_singular_values_of_any_mechanism(delta):
+    """A = U diag(s) V^T with made-up s; and, as for any matrix, their squares are the eigenvalues of A^T A."""
+    rng, s = np.random.default_rng(delta), np.geomspace(3.0, 0.2, delta)
+    U, V = (np.linalg.qr(rng.normal(size=(2, 4, n, delta)))[0] for n in (6, delta))
+    A = (U * s) @ T(V)
+    assert_allclose(rk.singular_values(A), np.broadcast_to(s, (2, 4, delta)), rtol=1e-13)
+    assert_allclose(rk.singular_values(A[0, 0]) ** 2, np.linalg.eigvalsh(A[0, 0].T @ A[0, 0])[::-1], rtol=1e-12)
 
 
 # (11)

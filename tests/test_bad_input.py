@@ -286,7 +286,9 @@ def test_rules_measures_and_numbers():
         refused(rk.close_loops, "iterations", TESTBED, Q, iterations=bad)
         refused(rk.estimate_pose, "iterations", TESTBED, Q[:, :3], X, iterations=bad)
     refused(rk.copper_loss, "c", TESTBED, np.ones(3), 1e-3)
-    refused(rk.singular_values, "A", np.ones((5, 3, 3)))
+    refused(rk.singular_values, "A", np.ones((5, 3, 4)))
+    for bad in (0, 1.5, 4):
+        refused(rk.closed_loop_projector, "delta", np.ones((3, 6)), bad)
 
 
 def test_rank_loss_is_named():
@@ -296,6 +298,9 @@ def test_rank_loss_is_named():
     refused(rk.steady_state_error, "A", flat, 1.0, np.zeros(3))
     refused(rk.explicit_pseudoinverse, "A~_1", np.ones((3, 6)), (0, 1))
     refused(rk.closed_loop_projector, "A~_1", np.ones((3, 6)))
+    refused(rk.closed_loop_projector, "rows", np.random.default_rng(0).normal(size=(3, 6)))
+    for columns in (1, 2, 3):
+        refused(rk.common_sign, "A", np.zeros((5, columns)))
     refused(rk.effective_gain, "F^T F", np.zeros((6, 2)), 1.0)
     edge = rk.inverse_kinematics(TESTBED, TESTBED.base[0] + 0.4 * np.array([np.cos(0.5), np.sin(0.5)]))
     refused(rk.orthogonal_complement, "q", TESTBED, edge)

@@ -251,6 +251,19 @@ def test_d_equals_the_projector_wherever_the_degree_of_actuation_is_two(name):
     assert norm(D - rk.nullspace_projector(robot, q)).max() < 1e-11
 
 
+@pytest.mark.parametrize(("m", "n", "delta"), [(2, 4, 1), (4, 9, 3), (6, 7, 2), (5, 5, 4), (3, 8, 3)])
+def test_d_of_any_mechanism_is_the_projector_of_numpys_pseudoinverse(m, n, delta):
+    rng = np.random.default_rng(m * n + delta)
+    A_tilde = rng.normal(size=(3, 7, m, delta)) @ rng.normal(size=(3, 7, delta, n))
+    D = rk.closed_loop_projector(A_tilde, delta)
+    expected = np.linalg.pinv(A_tilde, rcond=1e-10) @ A_tilde  # of rank delta, and the projector is symmetric
+    # Backward stable but for the conditions of the two factors.
+    bound = 1e-14 * np.linalg.cond(A_tilde @ np.swapaxes(A_tilde, -1, -2)[..., :delta]).max() if m == delta else 1e-9
+    assert_allclose(D, expected, rtol=0, atol=max(bound, 1e-11))
+    assert_allclose(D[1, 2], rk.closed_loop_projector(A_tilde[1, 2], delta), rtol=0, atol=1e-12)
+    assert_allclose(np.trace(D, axis1=-2, axis2=-1), delta, rtol=1e-9)
+
+
 def test_lyapunov_function_falls_at_the_rate_of_the_damping():
     target = rk.inverse_kinematics(ROBOT, [0.02, 0.0])
     desired = rk.Desired(3, np.array([0.02, 0.0]), np.zeros(2), np.zeros(2), target, np.zeros(6), np.zeros(6))

@@ -189,6 +189,14 @@ def test_one_common_sign_is_rare():
     assert share[0] == pytest.approx(0.02, abs=0.006) and share[1] == 0
 
 
+def test_common_sign_of_one_null_direction_is_that_of_the_null_vector():
+    at = poses(4000, (0.2, 0.2, np.pi / 2))
+    at = at[np.linalg.norm(four_rrr.corners(at) - four_rrr.BASE, axis=-1).max(axis=-1) < 2 * four_rrr.LINK]
+    A = rk.complement(machine().J(four_rrr.angles(at)), (0, 1, 2))[:, :4]
+    possible = rk.common_sign(A)
+    assert np.array_equal(possible, one_sign(at)) and possible.any()
+
+
 def one_sign(at):
     n = np.linalg.svd(A_tilde(at))[0][..., 3]
     return np.abs(np.sign(n).sum(axis=-1)) == 4

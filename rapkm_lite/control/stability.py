@@ -22,10 +22,11 @@ from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .computed_torque import joint_gain
 
 
-def closed_loop_projector(A_tilde) -> np.ndarray:
-    """D = A~^T (A~^T)^+ of (30), (..., 2N, 2N); equal to N_J wherever the degree of actuation is delta.
+def closed_loop_projector(A_tilde, delta: int = 2) -> np.ndarray:
+    """D = A~^T (A~^T)^+ of (30), (..., n, n); equal to N_J wherever the degree of actuation is delta.
 
-    A_tilde : (..., m, 2N).  Raises ValueError at input singularities.
+    A_tilde : (..., m, n), of any mechanism.  delta : its rank; 2 for the machines of `Manipulator`.
+    Raises ValueError at input singularities, and where `delta` is not the rank.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> D = rk.closed_loop_projector(rk.redundant_control_matrix(robot, q))
@@ -33,13 +34,13 @@ def closed_loop_projector(A_tilde) -> np.ndarray:
     True
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
-    return A_tilde.mT @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde))
+    return A_tilde.mT @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde, delta=delta))
 
 
 def effective_gain(F, K) -> np.ndarray:
-    """(F^T F)^-1 F^T K F of (35) corrected, (..., 2, 2): the gain that the error e2 feels under `RedundantCTC`.
+    """(F^T F)^-1 F^T K F of (35) corrected, (..., delta, delta): the gain that the error e2 feels under `RedundantCTC`.
 
-    F : (..., 2N, 2).  K : one number, or a matrix (..., 2N, 2N), which may be singular (drives only: diag(k, 0)).
+    F : (..., n, delta).  K : one number, or a matrix (..., n, n), which may be singular (drives only: diag(k, 0)).
     Raises ValueError where F has lost rank.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

@@ -20,7 +20,7 @@ from ..machine.arguments import (
     tall_matrix,
 )
 from ..machine.manipulator import Manipulator, manipulator
-from . import cores
+from . import cores, linalg
 from .at import at
 from .kinematics import cross
 from .linalg import many_inverses, product
@@ -124,16 +124,15 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 
 
 def singular_values(A) -> np.ndarray:
-    """Both singular values of (..., m, 2), largest first, in closed form with full relative accuracy of the product.
+    """Singular values (..., delta) of A (..., m, delta), largest first, for any mechanism.
+
+    Two columns have a closed form, which keeps the full relative accuracy of the product.
 
     >>> import rapkm_lite as rk
     >>> rk.singular_values([[3.0, 0.0], [0.0, 4.0], [0.0, 0.0]])
     array([4., 3.])
     """
-    A = tall_matrix("A", A)
-    if A.shape[-1] != 2:
-        raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
-    return cores.singular_values(A)
+    return linalg.singular_values(tall_matrix("A", A))
 
 
 def weighted_pseudoinverse(A, W=None) -> np.ndarray:

@@ -124,10 +124,12 @@ def null_direction(robot: Manipulator, q) -> np.ndarray:
 
 
 def common_sign(A) -> np.ndarray:
-    """Can a prestress load all drives with one sign, so that no gear has backlash?  Boolean (...,) for A (..., m, 2).
+    """Can a prestress load all drives with one sign, so that no gear has backlash?  Boolean (...,).
 
-    A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half plane (Stiemke): where the
-    largest gap between their directions is below a half turn.  For three arms: where all n_i have the same sign.
+    A : (..., m, delta), of any mechanism.
+    A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half space (Stiemke): in the plane,
+    delta = 2, where the largest gap between their directions is below a half turn; with one null direction where all
+    its n_i have the same sign; otherwise a linear programme for each A, some milliseconds, finds the most even n.
     Raises ValueError at input singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
@@ -135,12 +137,31 @@ def common_sign(A) -> np.ndarray:
     True
     """
     A = tall_matrix("A", A)
-    if A.shape[-1] != 2:
-        raise ValueError(f"A has shape {A.shape}; allowed: (..., m, 2)")
     cores.full_rank("A", A)
-    angle = np.sort(np.arctan2(A[..., 1], A[..., 0]), axis=-1)
-    gaps = np.diff(np.concatenate([angle, angle[..., :1] + 2 * np.pi], axis=-1), axis=-1)
-    return gaps.max(axis=-1) < np.pi
+    delta = A.shape[-1]
+    size = np.linalg.norm(A, axis=-1, keepdims=True)
+    if delta == 2 and np.all(size > 0.0):  # a drive without any direction fits into every half plane
+        angle = np.sort(np.arctan2(A[..., 1], A[..., 0]), axis=-1)
+        gaps = np.diff(np.concatenate([angle, angle[..., :1] + 2 * np.pi], axis=-1), axis=-1)
+        return gaps.max(axis=-1) < np.pi
+    # Rows of equal length: no sign changes, and none of the n_i is small for its units.
+    basis = np.linalg.qr(A / np.where(size > 0.0, size, 1.0), mode="complete")[0][..., delta:]
+    least = np.array([_most_even(basis[index]) for index in np.ndindex(A.shape[:-2])])
+    return (least > 1e-12).reshape(A.shape[:-2])[()]
+
+
+def _most_even(basis: np.ndarray) -> float:
+    """The smallest component of the combination n of null vectors, columns of (m, k), where it is largest, n_i <= 1."""
+    m, k = basis.shape
+    if k < 2:
+        return max((float(n.min()) for n in (*basis.T, *-basis.T)), default=0.0)
+    from scipy.optimize import linprog
+
+    # Unknowns: the coefficients of the basis, and what is below all components.
+    rows = np.block([[basis, np.zeros((m, 1))], [-basis, np.ones((m, 1))]])
+    limits = np.append(np.ones(m), np.zeros(m))
+    found = linprog(np.append(np.zeros(k), -1.0), rows, limits, bounds=(None, None))
+    return float((basis @ found.x[:k]).min()) if found.status == 0 else 0.0
 
 
 def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:

@@ -6,13 +6,11 @@ Link vectors are flat, v (..., 4N) in m, as `machine.tree` says; `tree` holds th
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import linear, orthogonal, pivots, product, solve
+from .linalg import linear, minors, orthogonal, pairs, pivots, product, solve
 
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
@@ -220,35 +218,12 @@ def right_inverse(name: str, A: np.ndarray) -> np.ndarray:
     return solve(R, Q.mT).mT
 
 
-def minors(A: np.ndarray) -> np.ndarray:
-    """A_j x A_k of the rows of (..., m, 2), for all pairs j < k, (..., m(m - 1)/2)."""
-    j, k = _pairs(A.shape[-2])
-    u, v = A[..., 0], A[..., 1]
-    return u.take(j, axis=-1) * v.take(k, axis=-1) - u.take(k, axis=-1) * v.take(j, axis=-1)
-
-
-@functools.cache
-def _pairs(m: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.triu_indices(m, 1)
-
-
-def singular_values(A: np.ndarray) -> np.ndarray:
-    """Both singular values of (..., m, 2), largest first; by Lagrange the minors give their product."""
-    u, v = A[..., 0], A[..., 1]
-    X = minors(A)
-    uu, vv, uv, area = np.vecdot(u, u), np.vecdot(v, v), np.vecdot(u, v), np.sqrt(np.vecdot(X, X))
-    sigma = np.empty((*area.shape, 2))
-    sigma[..., 0] = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
-    sigma[..., 1] = area / np.maximum(sigma[..., 0], 1e-300)
-    return sigma
-
-
 def prestress_shares(A: np.ndarray) -> np.ndarray:
     """Length of the rows of a null basis of A^T, (..., m) for A (..., m, 2); infinite at input singularities.
 
     By Cauchy-Binet the square is det(A_-i^T A_-i) / det(A^T A) with A_-i the other rows, both sums of squared minors.
     """
-    j, k = _pairs(A.shape[-2])
+    j, k = pairs(A.shape[-2])
     drives = np.arange(A.shape[-2])
     without = ((drives != j[:, None]) & (drives != k[:, None])).astype(float)
     squares = minors(A) ** 2

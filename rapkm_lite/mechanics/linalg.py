@@ -89,3 +89,29 @@ def pivots(R: np.ndarray) -> tuple[float, float]:
     size = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
     relative = size.min(axis=-1) / np.maximum(size.max(axis=-1), 1e-300)
     return float(size.min(initial=np.inf)), float(relative.min(initial=np.inf))
+
+
+def minors(A: np.ndarray) -> np.ndarray:
+    """A_j x A_k of the rows of (..., m, 2), for all pairs j < k, (..., m(m - 1)/2)."""
+    j, k = pairs(A.shape[-2])
+    u, v = A[..., 0], A[..., 1]
+    return u.take(j, axis=-1) * v.take(k, axis=-1) - u.take(k, axis=-1) * v.take(j, axis=-1)
+
+
+@functools.cache
+def pairs(m: int) -> tuple[np.ndarray, np.ndarray]:
+    """Indices j < k of all pairs of m rows."""
+    return np.triu_indices(m, 1)
+
+
+def singular_values(A: np.ndarray) -> np.ndarray:
+    """Singular values (..., k) of (..., m, k), largest first; for k = 2 by Lagrange the minors give their product."""
+    if A.shape[-1] != 2:
+        return np.linalg.svd(A, compute_uv=False)
+    u, v = A[..., 0], A[..., 1]
+    X = minors(A)
+    uu, vv, uv, area = np.vecdot(u, u), np.vecdot(v, v), np.vecdot(u, v), np.sqrt(np.vecdot(X, X))
+    sigma = np.empty((*area.shape, 2))
+    sigma[..., 0] = np.sqrt((uu + vv + np.hypot(uu - vv, 2 * uv)) / 2)
+    sigma[..., 1] = area / np.maximum(sigma[..., 0], 1e-300)
+    return sigma

@@ -10,8 +10,9 @@ import numpy as np
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from .actuation import distal_cross_products, drive_pairs
-from .cores import prestress_shares, singular_values
+from .cores import prestress_shares
 from .kinematics import ee_complement, inverse_kinematics
+from .linalg import singular_values
 from .partition import PARTITION_RULES
 
 

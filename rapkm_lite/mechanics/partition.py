@@ -9,7 +9,7 @@ import numpy as np
 
 from ..machine.arguments import joint_indices, one_of, real_array, whole_number, wide_matrix
 from . import cores
-from .linalg import product
+from .linalg import product, singular_values
 
 
 def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
@@ -88,7 +88,7 @@ def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
 
 def _spectrum(A1: np.ndarray) -> np.ndarray:
     """Singular values of the rows A~_1 (..., delta, n), largest first."""
-    return cores.singular_values(A1.mT) if A1.shape[-2] == 2 else np.linalg.svd(A1, compute_uv=False)
+    return singular_values(A1.mT)
 
 
 def _inverse_condition(A1: np.ndarray) -> np.ndarray:
