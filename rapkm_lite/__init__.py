@@ -16,7 +16,6 @@ from .machine.arguments import ConvergenceError
 from .machine.datafiles import data_path
 from .machine.logs import Log, mystery_run, read_log
 from .machine.manipulator import Manipulator, load
-from .machine.mjcf import to_mjcf
 from .mechanics.actuation import (
     actuation_type,
     control_matrix,
@@ -82,6 +81,7 @@ from .mechanics.matrices import (
     projector_dot,
     redundant_terms,
 )
+from .mechanics.mjcf import to_mjcf
 from .mechanics.partition import explicit_pseudoinverse, select_independent
 from .mechanics.redundancy import allocate_torques, endeffector_stiffness, minimax_torques
 from .mechanics.trajectory import Desired, Trajectory, circle, follow, hold, polygon, triangle

@@ -122,6 +122,42 @@ def test_mjcf_says_what_the_machine_is():
     assert_allclose(G[np.ix_(order, order)], rk.mass_matrix(robot, q[0]), atol=1e-15)
 
 
+# Machines whose arms do not all reach the centroid of the base points, or hardly bend there.
+AWKWARD = {
+    "one long way": rk.Manipulator(
+        [[-0.1, 0], [0.1, 0], [0.0, 1.2]], lengths=[[0.3, 0.3], [0.3, 0.3], [0.5, 0.25]], masses=1
+    ),
+    "too near": rk.Manipulator([[-0.1, 0], [0.1, 0.01], [0.0, 0.1]], lengths=[0.4, 0.25], masses=1),
+    "mixed mode": MACHINES["testbed"].replace(mode=[1, -1, 1], gravity=[0.0, -9.81], load=0.3),
+}
+
+
+@pytest.mark.parametrize("robot", [*MACHINES.values(), *AWKWARD.values()], ids=[*MACHINES, *AWKWARD])
+def test_mjcf_starts_closed_and_at_rest(robot):
+    """As MuJoCo opens the file, without its keyframe: no violation of any equality, no speed, our mode."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
+    model = mujoco.MjModel.from_xml_string(rk.to_mjcf(robot))
+    state, N = mujoco.MjData(model), robot.n_arms
+    mujoco.mj_forward(model, state)
+    assert state.nefc == 3 * (N - 1) and np.abs(state.efc_pos).max() < 1e-14
+    q = np.concatenate([[state.joint(f"{kind}{i + 1}").qpos[0] for i in range(N)] for kind in ("base", "elbow")])
+    assert np.abs(rk.loop_constraints(robot, q)).max() < 1e-14
+    assert np.array_equal(rk.working_mode(robot, q), robot.mode) and not state.qvel.any()
+    assert_allclose(state.sensor("x").data[:2], rk.forward_kinematics(robot, q), rtol=0, atol=1e-14)
+    assert np.array_equal(state.qpos, model.key_qpos[0])
+    if not robot.gravity.any():
+        mujoco.mj_step(model, state, 1000)
+        assert_allclose(state.qpos, model.key_qpos[0], rtol=0, atol=1e-9)
+
+
+def test_mjcf_starts_amid_the_base_points_where_it_can():
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
+    for name in MACHINES:
+        state = mujoco.MjData(model := mujoco.MjModel.from_xml_string(rk.to_mjcf(MACHINES[name])))
+        mujoco.mj_forward(model, state)
+        assert_allclose(state.sensor("x").data[:2], MACHINES[name].base.mean(axis=0), rtol=0, atol=1e-14)
+
+
 def test_mjcf_refuses_what_it_cannot_export():
     with pytest.raises(ValueError, match="robot = 3"):
         rk.to_mjcf(3)
@@ -129,3 +165,9 @@ def test_mjcf_refuses_what_it_cannot_export():
         rk.to_mjcf(MACHINES["testbed"], timestep=0.0)
     with pytest.raises(ValueError, match="q has shape"):
         rk.to_mjcf(MACHINES["testbed"], q=[0.0])
+    with pytest.raises(ValueError, match=r"q leaves the loops open by .*close_loops"):
+        rk.to_mjcf(MACHINES["testbed"], q=np.zeros(6))
+    touching = rk.Manipulator([[-0.2, 0], [0.2, 0]], lengths=0.1, masses=1)
+    with pytest.raises(ValueError, match="q = None, and no place was found that all arms reach with a bend"):
+        rk.to_mjcf(touching)
+    assert "<key " in rk.to_mjcf(touching, [0.0, np.pi, 0.0, 0.0])

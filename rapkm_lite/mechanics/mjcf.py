@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arguments import exact_array, positive_number
-from .manipulator import Manipulator
+from ..machine.arguments import exact_array, positive_number
+from ..machine.manipulator import Manipulator, manipulator
+from .at import at
+from .kinematics import inverse_kinematics, reachable
+from .maps import workspace_grid
 
 # Loops are closed by stiff, critically damped springs between the tips: the gaps of a run stay below a nanometre.
 _LOOP = 'solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"'
@@ -19,9 +22,10 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     angles and rates of the base joints, in rad and rad/s, and the position of tip 2 in m.  The load is lumped into the
     distal link of arm 2.  Not exported: Coulomb friction (another model there), resistance and torque constant.
 
-    q : (2N,) rad, a pose for the keyframe "start"; without it there is none, and MuJoCo starts with stretched arms.
+    q : (2N,) rad, where MuJoCo starts, at rest, and the keyframe "start"; default: with the end-effector amid the base
+    points, or, where they do not all reach that with a bend, at the place where the arms bend most evenly.
     timestep : s; its integrator is RK4.
-    Raises ValueError for values out of range.
+    Raises ValueError for values out of range, for a q that leaves the loops open, and where the default finds no place.
 
     >>> from rapkm_lite import load
     >>> to_mjcf(load()).count("<motor")
@@ -29,22 +33,19 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     """
     from xml.sax.saxutils import quoteattr  # only when needed: it brings a tenth of what the package imports
 
-    if not isinstance(robot, Manipulator):
-        raise ValueError(f"robot = {robot!r}; allowed: a Manipulator")
+    N = manipulator(robot).n_arms
     timestep = positive_number("timestep", timestep)
-    N = robot.n_arms
+    pose = _home(robot) if q is None else exact_array("q", q, robot.n_joints)
+    _ = at(robot, pose)._closed
     gx, gy = robot.gravity
-    arms = "".join(_arm(robot, i) for i in range(N))
+    arms = "".join(_arm(robot, i, pose) for i in range(N))
     loops = "".join(f'    <connect site1="tip{i + 1}" site2="tip2" {_LOOP}/>\n' for i in range(N) if i != 1)
     drives = [f"drive{i + 1}" for i in range(N)]
     motors = "".join(f'    <motor name="{d}" joint="base{i + 1}"/>\n' for i, d in enumerate(drives))
     angles = "".join(f'    <jointpos name="q{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
     rates = "".join(f'    <jointvel name="qd{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
-    start = ""
-    if q is not None:
-        pose = exact_array("q", q, robot.n_joints)
-        # A tree is read arm by arm: base1 elbow1 base2 elbow2 ...
-        start = f'  <keyframe><key name="start" qpos="{_row(pose.reshape(2, N).T.ravel())}"/></keyframe>\n'
+    # A tree is read arm by arm: base1 elbow1 base2 elbow2 ...
+    start = f'  <keyframe><key name="start" qpos="{_row(pose.reshape(2, N).T.ravel())}"/></keyframe>\n'
     return (
         f"<mujoco model={quoteattr(robot.name)}>\n"
         f'  <compiler angle="radian"/>\n'
@@ -58,22 +59,43 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     )
 
 
-def _arm(robot: Manipulator, i: int) -> str:
+def _home(robot: Manipulator) -> np.ndarray:
+    centre = robot.base.mean(axis=0)
+    if np.all(reachable(robot, centre)) and _bend(q := inverse_kinematics(robot, centre)) > 0.1:
+        return q
+    try:
+        x, y, inside = workspace_grid(robot, 100)
+        q = inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
+        return q[np.argmax(_bend(q))]
+    except ValueError:
+        raise ValueError(
+            "q = None, and no place was found that all arms reach with a bend; allowed: a pose (2N,)"
+        ) from None
+
+
+def _bend(q: np.ndarray) -> np.ndarray:
+    """The smallest |sin(elbow angle)|."""
+    return np.abs(np.sin(q[..., q.shape[-1] // 2 :])).min(axis=-1)
+
+
+def _arm(robot: Manipulator, i: int, pose: np.ndarray) -> str:
     (l1, l2), (m1, m2), (c1, c2), (i1, i2) = robot.lengths[i], robot.masses[i], robot.centers[i], robot.inertias[i]
     load = robot.load if i == 1 else 0.0
     mass, centre = m2 + load, (m2 * c2 + load * l2) / (m2 + load)
     inertia = i2 + m2 * (c2 - centre) ** 2 + load * (l2 - centre) ** 2
     tip = f'        <site name="tip{i + 1}" pos="{l2:.17g} 0 0"/>\n'
-    distal = _link(f"elbow{i + 1}", [l1, 0.0, 0.0], l2, mass, centre, inertia, 0.0, tip)
-    return _link(f"base{i + 1}", [*robot.base[i], 0.0], l1, m1, c1, i1, robot.rotor_inertia[i], distal)
+    base, elbow = pose.reshape(2, -1)[:, i]
+    distal = _link(f"elbow{i + 1}", elbow, [l1, 0.0, 0.0], l2, mass, centre, inertia, 0.0, tip)
+    return _link(f"base{i + 1}", base, [*robot.base[i], 0.0], l1, m1, c1, i1, robot.rotor_inertia[i], distal)
 
 
-def _link(joint: str, position, length: float, mass: float, centre: float, inertia: float, rotor: float, inner) -> str:
+def _link(joint: str, angle, position, length, mass, centre, inertia, rotor, inner: str) -> str:
+    # A viewer opens a model where its bodies stand in the file, which `ref` calls the angle: so they stand at the pose.
     # Moments about the other two axes do nothing in the plane, but MuJoCo wants them to fit a body.
     moments = _row([inertia, inertia, inertia])
     return (
-        f'    <body name="{joint} link" pos="{_row(position)}">\n'
-        f'      <joint name="{joint}" axis="0 0 1" armature="{rotor:.17g}"/>\n'
+        f'    <body name="{joint} link" pos="{_row(position)}" euler="0 0 {angle:.17g}">\n'
+        f'      <joint name="{joint}" axis="0 0 1" ref="{angle:.17g}" armature="{rotor:.17g}"/>\n'
         f'      <inertial pos="{centre:.17g} 0 0" mass="{mass:.17g}" diaginertia="{moments}"/>\n'
         f'      <geom type="capsule" size="{length / 40:.6g}" fromto="0 0 0 {length:.17g} 0 0"/>\n'
         f"{inner}    </body>\n"
