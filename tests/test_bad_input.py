@@ -308,6 +308,29 @@ def test_rank_loss_is_named():
     refused(rk.redundant_dynamics, "q", TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]), np.zeros(6))
 
 
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_rates_that_open_the_loops_are_refused_where_a_motion_is_asked_for(name):
+    """The sentence's remedy, N_J qd, is accepted; so are rates from closed poses a sample apart, and noise at rest."""
+    robot = rk.load(name)
+    q = rk.inverse_kinematics(robot, [[0.02, 0.05], [-0.03, 0.01]])
+    qd, c = np.random.default_rng(0).normal(size=q.shape), np.zeros(robot.n_arms)
+    calls = [
+        lambda qd: rk.forward_dynamics(robot, q, qd, c),
+        lambda qd: rk.inverse_dynamics(robot, q, qd, 0 * q),
+        lambda qd: rk.required_wrench(robot, q, qd, 0 * q),
+    ]
+    speed = np.abs(np.einsum("kij,kj->ki", rk.constraint_jacobian(robot, q), qd)).max()
+    moved = rk.inverse_kinematics(robot, [[0.022, 0.051], [-0.029, 0.008]])  # 2 m/s
+    tangent = np.einsum("kij,kj->ki", rk.nullspace_projector(robot, q), qd)
+    for call in calls:
+        with pytest.raises(ValueError, match=r"qd opens the loops .* allowed: .* nullspace_projector") as caught:
+            call(qd)
+        assert float(str(caught.value).split()[5]) == pytest.approx(speed, rel=1e-2)
+        for fine in (tangent, (moved - q) / 1e-3, 2e-3 * qd / np.abs(qd).max()):
+            call(fine)
+    assert np.all(np.isfinite(rk.at(robot, q, qd).redundant[1]))  # a law takes what it measures
+
+
 OUTSIDE = [[0.3, 0.3], [-0.25, -0.2], [1e3, 0.0]]
 
 

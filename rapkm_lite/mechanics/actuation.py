@@ -171,7 +171,7 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
     """Drive torques c (..., m) in N m of (11): c = (A^T)_W^+ F^T (G qdd + C qd + Q) + N_{A^T,W} c0.
 
     Of all torques for the motion, those of least (c - c0)^T W (c - c0).
-    q, qd, qdd : a motion on V, (..., 2N).  W : see `weighted_pseudoinverse`.
+    q, qd, qdd : a motion on V, (..., 2N); a qd that opens the loops is refused.  W : see `weighted_pseudoinverse`.
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
     also the inverse dynamics (25) in redundant coordinates.
@@ -208,7 +208,9 @@ def _driven(robot: Manipulator, q, qd, qdd):
     """The pose, and the wrench of a motion."""
     q, qd, qdd = joint_vectors(manipulator(robot).n_joints, q=q, qd=qd, qdd=qdd)
     pose = at(robot, q, qd)
-    return pose, matvec(pose.F.mT, matvec(pose.G, qdd) + matvec(pose.C, qd) + pose.Q)
+    F = pose.F
+    cores.check_tangent(robot.tree, pose.J, qd)
+    return pose, matvec(F.mT, matvec(pose.G, qdd) + matvec(pose.C, qd) + pose.Q)
 
 
 def force_polygon(A, torque: float) -> np.ndarray:

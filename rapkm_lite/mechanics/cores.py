@@ -75,6 +75,21 @@ def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
     return v
 
 
+def check_tangent(tree: Tree, J: np.ndarray, qd: np.ndarray) -> None:
+    """Raises ValueError where rates open the loops: |J qd| above 1e-2 of what the longest link could add to it.
+
+    So wide, because rates that are differences of closed poses, or belong to a slightly wrong model, are rates of use.
+    """
+    speed = np.abs(matvec(J, qd)).max(axis=-1)
+    limit = 1e-2 * tree.longest * np.maximum(np.abs(qd).max(axis=-1), 1.0)
+    if np.any(speed > limit):
+        k = np.unravel_index(np.argmax(speed / limit), speed.shape)
+        raise ValueError(
+            f"qd opens the loops at {speed[k]:.3g} m/s; allowed: {limit[k]:.3g} m/s (1e-2 of the longest link times "
+            "the largest rate or 1 rad/s) for motions; nullspace_projector(robot, q) @ qd keeps them closed"
+        )
+
+
 def levers(tree: Tree, v: np.ndarray) -> np.ndarray:
     """a_i x d_i = l1 l2 sin(elbow angle), (..., N)."""
     N, n = tree.N, tree.n

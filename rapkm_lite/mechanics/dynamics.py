@@ -9,6 +9,7 @@ import numpy as np
 
 from ..machine.arguments import check_leading, matvec, real_array, small_number
 from ..machine.manipulator import Manipulator, manipulator
+from . import cores
 from .at import at, given
 
 
@@ -162,7 +163,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
 
     The multipliers are the cut-joint reactions: -lambda_i is the force in N that the end-effector exerts on the tip of
     the cut arm i (1, 3, ..., N; arm 2 is not cut and carries the load).
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities, and for rates that open the loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> qdd, reactions = rk.forward_dynamics(robot, q, 0 * q, [0.1, 0.0, 0.0])
@@ -172,6 +173,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
     pose, c = at(robot, q, given(qd)), real_array("c", c, robot.n_arms)
     lead = check_leading(q=pose.q.shape[:-1], qd=pose.qd.shape[:-1], c=c.shape[:-1])
     _ = pose.N  # raises where J has lost rank
+    cores.check_tangent(robot.tree, pose.J, pose.qd)
     rhs = np.concatenate([c, np.zeros_like(c)], axis=-1) - matvec(pose.C, pose.qd) - pose.Q
     n, r = robot.n_joints, robot.n_constraints
     saddle = np.zeros((*lead, n + r, n + r))
