@@ -41,6 +41,7 @@ LEAST = {"rapkm_lite": 0.98, "rapkm_lite.plotting": 0.9, "rapkm_lite.explore": 0
 ROBOT = rk.load()
 PATH = rk.triangle(ROBOT, duration=0.3, dt=0.01)
 Q = rk.inverse_kinematics(ROBOT, [0.02, 0.05])
+QD = 0.1 * rk.nullspace_projector(ROBOT, Q) @ Q
 RUN = rk.simulate(ROBOT, rk.PD(7.05, 0.225), PATH, [4e-3, -2e-3, 5e-3])
 A = rk.control_matrix(ROBOT, Q)
 A_TILDE = rk.redundant_control_matrix(ROBOT, Q)
@@ -75,7 +76,7 @@ SWING = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))
 
 # A value that works, by the name of the parameter: one word, one thing.
 GOOD: dict[str, Any] = {
-    "robot": ROBOT, "model": ROBOT, "trajectory": PATH, "run": RUN, "q": Q, "qd": 0.1 * rk.nullspace_projector(ROBOT, Q) @ Q, "qdd": 0.2 * Q,
+    "robot": ROBOT, "model": ROBOT, "trajectory": PATH, "run": RUN, "q": Q, "qd": QD, "qdd": 0.2 * Q,
     "x": [0.02, 0.05], "xd": [0.01, 0.0], "xdd": [0.0, 0.1], "q_a": Q[:3], "qd_a": np.zeros(3), "c": np.zeros(3),
     "A": A, "A_tilde": A_TILDE, "F": rk.orthogonal_complement(ROBOT, Q), "K": 7.0, "K_P": 7.0, "K_D": 0.2, "K_I": 1.0,
     "W": [1.0, 2.0, 3.0], "offset": [4e-3, -2e-3, 5e-3], "offsets": 1e-3 * np.eye(3), "wrench": [0.1, 0.0],
