@@ -45,8 +45,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     which = {"all drives": None} | {f"pair {pair_name(p)}": p for p in pairs}
     gx, gy, inside, points = grid_points(robot, 121)
     # An image ends where its last pixels end, half a step beyond their centres.
-    wide, tall = (gx[1] - gx[0]) / 2, (gy[1] - gy[0]) / 2
-    extent = gx[0] - wide, gx[-1] + wide, gy[0] - tall, gy[-1] + tall
+    extent = tuple(end + way * (g[1] - g[0]) / 2 for g in (gx, gy) for end, way in ((g[0], -1), (g[-1], 1)))
     outline = marks.workspace_outline(robot)
     curves = lru_cache(maxsize=8)(lambda mode: marks.singular_curves(robot, modes[mode]))
     matrices = lru_cache(maxsize=8)(
@@ -62,6 +61,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
+        picture.title("machine", f"Machine and map of σ_min, {drives}")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
             for curve in curves(mode)[pair]:
