@@ -107,7 +107,7 @@ def player(widget) -> widgets.Widget:
     # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
     speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
     widgets.jslink((play, "value"), (widget, "value"))
-    return widgets.HBox([play, speed])
+    return widgets.HBox([play, speed]).add_class("rapkm-player")
 
 
 class Shown(widgets.VBox):

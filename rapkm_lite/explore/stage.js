@@ -6,7 +6,7 @@
 // A mark is [kind, panel, style, points, words?]: style a number in `styles` or an object, points how many pairs of the
 // first buffer, or an array of numbers.  Lengths in styles are points (1/72 inch), colours "#rrggbb" for white paper.
 const POINT = 96 / 72;
-const PATIENCE = 5000; // ms after which an answer counts as lost
+const PATIENCE = 5000; // ms after which nobody waits for an answer: the kernel is busy, or another one
 const AFLOAT = 2; // questions under way at the same time: three are no faster and lag more
 
 /** True minus signs before numbers, not in words with a hyphen. */
@@ -102,8 +102,7 @@ const contrast = (a, b) => (Math.max(shine(a), shine(b)) + 0.05) / (Math.min(shi
 export function themeOf(el) {
   const paper = getComputedStyle(el).backgroundColor.match(/[\d.]+/g).slice(0, 3).map(Number);
   const dark = shine(paper) < 0.3, ink = dark ? [235, 235, 235] : [34, 34, 34];
-  const tone = (share) => css(mix(paper, ink, share));
-  const tones = { paper: tone(0), faint: tone(0.13), axis: tone(0.6), ink: tone(1) };
+  const tones = remade({ paper: 0, faint: 0.13, axis: 0.6, ink: 1 }, (share) => css(mix(paper, ink, share)));
   const colour = (hex, fill = false) => {
     if (!hex || !dark || tones[hex]) return tones[hex] ?? hex;
     let c = rgb(hex);
@@ -250,9 +249,8 @@ function area(panel, path, style) {
 }
 
 function words(panel, { kind, points, words }, style) {
-  const { box } = panel, right = box.left + box.width, foot = box.top + box.height;
-  const inside = () => [box.left + points[0] * box.width, foot - points[1] * box.height];
-  const [x, y] = kind === "words" ? inside() : panel.at(...points);
+  const { box } = panel, right = box.left + box.width, foot = box.top + box.height, [u, v] = points;
+  const [x, y] = kind === "words" ? [box.left + u * box.width, foot - v * box.height] : panel.at(u, v);
   if (x < box.left - 1 || x > right + 1 || y < box.top - 1 || y > foot + 1) return;
   const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold), left = x - wide * SHARE[style.ha];
   // Words that would cover others step aside, away from what they name.
@@ -398,7 +396,7 @@ export function mount(el, scene, link) {
     pump();
   }
   function pump(late) {
-    if (open.delete(late)) say("No answer: run the cell again.");
+    if (open.delete(late)) say("No answer yet. Was the kernel restarted? Then run the cell again.");
     if (open.size >= AFLOAT || !Object.keys({ ...waiting.to, ...waiting.by }).length) return;
     const message = { kind: "grab", from: me, seq: ++seq, ...waiting };
     waiting = { to: {}, by: {} };
@@ -468,6 +466,8 @@ export function mount(el, scene, link) {
       plot.style.cursor = held ? "grabbing" : under(panel, event) ? "grab" : "";
     };
     plot.onlostpointercapture = () => (held = null);
+    // A finger that takes hold scrolls the page no more, unless all of the panel would stop it.
+    plot.addEventListener("touchstart", (event) => held?.handle.at[1] != null && event.preventDefault());
   }
 
   copy.onclick = () => say(state.code) && navigator.clipboard?.writeText(state.code).catch(() => {});
@@ -519,7 +519,7 @@ function page(event) {
   event.preventDefault();
   event.stopImmediatePropagation();
   const now = screens.findLastIndex((screen) => screen.getBoundingClientRect().top < innerHeight / 2);
-  screens[Math.min(Math.max(now + way, 0), screens.length - 1)].scrollIntoView({ block: "start" });
+  screens[now + way]?.scrollIntoView({ block: "start" });
 }
 
 export default {

@@ -19,10 +19,13 @@ HANDLED = (
 )  # fmt: skip
 WIDE = {"width": 1400, "height": 1000}
 KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
-FAILING = """from rapkm_lite import explore
+FAILING = """import time
+from rapkm_lite import explore
 def shy(picture, slope):
     picture.handle("a", 0.5, slope, slope=(0, 1))
-    if slope > 2:
+    if slope > 3.5:
+        time.sleep(6)
+    elif slope > 2:
         raise RuntimeError("nobody expected this")
     picture.line("a", [0, 1], [0, slope])
 slopes = {"slope": explore.slider("slope in m", 0.0, 4.0, 0.1, 1.0)}
@@ -252,6 +255,57 @@ def test_failure_in_the_kernel_blocks_nobody(shown):
     drag(notebook, notebook.ask("() => stage.knob()"), (0, 130))
     assert still(notebook)["slope"] < 2
     assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+
+
+def test_slow_answer_is_announced_and_awaited(shown):
+    notebook = shown("shy")
+    notebook.ask("() => stage.root().querySelector('.rapkm-knob').focus()")
+    for _ in range(3):
+        notebook.page.keyboard.press("Shift+ArrowUp")
+    said = "() => stage.root().querySelector('.rapkm-note').textContent"
+    notebook.wait(f"() => ({said})().startsWith('No answer yet')", 15)
+    notebook.wait(f"() => stage.places().slope === 4 && ({said})() === ''", 15)
+    assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+
+
+def test_a_finger_on_a_line_takes_it_and_beside_it_scrolls(shown):
+    notebook = shown("three_opinions")
+    page, touch = notebook.page, notebook.page.context.new_cdp_session(notebook.page)
+    page.set_viewport_size({"width": 390, "height": 800})
+    notebook.ask("() => stage.middle(stage.root().querySelector('.rapkm-plot'))")
+    still(notebook)
+    # Where a line can be taken far from its knob, and where there is nothing to take.
+    places = """() => { const r = stage.root().querySelector('.rapkm-plot').getBoundingClientRect();
+        const grid = [...Array(100).keys()].map(k => [r.left + r.width * (k % 10 + 1) / 11,
+            r.top + r.height * (Math.floor(k / 10) + 1) / 11]);
+        const knobs = [...stage.root().querySelectorAll('.rapkm-knob')].map(e => e.getBoundingClientRect());
+        return grid.filter(([x, y]) => knobs.every(b => Math.hypot(x - b.left - 13, y - b.top - 13) > 50)); }"""
+    cursors = {}
+    for place in notebook.ask(places):
+        page.mouse.move(*place)
+        cursors[notebook.ask("() => stage.root().querySelector('.rapkm-plot').style.cursor")] = place
+    assert set(cursors) == {"", "grab"}
+    notebook.ask("() => { window.cancelled = 0; document.addEventListener('pointercancel', () => cancelled++, true); }")
+    for cursor, taken in (("grab", True), ("", False)):
+        x, y = cursors[cursor]
+        before, cancelled = still(notebook), notebook.ask("() => cancelled")
+        touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+        for k in range(1, 13):
+            touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 8 * k}]})
+            page.wait_for_timeout(30)
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        # A browser that begins to scroll takes the pointer away.
+        assert (still(notebook) != before) is taken
+        assert (notebook.ask("() => cancelled") == cancelled) is taken
+
+
+def test_nothing_plays_where_less_motion_is_asked_for(shown):
+    notebook = shown("animation")
+    seen = "() => document.querySelector('.rapkm-explorer .widget-play').getClientRects().length"
+    assert notebook.ask(seen) == 1
+    notebook.page.emulate_media(reduced_motion="reduce")
+    assert notebook.ask(seen) == 0
+    notebook.page.emulate_media(reduced_motion="no-preference")
 
 
 def test_reloaded_page_goes_on_with_the_kernel(shown):
