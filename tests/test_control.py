@@ -98,6 +98,7 @@ LAWS = {
     "redundant APD": rk.RedundantAPD(50.0, 5.0),
     "redundant CTC": rk.RedundantCTC(400.0, 40.0),
     "line 2": rk.RedundantCTC(400.0, 40.0, projected=False),
+    "line 2 of APD": rk.RedundantAPD(50.0, 5.0, projected=False),
     "printed rule": rk.RedundantCTC(400.0, 40.0, rule="printed"),
 }
 

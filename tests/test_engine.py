@@ -25,6 +25,7 @@ LAWS = {
     "redundant_ctc": rk.RedundantCTC(900.0, 60.0),
     "redundant_ctc_line2": rk.RedundantCTC(900.0, 60.0, projected=False),
     "redundant_apd": rk.RedundantAPD(5.0, 0.2),
+    "redundant_apd_line2": rk.RedundantAPD(5.0, 0.2, projected=False),
 }
 
 

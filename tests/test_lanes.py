@@ -59,6 +59,7 @@ def laws(N):
         "SwitchedCTC, true pose": rk.SwitchedCTC(900.0, 60.0, 1.0, "true"),
         "RedundantAPD": rk.RedundantAPD(5.0, 0.2),
         "RedundantAPD (29)": rk.RedundantAPD(gains, 0.03 * gains),
+        "RedundantAPD line 2": rk.RedundantAPD(gains, 0.2, projected=False),
         "RedundantCTC": rk.RedundantCTC(mixed, 60.0),
         "RedundantCTC (29)": rk.RedundantCTC(100 * gains, 9 * gains),
         "RedundantCTC line 2": rk.RedundantCTC(900.0, 60.0, projected=False, pose="true"),

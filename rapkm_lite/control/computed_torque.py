@@ -191,27 +191,28 @@ class RedundantAPD(LawValue):
     """Augmented PD in redundant coordinates, line 1 of (28): c = (A~^T)^+ (G~ qdd^d + C~ qd^d + Q~ - K_P e - K_D ed).
 
     The errors then obey (30), which is G~ edd + (C~ + D K_D) ed + D K_P e = 0 wherever the degree of actuation is
-    delta, with D of `closed_loop_projector`.  Line 2 of the print, with N_J (G qdd^d + C qd^d + Q), is another law:
-    both agree at e = 0 only.
+    delta, with D of `closed_loop_projector`.
 
     K_P, K_D : in N m/rad, N m s/rad.  (m,) = (N,) are the chapter's gains (29), K = diag(0, ..., 0, K_1, ..., K_m) on
         the driven joints (which come first in our q); one number, (2N,) or (2N, 2N) act on all joints.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
+    projected : False reads line 2 of the print, c = (A~^T)^+ N_J (G qdd^d + C qd^d + Q - K_P e - K_D ed), which is
+        another law: both agree at e = 0 only.
 
     >>> import rapkm_lite as rk
     >>> rk.RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2])
-    RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2], rule='sigma_min', pose='measured')
+    RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2], rule='sigma_min', pose='measured', projected=True)
     """
 
     K_P: Array
     K_D: Array
     rule: str = "sigma_min"
     pose: str = "measured"
+    projected: bool = True
 
     def __post_init__(self):
         self._check_pose()
-        if isinstance(self, RedundantCTC):
-            switch("projected", self.projected)
+        switch("projected", self.projected)
         one_of("rule", self.rule, PARTITION_RULES)
         self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
         super().__post_init__()
@@ -224,9 +225,16 @@ class RedundantAPD(LawValue):
         A_tilde = redundant_control_matrix(model, q)
         return feedback, explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
 
+    def _terms(self, model, q, qd):
+        """Inertia, velocity terms and forces of the line in use."""
+        if self.projected:
+            return redundant_dynamics(model, q, qd)
+        # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
+        return mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd)
+
     def torque(self, model, q, qd, q_a, qd_a, desired):
         feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
-        G, C, Q = redundant_dynamics(model, q, qd)
+        G, C, Q = self._terms(model, q, qd)
         return matvec(pinv, matvec(G, desired.qdd) + matvec(C, desired.qd) + Q - feedback)
 
 
@@ -247,17 +255,10 @@ class RedundantCTC(RedundantAPD):
     True
     """
 
-    projected: bool = True
-
     def torque(self, model, q, qd, q_a, qd_a, desired):
         feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
-        v = desired.qdd - feedback
-        if self.projected:
-            G, C, Q = redundant_dynamics(model, q, qd)
-        else:
-            # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
-            G, C, Q = mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd)
-        return matvec(pinv, matvec(G, v) + matvec(C, qd) + Q)
+        G, C, Q = self._terms(model, q, qd)
+        return matvec(pinv, matvec(G, desired.qdd - feedback) + matvec(C, qd) + Q)
 
 
 def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:

@@ -155,7 +155,8 @@ def gram(lanes, drives, arms, w):
 def redundant_feedback(lanes, drives, arms, law, table, o, w):
     """w and g of (28) and (32) in all joints: w = F^+ (v - Fdot u), or F^T G (v - Fdot u) as a force in line 2."""
     L, N, W = len(lanes), len(drives), len(arms)
-    force, line2 = law.form == REDUNDANT_APD, law.form == REDUNDANT_CTC_LINE2
+    force = law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2
+    line2 = law.form == REDUNDANT_CTC_LINE2 or law.form == REDUNDANT_APD_LINE2
     for j in range(L):
         wx = wy = gx = gy = tx = ty = 0.0
         vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
@@ -173,12 +174,18 @@ def redundant_feedback(lanes, drives, arms, law, table, o, w):
             l1sq, l2sq = w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)]
             if force:
                 gx, gy = gx - bx * s - ex * t, gy - by * s - ey * t
-                # The part of the desired rates that is not tangent, turned by Fdot^T.
+                # The part of the desired rates that is not tangent, turned by Fdot^T; in line 2 it meets C.
                 base, back = inv * (bx * vx + by * vy), inv * (lx * vx + ly * vy)
                 rest = want(table, o, RATE, i, W) - (bx * ux + by * uy)
                 bend = want(table, o, ELBOW_RATE, i, W) - (ex * ux + ey * uy)
-                p, b = base * ad * (rest - bend) - base * l1sq * bend, back * l2sq * (rest - bend) - back * ad * bend
-                tx, ty = tx + bx * p + lx * b, ty + by * p + ly * b
+                if line2:
+                    couple = w[at(MODEL + TIP, i, j, W, L)] * w[at(MDEN, i, j, W, L)]
+                    p, b = couple * (lx * vx + ly * vy) * (rest + bend), couple * (bx * vx + by * vy) * rest
+                    gx, gy = gx + bx * p - lx * b, gy + by * p - ly * b
+                else:
+                    p = base * ad * (rest - bend) - base * l1sq * bend
+                    b = back * l2sq * (rest - bend) - back * ad * bend
+                    tx, ty = tx + bx * p + lx * b, ty + by * p + ly * b
             else:
                 r, q = r - s, q - t
             if line2:

@@ -68,7 +68,7 @@ def joint(drives, arms, table, o, w, which, j, L):
 def reference(lanes, drives, arms, law, table, o, w):
     """The reference rate u: the velocity of the pose, in APD laws what the desired rates of the coordinates mean."""
     L, N, W = len(lanes), len(drives), len(arms)
-    if law.form == REDUNDANT_APD:
+    if law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2:
         for j in range(L):
             fx = fy = 0.0
             for i in range(N):

@@ -10,7 +10,7 @@ from . import compiled
 
 # What a run ended with; laws; filters; pose sources.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
-PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(8)
+PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_APD_LINE2, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(9)
 NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
 MEASURED, TRUE = range(2)
 # At which pose a law of a user wants the matrices.

@@ -79,7 +79,7 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}
     if code in ("REDUNDANT_APD", "REDUNDANT_CTC"):
         (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
-        code = code if getattr(law, "projected", True) else "REDUNDANT_CTC_LINE2"
+        code = code if law.projected else f"{code}_LINE2"
         return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
     (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
     run = {
