@@ -234,7 +234,7 @@ def computed_torque(lanes, drives, arms, extra, law, table, o, w):
     if redundant:
         gram(lanes, drives, arms, w)
     reference(lanes, drives, arms, law, table, o, w)
-    if law.form == APD or law.form == REDUNDANT_APD:
+    if law.form in (APD, REDUNDANT_APD, REDUNDANT_APD_LINE2):
         shares(lanes, drives, arms, extra, w)
     if redundant:
         redundant_feedback(lanes, drives, arms, law, table, o, w)
