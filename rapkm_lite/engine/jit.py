@@ -17,7 +17,8 @@ if COMPILED:
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
 # Kernels write into arrays that they are given: without counts of who refers to them a sample takes up to a third less.
 _OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
-_INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
+_INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
+_VIEW: dict[str, Any] = {**_INNER, "_nrt": True}
 
 
 @functools.cache
@@ -64,7 +65,7 @@ def leaf(function):
 
 def view(function):
     """A `leaf`, or what calls one, that returns a part of an array."""
-    return njit(**{**_INNER, "_nrt": True})(function) if COMPILED else function
+    return njit(**_VIEW)(function) if COMPILED else function
 
 
 def index(function):

@@ -18,9 +18,13 @@ from .tables import *
 
 
 @leaf
-def arm_shares(w, p, P, extra, env, vx, vy, ux, uy, bx, by, lx, ly, ad, inv, den):
+def arm_shares(w, p, P, extra, env, rates, links):
     """Write the shares of an arm, entry p of pair rows of P numbers, in M and h, and the accelerations of its joints
-    at zero xdd, with the reference rate u."""
+    at zero xdd.
+
+    rates : v and the reference rate u.  links : b, l, a.d, 1 / (a x d) and a x d of the arm.
+    """
+    (vx, vy, ux, uy), (bx, by, lx, ly, ad, inv, den) = rates, links
     base = bx * vx + by * vy
     base_acc, back_acc = accelerations(
         base,
@@ -92,7 +96,7 @@ def look(lanes, drives, arms, extra, table, o, w):
             w[at(ELBOW_E, i, j, W, L)] = small_angle(s)
             w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             w[at(ELBOW_ED, i, j, W, L)] = -(bx + lx) * vx - (by + ly) * vy - rate
-            arm_shares(w, i * L + j, W * L, extra, env, vx, vy, vx, vy, bx, by, lx, ly, ad, inv, den)
+            arm_shares(w, i * L + j, W * L, extra, env, (vx, vy, vx, vy), (bx, by, lx, ly, ad, inv, den))
     near = 0.0
     for p in range(N * L):
         near = min(near, w[NEAR * W * L + p])
@@ -113,21 +117,9 @@ def shares(lanes, drives, arms, extra, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            env = (
-                w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
-                w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
-                w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
-            )
-            arm_shares(
-                w,
-                i * L + j,
-                W * L,
-                extra,
-                env,
-                w[of(PVX, j, W, L)],
-                w[of(PVY, j, W, L)],
-                w[of(REF_X, j, W, L)],
-                w[of(REF_Y, j, W, L)],
+            _, _, vx, vy, env = pose_of(w, j, W, L)
+            rates = vx, vy, w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
+            links = (
                 w[at(A1, i, j, W, L)],
                 w[at(A2, i, j, W, L)],
                 w[at(L1, i, j, W, L)],
@@ -136,6 +128,7 @@ def shares(lanes, drives, arms, extra, w):
                 w[at(MINV, i, j, W, L)],
                 w[at(MDEN, i, j, W, L)],
             )
+            arm_shares(w, i * L + j, W * L, extra, env, rates, links)
 
 
 @outlined
