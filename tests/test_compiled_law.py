@@ -1,7 +1,10 @@
 """Laws that a user compiled: the same torques as in Python, against the textbook layer; memory, filters, studies."""
 
+import copy
 import linecache
+import pickle
 import re
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -179,6 +182,21 @@ REFUSED = {
     managed: 'such a with statement is not known here, line # of test_compiled_law.py: with np.errstate(all="ignore"):',
     square: "it returns an array with 2 dimensions",
 }
+
+
+def test_a_decorated_law_travels():
+    """The name of a decorated function is that of the law; runs go to other processes and come back as they were."""
+    for law in (pid, rk.compiled(pid.function, memory=4), rk.AntagonismFilter(pid), rk.compiled(ctc, at="true")):
+        again = pickle.loads(pickle.dumps(law))
+        assert again == law == copy.deepcopy(law) and hash(again) == hash(law)
+    assert pickle.loads(pickle.dumps(pid)).function is pid.function
+    run = rk.simulate(ROBOT, pid, PATH, OFFSET)
+    assert pickle.loads(pickle.dumps(run)) == run
+    with ProcessPoolExecutor(1) as pool:
+        study = rk.sweep(ROBOT, [pid, rk.PD(7.05, 0.225)], PATH, OFFSET, executor=pool, chunk=1)
+    assert study == rk.sweep(ROBOT, [pid, rk.PD(7.05, 0.225)], PATH, OFFSET)
+    with pytest.raises((AttributeError, pickle.PicklingError)):
+        pickle.dumps(rk.compiled(lambda t, q_a, qd_a, d: -q_a))
 
 
 @pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")

@@ -114,6 +114,22 @@ def test_an_exception_without_words():
     assert lost(ROBOT, FailsAt(0.3, stop), PATH).reason.startswith("the law raised StopIteration (line ")
 
 
+class Mute(Exception):
+    """An exception whose words fail themselves."""
+
+    def __str__(self):
+        raise RuntimeError("no words")
+
+
+def test_an_exception_that_cannot_be_printed_loses_nothing():
+    def mute():
+        raise Mute
+
+    error = lost(ROBOT, FailsAt(0.1, mute), PATH)
+    assert error.reason.startswith("the law raised Mute (line ") and isinstance(error.__cause__, Mute)
+    consistent(error, 100)
+
+
 def test_the_first_sample_belongs_to_the_caller():
     with pytest.raises(KeyError, match="gain table"):
         rk.simulate(ROBOT, FailsAt(0.0, boom), PATH)
@@ -307,6 +323,12 @@ def test_finished_chunks_are_on_the_exception_and_the_rest_is_cancelled(law, err
     assert_array_equal(part.energies[:4], rk.sweep(ROBOT, law, PATH, offsets[:4]).energies)
     assert part.energies.mask[4:].all()
     assert "4 of 8 runs were finished" in caught.value.__notes__[-1]
+
+
+def test_an_interrupt_before_any_chunk_is_done_has_a_partial_too():
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, KeyboardInterrupt()), chunk=2)
+    assert caught.value.partial.failed.all() and caught.value.partial.failure_time.mask.all()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")

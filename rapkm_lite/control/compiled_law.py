@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +52,16 @@ class CompiledLaw(LawValue):
         self.check()
         return np.zeros(self.memory)
 
+    def __reduce__(self):
+        # The name of a decorated function stands for the law, which plain pickle would not take for the function.
+        place = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "")
+        try:
+            if _function(*place) is self.function:
+                return _law, (*place, self.at, self.memory)
+        except Exception:  # such as a function within another one, which plain pickle refuses
+            pass
+        return CompiledLaw, (self.function, self.at, self.memory)
+
     def check(self) -> None:
         """Raise ValueError when the function does not take what a run gives it."""
         given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
@@ -79,6 +92,16 @@ class CompiledLaw(LawValue):
 
     def __repr__(self):
         return f"compiled({self._name}, at={self.at!r}, memory={self.memory})"
+
+
+def _function(module: str, name: str):
+    """The function of a module, also where its name stands for the law that a decorator made of it."""
+    found: Any = functools.reduce(getattr, name.split("."), importlib.import_module(module))
+    return found.function if isinstance(found, CompiledLaw) else found
+
+
+def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
+    return CompiledLaw(_function(module, name), at, memory)
 
 
 def compiled(function=None, *, at: str | None = None, memory: int = 0):

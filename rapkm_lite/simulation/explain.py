@@ -40,7 +40,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     if status not in REASONS:
         if isinstance(cause, BadAnswer):
             return str(cause)
-        return f"the law raised {type(cause).__name__}{f': {cause}' if str(cause) else ''}{place(cause)}"
+        return f"the law raised {type(cause).__name__}{_said(cause)}{place(cause)}"
     if status == TOO_STIFF:
         return too_stiff(setup)
     written = _written_by_user(law)
@@ -50,6 +50,15 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, k, written is None), "look at gains, offsets and the path")
     return f"{REASONS[status]} ({words})"
+
+
+def _said(error: BaseException | None) -> str:
+    """The words of an exception, after a colon; those that fail themselves are none."""
+    try:
+        words = str(error)
+    except Exception:
+        words = ""
+    return f": {words}" if words else ""
 
 
 def place(error: BaseException | None) -> str:

@@ -22,17 +22,17 @@ def growth(setup: Setup, law, k: int) -> float | None:
     robot, model, trajectory = setup[:3]
     plant, dt, desired = Plant(robot, trajectory), trajectory.dt, trajectory[k]
     start: Any = as_law(law).start(model, dt)
-    integral = start if isinstance(inner_law(law), PID) else np.zeros(0)
+    integral: np.ndarray = start if isinstance(inner_law(law), PID) else np.zeros(0)
     centre = np.concatenate([trajectory.x[k], trajectory.xd[k], integral])
-    step = 1e-6
-    columns: list[np.ndarray] = []
+    step, columns = 1e-6, []
 
     def following(state):
         controller, (x, xd, memory) = Controller(law, model, dt), np.split(state, (2, 4))
         controller.memory = memory if len(memory) else start
         q, qd = plant.observe(k, state[:4])
         c = controller.command(trajectory.t[k], q, qd, desired, (x, xd))
-        return np.append(np.asarray(plant.hold(state[:4], c, dt), float), controller.memory if len(memory) else memory)
+        held, kept = plant.hold(state[:4], c, dt), controller.memory if len(memory) else memory
+        return np.concatenate([np.asarray(held, dtype=float), np.asarray(kept)])
 
     try:
         for direction in step * np.eye(len(centre)):

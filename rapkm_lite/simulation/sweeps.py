@@ -162,7 +162,7 @@ def sweep(
             errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
             finished = np.count_nonzero(table.status == DONE)
-            if finished:
+            if finished or not isinstance(error, Exception):
                 partial = _result(table, setup, law, offsets, mask=True)
                 hand_over(
                     error,
