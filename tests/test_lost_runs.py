@@ -11,6 +11,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import rapkm_lite as rk
+from rapkm_lite.engine import loop
+from rapkm_lite.simulation import compiled, runs
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.03, duration=0.3)
@@ -143,6 +145,37 @@ def test_an_interrupt_comes_through():
         rk.simulate(ROBOT, FailsAt(0.1, interrupt), PATH)
     consistent(caught.value, 100)
     assert "up to t = 0.1000 s" in caught.value.__notes__[-1]
+
+
+@pytest.mark.parametrize("law", [PD, rk.SwitchedCTC(900.0, 60.0), rk.CTC(900.0, 60.0, (0, 4))], ids=repr)
+@pytest.mark.parametrize(("before", "rows"), [(True, 49), (False, 60)], ids=["before a part", "after a part"])
+def test_an_interrupt_in_the_engine_keeps_what_it_has_done(law, before, rows, monkeypatch):
+    """A Ctrl-C is raised when a kernel returns; it did all or nothing of its part of the samples."""
+    path = rk.triangle(ROBOT, duration=0.6, dt=0.01)
+    whole, real, parts = rk.simulate(ROBOT, law, path, OFFSET), loop.closed_loops, []
+
+    def interrupted(*arguments):
+        parts.append(None)
+        if not (before and len(parts) == 2):
+            real(*arguments)
+        if len(parts) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop, "closed_loops", interrupted)
+    monkeypatch.setattr(compiled, "PART", 50)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, law, path, OFFSET)
+    consistent(caught.value, rows)
+    for name in ("t", "x", "xd", "q_a", "qd_a", "c", "pairs"):
+        assert_array_equal(getattr(caught.value.partial, name), getattr(whole, name)[:rows])
+
+
+def test_an_interrupt_while_the_cause_is_looked_for_loses_no_run(monkeypatch):
+    monkeypatch.setattr(runs, "explain", lambda *arguments: interrupt())
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, rk.PD(1e4, 0.225), PATH, OFFSET)
+    consistent(caught.value, len(caught.value.partial))
+    assert 0 < len(caught.value.partial) < len(PATH)
 
 
 @pytest.mark.parametrize(

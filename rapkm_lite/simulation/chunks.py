@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.grammar import BadAnswer
-from .compiled import DONE, SINGULAR, compiled, encode, many
+from .compiled import DONE, LAW_FAILED, SINGULAR, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import explain
-from .loop import LAW_FAILED
 from .runs import SimulationError, complete
 from .setup import Setup
 

@@ -15,9 +15,12 @@ from .codes import Code, code_of
 from .patience import patience
 from .setup import Outcome, Setup
 
+LAW_FAILED = -2
+"""Status beside those of the engine: the law raised, or the user pressed Ctrl-C."""
+
 __all__ = [
-    "COMPILED", "DONE", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled", "encode", "many",
-    "single", "without_compiler",
+    "COMPILED", "DONE", "LAW_FAILED", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled",
+    "encode", "many", "single", "without_compiler",
 ]  # fmt: skip
 
 
@@ -27,12 +30,20 @@ def encode(law: Any, model) -> Code | None:
     return None if code is None or (code.user is not None and not compiled()) else code
 
 
-def single(setup: Setup, code: Code) -> Outcome:
-    """One run with its history."""
+def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]:
+    """One run with its history, and the Ctrl-C that stopped it; one before the first sample is raised."""
     samples, N = len(setup.trajectory), setup.robot.n_arms
-    history = [np.zeros((samples, size)) for size in (2, 2, N, N, N)] + [np.zeros((samples, 2), np.int32)]
-    w = _run(setup, [code], setup.sensors.offset[None], history)
-    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *all_frozen(history))
+    # Kernels do not hear a Ctrl-C: what they have done when it is raised, the numbers tell.
+    history = [np.full((samples, 2), np.nan), *(np.zeros((samples, size)) for size in (2, N, N, N))]
+    history.append(np.zeros((samples, 2), np.int32))
+    try:
+        w = _run(setup, [code], setup.sensors.offset[None], history)
+    except KeyboardInterrupt as interrupt:
+        begun = int(np.append(np.isfinite(history[0][:, 0]), False).argmin())
+        if begun == 0:
+            raise
+        return Outcome(LAW_FAILED, begun - 1, *all_frozen(history)), interrupt
+    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *all_frozen(history)), None
 
 
 def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -137,14 +148,12 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
+            finally:
+                if log is not None:
+                    _take(history, part, log, drives - N)
             work[:] = w
-            if log is not None and not compiled():
-                _take(history, part, log)
             if not np.any(runs[rows.STATUS] == DONE):
                 break
-
-    if history is not None:
-        history[-1][history[-1] >= drives] -= drives - N
 
     def row(name: str) -> np.ndarray:
         index = getattr(rows, name)
@@ -153,10 +162,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     return row
 
 
-def _take(history, part: slice, log) -> None:
-    """Lists that were filled without a compiler, into the columns of a history."""
-    for column, values in zip(history, log, strict=True):
-        column[part] = np.reshape(values, (-1, column.shape[1]))
+def _take(history, part: slice, log, filled: int) -> None:
+    """Lists that were filled without a compiler, into the columns of a history; elbows follow `filled` arms sooner."""
+    if not compiled():
+        for column, values in zip(history, log, strict=True):
+            column[part] = np.reshape(values, (-1, column.shape[1]))
+    pairs, N = history[-1][part], history[1].shape[1]
+    pairs[pairs >= N + filled] -= filled
 
 
 def _law(code: Code, asks: int, same: bool) -> tables.Law:

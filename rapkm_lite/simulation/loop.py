@@ -10,12 +10,9 @@ import copy
 import numpy as np
 
 from ..control.sample import Controller, NoPose
-from .compiled import DONE, NO_POSE, Plant
+from .compiled import DONE, LAW_FAILED, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup, blank
-
-LAW_FAILED = -2
-"""Status beside those of the engine: the law raised."""
 
 
 def own_copy(law):

@@ -200,21 +200,24 @@ def complete(setup: Setup, law) -> Run:
     words = f"friction is stiff: up to {steps} steps in every hold in which a drive is nearly at rest ..."
     with patience(text=words) if steps > MANY_STEPS else nullcontext():
         if code is not None:
-            outcome = single(setup, code)
+            outcome, cause = single(setup, code)
             if code.user is not None and outcome.status == SINGULAR:
                 outcome, cause = again_in_python(setup, law, outcome)
         else:
             law = own_copy(law)
             outcome, cause = closed_loop(setup, law)
     run = _run(setup, law, outcome)
-    if cause is not None and not isinstance(cause, Exception):
-        time = setup.trajectory.t[outcome.sample]
-        hand_over(cause, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
-        raise cause
-    if outcome.status != DONE:
+    time = setup.trajectory.t[outcome.sample]
+    try:
+        if cause is not None and not isinstance(cause, Exception):
+            raise cause
+        if outcome.status == DONE:
+            return run
         reason = explain(setup, law, outcome.status, outcome.sample, cause)
-        raise SimulationError(setup.trajectory.t[outcome.sample], reason, run) from cause
-    return run
+    except BaseException as error:  # also a Ctrl-C while the cause is looked for
+        hand_over(error, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
+        raise
+    raise SimulationError(time, reason, run) from cause
 
 
 def _run(setup: Setup, law, outcome: Outcome) -> Run:
