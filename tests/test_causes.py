@@ -106,6 +106,13 @@ SETS += [
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
     ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
+    (
+        "TorqueLimit\\(0.01\\) acts, and the law's own limit",
+        HANGING,
+        rk.PID(20.0, 10.0, 0.4, 0.05),
+        HOLD,
+        fault(rk.TorqueLimit(0.01)),
+    ),
     ("DeadDrive", HANGING, rk.PID(20.0, 10.0, 0.4), HOLD, fault(*(rk.DeadDrive(i, 0.1) for i in range(3)))),
 ]
 

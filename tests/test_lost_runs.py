@@ -93,11 +93,13 @@ def test_an_exception_of_the_law_keeps_the_samples_before_it():
         assert_array_equal(getattr(error.partial, name), getattr(whole, name)[:100])
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
         (lambda: None, "law returned None"),
         (lambda: np.array([0.0, np.nan, 0.0]), r"[1] = nan; allowed: finite numbers"),
+        (lambda: np.array([0.0, -1e200, 0.0]), r"[1] = -1e+200; allowed: finite numbers"),
         (lambda: [1.0], "law returned the shape (1,); allowed: (3,)"),
         (lambda: "c", "is not numeric"),
         (lambda: np.zeros((1, 3)), "law returned the shape (1, 3)"),

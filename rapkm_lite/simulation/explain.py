@@ -141,8 +141,11 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
         yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
     inner = inner_law(law)
     if isinstance(inner, PID) and np.isfinite(inner.limit).any():
-        if _runs(setup, _replaced(law, limit=math.inf), k):
-            yield f"the law's own limit of {inner.limit.min():g} N m; without it it is not lost"
+        free, own = _replaced(law, limit=math.inf), f"the law's own limit of {inner.limit.min():g} N m"
+        if _runs(setup, free, k):
+            yield f"{own}; without it it is not lost"
+        if begun and _runs(_with(setup, []), free, k):
+            yield f"{_words(begun[0])}, and {own}; without both it is not lost"
 
 
 def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:

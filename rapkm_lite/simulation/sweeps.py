@@ -161,15 +161,7 @@ def sweep(
         try:
             errors = _collect(pool, chunks, table, progress)
         except BaseException as error:
-            finished = np.count_nonzero(table.status == DONE)
-            if finished or not isinstance(error, Exception):
-                partial = _result(table, setup, law, offsets, mask=True)
-                hand_over(
-                    error,
-                    partial,
-                    f"{finished} of {len(laws)} runs were finished; they are in the `partial` of "
-                    "this exception, a Sweep whose other rows are masked.",
-                )
+            _hand_over_rows(error, table, setup, law, offsets)
             raise
     broken = bool(table.failed.any())
     result = _result(table, setup, law, offsets, mask=failed == "mask" or broken)
@@ -207,6 +199,15 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
                 table.enter(i, *job.result())
         raise
     return errors
+
+
+def _hand_over_rows(error: BaseException, table: Columns, setup: Setup, law, offsets) -> None:
+    """Give an exception the rows that are finished; an interrupt also when there are none."""
+    finished = np.count_nonzero(table.status == DONE)
+    if finished or not isinstance(error, Exception):
+        words = "they are in the `partial` of this exception, a Sweep whose other rows are masked."
+        partial = _result(table, setup, law, offsets, mask=True)
+        hand_over(error, partial, f"{finished} of {len(table.status)} runs were finished; {words}")
 
 
 def _raise(i: int, error, setup: Setup, law, result: Sweep):
