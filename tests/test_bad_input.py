@@ -396,3 +396,42 @@ def test_no_numpy_warnings_turn_into_results():
         for f in (rk.inverse_dynamics, rk.required_wrench):
             assert np.all(np.isfinite(f(TESTBED, Q, QD, QDD)))
         assert np.all(np.isfinite(rk.singular_values(np.zeros((2, 3, 2)))))
+
+
+class Silent:
+    """What has no words for itself."""
+
+    def __repr__(self):
+        raise RuntimeError("no words")
+
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("no numbers")
+
+
+def test_bytes_are_no_numbers():
+    for bad in (b"\x00\x01", bytearray(b"\x00\x01\x02")):
+        refused(rk.steady_state_torque, "offset", A[0], 7.0, bad)
+        refused(rk.control_matrix, "independent", TESTBED, Q[0], bad)
+    refused(rk.PD, "K_P", bytearray(b"a"), 0.2)
+
+
+def test_an_object_without_words_is_named_all_the_same():
+    refused(rk.CommandFilter, "law", Silent())
+    refused(rk.to_mjcf, "robot", Silent())
+    refused(rk.calibrate, "robot", Silent(), Q[:, :3])
+    refused(rk.read_log, "source", Silent())
+    refused(rk.TorqueLimit, "limit", Silent())
+    refused(rk.CommandFilter, "law", "x" * 100000)
+
+
+@pytest.mark.parametrize("n", [5001, 10**18, 2**63])
+def test_a_grid_fits_into_the_memory(n):
+    for of in (rk.workspace_grid, rk.actuation_map, rk.switching_map):
+        refused(of, "n", TESTBED, n=n)
+
+
+def test_what_a_decorator_and_a_calibration_ask_for_is_looked_at_once():
+    refused(rk.compiled, "at", at="nowhere")
+    refused(rk.compiled, "memory", memory=-1)
+    for bad in (-7.0, 0.0, [7.0, 7.0]):
+        refused(rk.calibrate, "K_P", TESTBED, Q[:, :3], K_P=bad)

@@ -279,3 +279,31 @@ def test_workspace_grid_keeps_off_the_boundary():
     np.testing.assert_array_equal(plotting.on_grid(inside, points)[inside], points)
     i, j = np.argwhere(inside)[7]
     assert points[7].tolist() == [x[j], y[i]]
+
+
+def test_arguments_are_looked_at_before_a_picture_is_drawn(world):
+    """What Matplotlib would have drawn, left out or turned into something else."""
+    robot, q = world["robot"], world["q"]
+    wrong = [
+        ("offset", lambda: plotting.plot_synchronization(robot, [0.0, 0.0], ["0.1", "0.1", "0.1"])),
+        ("pair", lambda: plotting.plot_ee_paths(world["runs"], pair="12")),
+        ("labels", lambda: plotting.plot_machine(robot, q, labels=[1.0])),
+        ("guaranteed", lambda: plotting.plot_available_forces(robot, q, guaranteed=-1.0)),
+        ("F", lambda: plotting.plot_configuration_space(robot, [(1, 1, 1)], F="F")),
+        ("n", lambda: plotting.plot_fight_map(robot, OFFSET, 7.05, n=10**18)),
+        ("frames", lambda: plotting.film_workshop(robot, OFFSET, frames=10**18)),
+        ("jumps", lambda: plotting.plot_chatter([0.5, 2.0], [1j, 40.0], [True, False])),
+        ("gap", lambda: plotting.plot_spacing([0.1, 0.2], 0.0, ("offsets", 5e-3))),
+        ("colour", lambda: plotting.plot_workspace(robot, colour="no colour")),
+        ("names", lambda: plotting.plot_readings("ab", [0, 0], [1, 1], scatter(6).reshape(3, 2))),
+    ]
+    for name, call in wrong:
+        with pytest.raises(ValueError, match=rf"\b{name}\b.*allowed"):
+            call()
+
+
+def test_lists_are_arrays_and_curves_may_have_gaps():
+    plotting.plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
+    plotting.plot_demand([0.0, 0.5, 1.0], [0.1, 0.0, 0.1], {"equal": [0.5]})
+    plotting.plot_gain_curve([1.0, 7.0, 9.0], [2.0, np.nan, 4.0], [2.0, 2.1, 2.2], [0.2, 3.0, 4.0])
+    plotting.plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])

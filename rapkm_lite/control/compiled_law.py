@@ -35,9 +35,7 @@ class CompiledLaw(LawValue):
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type):
             raise ValueError(f"function = {short(self.function)}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
-        if self.at is not None:
-            one_of("at", self.at, SOURCES)
-        self._set(memory=whole_number("memory", self.memory, 0))
+        self._set(memory=_asked(self.at, self.memory))
         super().__post_init__()
 
     @property
@@ -104,6 +102,13 @@ def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
     return CompiledLaw(_function(module, name), at, memory)
 
 
+def _asked(at, memory) -> int:
+    """The number of floats of a memory, where both arguments of `compiled` are what they may be."""
+    if at is not None:
+        one_of("at", at, SOURCES)
+    return whole_number("memory", memory, 0, 10**6)
+
+
 def compiled(function=None, *, at: str | None = None, memory: int = 0):
     """Decorator: a law that you write runs inside the compiled loop, some hundred times faster than in Python.
 
@@ -129,5 +134,6 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     compiled(pi, at=None, memory=3)
     """
     if function is None:
+        _asked(at, memory)
         return lambda f: CompiledLaw(f, at, memory)
     return CompiledLaw(function, at, memory)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, matvec, positive_definite, real_array, whole_number
+from ..machine.arguments import bounded, matvec, positive_definite, real_array, short, whole_number
 from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
@@ -112,7 +112,7 @@ def torque_limit(limit) -> np.ndarray:
 def _is_infinite(value) -> np.ndarray:
     try:
         return np.asarray(value, dtype=float) == math.inf
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # whatever an object answers that is asked for a number; `real_array` refuses it
         return np.zeros((), bool)
 
 
@@ -178,7 +178,7 @@ class CommandFilter(LawValue):
     def __post_init__(self):
         self._check_pose()
         if not isinstance(self.law, PD):
-            raise ValueError(f"law = {self.law!r}; allowed: PD, whose commands are filtered")
+            raise ValueError(f"law = {short(self.law)}; allowed: PD, whose commands are filtered")
         super().__post_init__()
 
     def start(self, model, dt):

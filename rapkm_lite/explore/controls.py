@@ -6,8 +6,9 @@ import math
 from collections.abc import Collection
 
 import ipywidgets as widgets
+import numpy as np
 
-from ..machine.arguments import exact_array, function, having, of_kind, positive_number, short, whole_number
+from ..machine.arguments import exact_array, function, having, of_kind, positive_number, real_array, short, whole_number
 from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
@@ -50,6 +51,10 @@ def choice(label: str, options, value=None) -> widgets.Widget:
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
         raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
     options = list(options)
+    for option in options:
+        pair = isinstance(option, tuple) and len(option) == 2
+        if not (pair or isinstance(option, str) or (isinstance(option, int | float) and math.isfinite(option))):
+            raise ValueError(f"options holds {short(option)}; allowed: words, numbers, or pairs (word, value)")
     known = [option[1] if isinstance(option, tuple) else option for option in options]
     if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
         raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
@@ -73,9 +78,12 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
     >>> sorted(offset_sliders(rk.load(), [4, -2, 5]))
     ['offset_1', 'offset_2', 'offset_3']
     """
+    values, most = real_array("values", values), positive_number("limit", limit)
+    if values.ndim != 1 or not values.size or np.abs(values).max() > most:
+        raise ValueError(f"values = {short(values.tolist())}; allowed: a list of offsets in mrad, within +-{most:g}")
     return {
-        f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -float(limit), float(limit), 0.5, float(v))
-        for i, v in enumerate((tuple(values) * robot.n_arms)[: robot.n_arms])
+        f"offset_{i + 1}": slider(f"offset {i + 1} in mrad", -most, most, 0.5, v)
+        for i, v in enumerate(np.resize(values, robot.n_arms).tolist())
     }
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..machine.arguments import (
+    bounded,
     exact_array,
     function,
     having,
@@ -28,7 +29,8 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.trajectory import Trajectory
 
 Known = dict[str, Any]
-_FIRST = ("robot", "trajectory", "ax", "axes")
+# More samples or frames than this are a slip of the hand: they would take all the memory.
+_MOST = 5000
 
 
 def guarded(names: dict[str, Any]) -> dict[str, Any]:
@@ -51,16 +53,15 @@ def _guard(picture: Callable) -> Callable:
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
         asked = [p for p in plain if not (given[p.name] is None and p.default is None)]
         for parameter in asked:
-            if parameter.name in _FIRST or str(parameter.annotation) in ("bool", "str", "int", "float"):
-                _check(parameter, given[parameter.name], known)
+            _check(parameter, given[parameter.name], known, _drawable)
         try:
             return picture(*args, **named)
-        except (ArithmeticError, AttributeError, TypeError, LookupError, ValueError, RuntimeError) as error:
-            if isinstance(error, RuntimeError) and type(error) is not RuntimeError:
+        except Exception as error:
+            if isinstance(error, RuntimeError) and type(error).__module__.startswith("rapkm_lite."):
                 raise  # a run that was lost, say
-            # Curves may be whatever can be drawn; what could not is held to the names.
+            # Curves may have gaps; what could not be drawn is held to the names.
             for parameter in asked:
-                _check(parameter, given[parameter.name], known)
+                _check(parameter, given[parameter.name], known, _numbers)
             if isinstance(error, KeyError) and "allowed" in str(error):
                 raise ValueError(error.args[0]) from error  # a KeyError shows its words in quotes
             if "allowed" in str(error) or "needed" in str(error):
@@ -77,22 +78,28 @@ def _size(value) -> str:
     return f"an array {value.shape}" if isinstance(value, np.ndarray) else short(value)
 
 
-def _check(parameter: inspect.Parameter, value, known: Known) -> None:
+def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -> None:
     name, kind, default = parameter.name, str(parameter.annotation), parameter.default
+    if value is None and kind.endswith("| None"):
+        return
     if kind == "bool" or isinstance(default, bool):
         switch(name, value)
     elif kind == "str" or isinstance(default, str):
         of_kind(name, value, str, "text")
+        if name == "colour":
+            _colour(name, value)
     elif kind == "dict":
         _dictionary(name, value)
-    elif kind == "int":
-        whole_number(name, value, -1 if default == -1 else 0)
+    elif kind.startswith("int"):
+        whole_number(name, value, -1 if default == -1 else 0, _MOST)
     elif kind == "float" or isinstance(default, float):
         exact_array(name, value)
     elif kind.startswith("Callable"):
         function(name, value)
     elif name in _RULES:
         _RULES[name](name, value, known)
+    elif name in _CURVES:
+        curve(name, value, known)
 
 
 def _dictionary(name: str, value) -> None:
@@ -121,7 +128,7 @@ def _table(name: str, value, known: Known) -> None:
 
 
 def _axes(name: str, value, known: Known) -> None:
-    for ax in np.ravel(np.asarray(value, dtype=object)):
+    for ax in np.ravel(np.asarray(value, dtype=object)) if isinstance(value, np.ndarray | list | tuple) else [value]:
         having(name, ax, "axes of matplotlib, or None for new ones", "plot", "get_xlim", "figure")
 
 
@@ -145,19 +152,24 @@ def _pair(name: str, value, known: Known) -> None:
 
 
 def _pairs(name: str, value, known: Known) -> None:
-    for pair in of_kind(name, value, (list, tuple, np.ndarray), "pairs of drives, such as [(0, 1), (0, 2)]"):
+    several = "pairs of drives, such as [(0, 1), (0, 2)]"
+    of_kind(name, value, (list, tuple, np.ndarray), several)
+    if value.shape[1:] != (2,) if isinstance(value, np.ndarray) else not value:
+        raise ValueError(f"{name} = {short(value)}; allowed: {several}")
+    for pair in value:
         _pair(name, pair, known)
 
 
 def _arms(name: str, value, known: Known) -> None:
-    if isinstance(value, list | tuple | range | np.ndarray) and len(value) == 1:
+    if isinstance(value, list | tuple | range | np.ndarray) and np.ndim(value) == 1 and len(value) == 1:
         whole_number(name, value[0], 0)
     else:
         joint_indices(name, list(value) if isinstance(value, range) else value, _drives(known), None, "arm")
 
 
 def _signs(name: str, value, known: Known) -> None:
-    if not np.all(np.abs(real_array(name, value)) == 1.0):
+    signs = real_array(name, value)
+    if not signs.size or not np.all(np.abs(signs) == 1.0):
         raise ValueError(f"{name} = {short(value)}; allowed: +1 or -1 for each arm")
 
 
@@ -169,7 +181,47 @@ def _numbers(name: str, value, known: Known) -> None:
 
 
 def _logical(value) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype == bool
+    try:
+        return isinstance(value, np.ndarray | list) and np.asarray(value).dtype == bool
+    except ValueError:
+        return False
+
+
+def _drawable(name: str, value, known: Known) -> None:
+    """What Matplotlib would draw as a curve: numbers, of which some may be missing or hidden."""
+    try:
+        fine = np.ma.asarray(value).dtype.kind in "biuf" and not isinstance(value, bytes | bytearray)
+    except Exception:
+        fine = False
+    if not fine:
+        _numbers(name, value, known)
+
+
+def _level(name: str, value, known: Known) -> None:
+    """One number to compare with, or the words beside it and the number."""
+    exact_array(name, value[1] if isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], str) else value)
+
+
+def _size_of(name: str, value, known: Known) -> None:
+    bounded(name, exact_array(name, value), 0.0, strict=False)
+
+
+def _rows(name: str, value, known: Known) -> None:
+    if not isinstance(value, list | tuple) or not value:
+        raise ValueError(f"{name} = {short(value)}; allowed: a list of rows")
+
+
+def _words(name: str, value, known: Known) -> None:
+    listed = isinstance(value, list | tuple) and value and all(isinstance(word, str) for word in value)
+    if not listed:
+        raise ValueError(f"{name} = {short(value)}; allowed: a list of words")
+
+
+def _colour(name: str, value) -> None:
+    from matplotlib.colors import is_color_like
+
+    if not is_color_like(value):
+        raise ValueError(f"{name} = {short(value)}; allowed: a colour of Matplotlib, such as '#112233'")
 
 
 def _gain(name: str, value, known: Known) -> None:
@@ -196,12 +248,20 @@ _RULES: dict[str, Callable[[str, Any, Known], None]] = {
     "modes": _signs,
     "K": _gain,
     "K_P": _gain,
-    **dict.fromkeys(
-        (
-            "F x y t values sigma forces theory ratio simulated target jumps can_rest spacing gap "
-            "marked rate zoom gains without with_filter antagonistic centres reference low high readings demand points "
-            "start stop vmin vmax quantum friction box inside cube xd share part"
-        ).split(),
-        _numbers,
-    ),
+    "free": _run,
+    "clipped": _run,
+    "names": _words,
+    "labels": _words,
+    "rules": _words,
+    "head": _words,
+    "rows": _rows,
+    "marked": _level,
+    "special": _level,
+    **dict.fromkeys("rate vmin vmax target nominal".split(), _level),
+    **dict.fromkeys("quantum friction guaranteed".split(), _size_of),
+    **dict.fromkeys("F n limit zoom places start stop end box forces room pose low high centres".split(), _numbers),
 }
+_CURVES = (
+    "x y t values sigma theory ratio simulated jumps can_rest spacing gap gains without with_filter antagonistic "
+    "reference readings demand points inside cube xd share part c eps leak residual bias exact error predicted"
+).split()

@@ -57,8 +57,8 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
         raise ValueError(f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)")
     try:
         array = np.asarray(value)
-        # NumPy would read "1.0" and True as numbers, and drop the imaginary part of a complex array.
-        if value is None or array.dtype.kind not in "iufO":
+        # NumPy would read "1.0", True and bytes as numbers, and drop the imaginary part of a complex array.
+        if value is None or isinstance(value, bytearray) or array.dtype.kind not in "iufO":
             raise TypeError
         array = array.astype(float, copy=False)
     except OverflowError:
@@ -145,11 +145,11 @@ def small_number(name: str, value) -> float:
     return number
 
 
-def whole_number(name: str, value, low: int) -> int:
-    """Return `value` as an int that is not below `low`."""
+def whole_number(name: str, value, low: int, high: float = math.inf) -> int:
+    """Return `value` as an int that is not below `low`, nor above `high`."""
     number = float(bounded(name, exact_array(name, value), low, strict=False))
-    if not number.is_integer():
-        raise ValueError(f"{name} = {number:g}; allowed: whole numbers >= {low}")
+    if not number.is_integer() or number > high:
+        raise ValueError(f"{name} = {number:g}; allowed: whole numbers >= {low}" + f", to {high}" * (high < math.inf))
     return int(number)
 
 
@@ -177,9 +177,13 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
 def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: str = "joint") -> tuple[int, ...]:
     """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
     numbers = value.tolist() if isinstance(value, np.ndarray) else value
-    exact = isinstance(numbers, Sequence) and all(
-        isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < (math.inf if n is None else n)
-        for i in numbers
+    exact = (
+        isinstance(numbers, Sequence)
+        and not isinstance(numbers, bytes | bytearray)
+        and all(
+            isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < (math.inf if n is None else n)
+            for i in numbers
+        )
     )
     fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
     if not fits:

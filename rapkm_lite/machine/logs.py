@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .arguments import one_of, real_array
+from .arguments import one_of, real_array, short
 from .datafiles import data_path
 from .values import Array, Value
 
@@ -76,7 +76,7 @@ def read_log(source: str | Path) -> Log:
     Log('gain', 901 records, 9 s, 3 drives)
     """
     if not isinstance(source, str | Path):
-        raise ValueError(f"source = {source!r}; allowed: the path of a CSV file")
+        raise ValueError(f"source = {short(source)}; allowed: the path of a CSV file")
     path = Path(source)
     try:
         # Spreadsheets write a mark before the header, editors an empty line at the end.
@@ -84,7 +84,7 @@ def read_log(source: str | Path) -> Log:
             header, *lines = list(csv.reader(file)) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no text in UTF-8"
-        raise ValueError(f"the log {str(source)!r} cannot be read ({reason}); allowed: a CSV file") from None
+        raise ValueError(f"source = {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
     while lines and not lines[-1]:
         lines.pop()
     N, rest = divmod(len(header) - 1, 3)

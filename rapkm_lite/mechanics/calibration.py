@@ -16,7 +16,7 @@ import numpy as np
 
 from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number, real_array
 from ..machine.logs import Log, read_log
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, Value
 from .at import at
 from .encoders import cautions, changed, closure, gauge, poses, rounding, unknown_names
@@ -133,17 +133,17 @@ def calibrate(
     >>> rk.calibrate(rk.load(), rk.mystery_run("offset_b")).rank
     3
     """
-    if not isinstance(robot, Manipulator):
-        raise ValueError(f"robot = {robot!r}; allowed: a Manipulator")
+    manipulator(robot)
     one_of("unknowns", unknowns, UNKNOWNS)
     one_of("use", use, ("angles", "torques"))
+    K_P = None if K_P is None else bounded("K_P", drive_values("K_P", K_P, robot.n_arms), 0.0, strict=True)
     noise = None if noise is None else positive_number("noise", noise)
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
     angles, logs = _read(robot, log)
     stand = rests(logs) if logs else None
     gain = fitted_gain(stand) if stand else None
-    notes = [] if gain is None or K_P is None else gain.objections(drive_values("K_P", K_P, robot.n_arms))
+    notes = [] if gain is None or K_P is None else gain.objections(K_P)
     if use == "torques":
         angles, step = _angles_of_torques(robot, stand, gain, K_P, notes)
     else:
@@ -187,7 +187,7 @@ def _angles_of_torques(
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
                 "filter; allowed: the gain of the drives, or use = 'angles'"
             )
-    K_P = bounded("K_P", drive_values("K_P", K_P, robot.n_arms), 0.0, strict=True)
+    K_P = bounded("K_P", K_P, 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))

@@ -40,7 +40,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     ((20,), (20,), (20, 20))
     """
     manipulator(robot)
-    n = whole_number("n", n, 2)
+    n = whole_number("n", n, 2, 5000)
     left, right, low, high = sampling_box(robot) if box is None else exact_array("box", box, 4)
     if not (left < right and low < high):
         raise ValueError(f"box = {(left, right, low, high)}; allowed: (x_min, x_max, y_min, y_max) with min < max")

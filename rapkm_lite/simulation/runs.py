@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import matvec
+from ..machine.arguments import matvec, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -188,7 +188,7 @@ def simulate(
     """
     given = Sensors(offset, encoder, velocity_filter)
     if sensors is not None and given != Sensors():
-        raise ValueError(f"sensors = {sensors!r} together with {given!r}; allowed: one of both")
+        raise ValueError(f"sensors = {short(sensors)} together with {given!r}; allowed: one of both")
     return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law)
 
 

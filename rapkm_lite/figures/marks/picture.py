@@ -184,7 +184,7 @@ class Picture:
 
     def _check(self, panel: str) -> None:
         if panel not in self.panels:
-            raise KeyError(f"there is no panel {panel!r}; allowed: {', '.join(self.panels)}")
+            raise KeyError(f"there is no panel {short(panel)}; allowed: {', '.join(self.panels)}")
 
     def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words: Any = "") -> None:
         self._check(panel)
