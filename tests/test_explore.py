@@ -239,6 +239,23 @@ def test_wrong_names_raise_a_sentence_that_names_both_sides():
         light().picture.line("b", 0, 0)
 
 
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("slope", ("a", None, [1.0, 2.0], 1j, 4.0)), ("number", (2.5, "3")), ("word", ([1], "up")), ("on", (1, "yes"))],
+)
+def test_controls_refuse_what_they_cannot_take(name, values):
+    controls = {
+        "slope": explore.slider("slope", -3.0, 3.0, 0.1, 1.0),
+        "number": explore.slider("number", 1, 9, 1, 5),
+        "word": explore.choice("word", ["a", "b"]),
+        "on": explore.switch("on"),
+    }
+    made = explore.explorer(lambda picture, **rest: None, controls, {"a": {}})
+    for value in values:
+        with pytest.raises(ValueError, match=f"^{name} .*allowed"):
+            made.set(**{name: value})
+
+
 def test_a_broken_draw_fails_at_once():
     def broken(picture, slope):
         raise TypeError("a mistake in the lesson")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Hashable
 
 import ipywidgets as widgets
 import numpy as np
@@ -129,13 +129,18 @@ def check(name: str, widget, value) -> None:
     """Raise ValueError for a value that the control cannot take."""
     if isinstance(widget, widgets.Dropdown):
         allowed = [option[1] if isinstance(option, tuple) else option for option in widget.options]
-        if value not in allowed:
-            raise ValueError(f"{name} = {value!r}; allowed: {', '.join(map(repr, allowed))}")
+        if not isinstance(value, Hashable) or value not in allowed:
+            raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
+    elif isinstance(widget, widgets.Checkbox):
+        truth(name, value)
     elif hasattr(widget, "min"):
+        number = float(exact_array(name, value))
+        if isinstance(widget, widgets.IntSlider) and not number.is_integer():
+            raise ValueError(f"{name} = {number:g}; allowed: whole numbers")
         low, high = _ends(widget)
         slack = 1e-12 * max(abs(low), abs(high))
-        if not low - slack <= value <= high + slack:
-            raise ValueError(f"{name} = {value!r}; allowed: {low:g} to {high:g}")
+        if not low - slack <= number <= high + slack:
+            raise ValueError(f"{name} = {number:g}; allowed: {low:g} to {high:g}")
 
 
 def tidied(value):
