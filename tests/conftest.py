@@ -38,7 +38,7 @@ GROUPS = {
         "test_types",
     ],
     "oracle": ["test_oracles", "test_symbolic", "test_your_machine"],
-    "browser": ["test_lab", "test_stage", "test_start"],
+    "browser": ["test_lab", "test_lite", "test_stage", "test_start"],
 }
 # Longer than their file lets one expect.
 SLOW = {

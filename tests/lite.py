@@ -1,7 +1,7 @@
 """All lessons of a built JupyterLite site, top to bottom in headless Chromium: python -m tests.lite docs/_site/lite
 
-Fails on a traceback, on a request to elsewhere, and on a slider that changes no picture.  --only 03 takes one lesson;
---cells 5 names the five slowest cells of each.
+Fails on a traceback, on a request to elsewhere, and on a slider that changes neither picture nor numbers: every slider
+of every explorer is moved.  --only 03 takes one lesson; --cells 5 names the five slowest cells of each.
 """
 
 from __future__ import annotations
@@ -21,9 +21,17 @@ PROMPTS = "[...document.querySelectorAll('.jp-CodeCell .jp-InputPrompt')].map(e 
 WAITING = f"{PROMPTS}.filter(t => t.includes('*')).length"
 ERRORS = """[...document.querySelectorAll('.jp-OutputArea-output')].map(e => e.innerText)
     .filter(t => /Traceback \\(most|Error displaying widget|Failed to load model/.test(t)).map(t => t.slice(-400))"""
-# What each explorer has painted so far, and the pictures of widgets.
-SEEN = """[...document.querySelectorAll('.rapkm')].map(e => e.dataset.drawn).join()
-    + [...document.querySelectorAll('.jupyter-widgets img')].map(e => e.src.length).join()"""
+# The sliders that a reader can take: their labels, values and ends, by their place among all of the page.
+SLIDERS = """() => [...document.querySelectorAll('.rapkm-explorer .noUi-handle')].map((e, place) => ({ place,
+    label: e.closest('.rapkm-control')?.querySelector('.widget-label')?.textContent ?? '',
+    shown: e.getClientRects().length > 0, ...Object.fromEntries(['now', 'min', 'max'].map(
+        name => [name, Number(e.getAttribute('aria-value' + name))])) }))"""
+# The canvases and the numbers of the explorer of a slider.
+LOOK = """(place) => { const all = document.querySelectorAll('.rapkm-explorer .noUi-handle');
+    const root = all[place].closest('.rapkm-explorer');
+    return [...root.querySelectorAll('canvas')].map(c => c.toDataURL()).join()
+        + root.querySelector('.rapkm-numbers')?.textContent + root.querySelector('.rapkm-problem')?.textContent; }"""
+HANDLE = ".rapkm-explorer .noUi-handle"
 # Nothing but this machine answers.
 OFFLINE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
 
@@ -33,6 +41,39 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
     def log_message(self, *args):
         pass
+
+
+def key(now: float, least: float, most: float) -> str:
+    """What moves a slider for certain: a leap to the side that has more room; one press is one picture."""
+    return "PageUp" if now - least <= most - now else "PageDown"
+
+
+def idle_sliders(page, patience: float = 30.0, limit: float = 600.0) -> list[str]:
+    """Move every slider of every explorer on a page; says which changed nothing within `patience` s, and what is left
+    when `limit` s are over."""
+    wrong, end = [], time.monotonic() + limit
+    for slider in page.evaluate(SLIDERS):
+        name = f"slider {slider['place'] + 1}, {slider['label'] or 'without a label'},"
+        if not slider["shown"]:
+            continue
+        if time.monotonic() > end:
+            wrong.append(f"{name} and all after it had no turn within {limit:.0f} s")
+            break
+        before, handle = page.evaluate(LOOK, slider["place"]), page.locator(HANDLE).nth(slider["place"])
+        handle.scroll_into_view_if_needed()
+        handle.press(key(slider["now"], slider["min"], slider["max"]))
+        try:
+            page.wait_for_function(
+                f"([place, before]) => ({LOOK})(place) !== before",
+                arg=[slider["place"], before],
+                timeout=1000 * patience,
+                polling=100,
+            )
+        except Exception as error:
+            if "Timeout" not in type(error).__name__:
+                raise
+            wrong.append(f"{name} changes nothing")
+    return wrong
 
 
 def drive(context, address: str, notebook: str, limit: float, cells: int = 0) -> list[str]:
@@ -64,19 +105,12 @@ def drive(context, address: str, notebook: str, limit: float, cells: int = 0) ->
     took = ends[-1] - started
     seconds = sorted(((b - a, k) for k, (a, b) in enumerate(pairwise(ends))), reverse=True)[:cells]
     slowest = "".join(f", {s:.0f} s in code cell {k + 1}" for s, k in seconds)
+    wrong += idle_sliders(page, limit=limit)
+    sliders = page.evaluate(SLIDERS)
+    folded = sum(not slider["shown"] for slider in sliders)
     wrong += page.evaluate(ERRORS)
-    handles = page.locator(".jupyter-widgets .noUi-handle")
-    for k in range(min(handles.count(), 6)):
-        handle, before = handles.nth(k), page.evaluate(SEEN)
-        handle.scroll_into_view_if_needed()
-        handle.press("PageUp")
-        handle.press("ArrowLeft")
-        try:
-            page.wait_for_function(f"(before) => {SEEN} !== before", arg=before, timeout=30_000)
-        except Exception:
-            wrong.append(f"slider {k} changes no picture")
     said = "; ".join(wrong) or "well"
-    print(f"{notebook}: run all {took:.0f} s{slowest}, {handles.count()} sliders, {said}", flush=True)
+    print(f"{notebook}: run all {took:.0f} s{slowest}, {len(sliders)} sliders, {folded} folded, {said}", flush=True)
     page.close()
     return wrong
 
