@@ -32,7 +32,15 @@ def terminal(monkeypatch):
 def notebook(monkeypatch):
     shown = []
     monkeypatch.setattr(_patience, "_notebook", lambda: True)
-    monkeypatch.setattr("IPython.display.display", lambda bundle, raw: shown.append((bundle, raw)))
+
+    def display(bundle, raw, display_id):
+        shown.append((bundle, raw))
+        return types.SimpleNamespace(update=display_again)
+
+    def display_again(bundle, raw):
+        shown.append((bundle, raw))
+
+    monkeypatch.setattr("IPython.display.display", display)
     return shown
 
 
@@ -89,15 +97,17 @@ def test_nothing_is_shown_where_nobody_looks(monkeypatch):
 
 def test_a_notebook_sees_a_widget_without_text(notebook):
     slow("notebook")
-    ((bundle, raw),) = notebook
+    (bundle, raw), last = notebook
     assert raw and list(bundle) == ["application/vnd.jupyter.widget-view+json"]
+    # Nothing is left for a page that is opened later.
+    assert last == ({}, True)
 
 
 def test_progress_counts_the_chunks(terminal, notebook, monkeypatch):
     with _patience.progress_bar(4) as advance:
         for _ in range(4):
             advance()
-    assert len(notebook) == 1
+    assert len(notebook) == 2 and notebook[-1][0] == {}
     monkeypatch.setattr(_patience, "_notebook", lambda: False)
     with _patience.progress_bar(4) as advance:
         advance()

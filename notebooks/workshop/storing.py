@@ -68,8 +68,9 @@ def cover(cell: nbformat.NotebookNode) -> None:
 
 def bare_widget(output: nbformat.NotebookNode) -> bool:
     """True for a widget with nothing but its repr beside it, of which nothing is left without a kernel."""
-    data = output.get("data", {})
-    return WIDGET in data and set(data) <= {WIDGET, "text/plain"}
+    data = output.get("data")
+    # A line for somebody who waits is emptied at its end.
+    return data == {} or (bool(data) and WIDGET in data and set(data) <= {WIDGET, "text/plain"})
 
 
 def tidy(notebook: nbformat.NotebookNode) -> None:

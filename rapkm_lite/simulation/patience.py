@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ..machine.arguments import short
 
@@ -54,12 +54,21 @@ def _in_terminal() -> bool:
     return sys.stderr is not None and sys.stderr.isatty()
 
 
-def _display(widget) -> None:
-    """Show a widget without the text that `display` would leave in the notebook."""
+def _display(widget) -> Callable[[], None]:
+    """Show a widget without the text that `display` would leave in the notebook; returns what takes it away.
+
+    The output is emptied, too: a page that is shown later, or without a kernel, would look for the widget in vain.
+    """
     from IPython.display import display
 
     view = {"version_major": 2, "version_minor": 0, "model_id": widget.model_id}
-    display({"application/vnd.jupyter.widget-view+json": view}, raw=True)
+    shown = display({"application/vnd.jupyter.widget-view+json": view}, raw=True, display_id=True)
+
+    def leave() -> None:
+        widget.close()
+        shown.update({}, raw=True)
+
+    return leave
 
 
 def _terminal(text: str) -> None:
@@ -73,9 +82,7 @@ def _show(text: str):
     if _notebook():
         from ipywidgets import Label
 
-        label = Label(text)
-        _display(label)
-        return label.close
+        return _display(Label(text))
     if _in_terminal():
         _terminal(text)
         return lambda: _terminal(" " * len(text) + "\r")
@@ -115,7 +122,7 @@ def progress_bar(total: int):
         from ipywidgets import IntProgress
 
         bar = IntProgress(max=total, description="runs")
-        _display(bar)
+        leave = _display(bar)
 
     def advance():
         nonlocal done
@@ -131,6 +138,6 @@ def progress_bar(total: int):
         yield advance
     finally:
         if notebook:
-            bar.close()
+            leave()
         elif terminal:
             _terminal(" " * 60 + "\r")
