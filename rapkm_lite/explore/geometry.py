@@ -61,7 +61,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
-        picture.title("machine", f"Machine and map of σ_min, {drives}")
+        picture.title("machine", f"Machine and map of σ_min, {drives}", fontweight="bold")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
             for curve in curves(mode)[pair]:
