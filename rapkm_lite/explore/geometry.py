@@ -61,10 +61,11 @@ def machine(robot: Manipulator | None = None) -> Explorer:
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
-        picture.title("machine", f"Machine and map of σ_min, {drives}", fontweight="bold")
+        picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
             for curve in curves(mode)[pair]:
+                picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
                 picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
         A = act.control_matrix(robot, q)
         numbers = {
@@ -107,7 +108,6 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     pairs = act.drive_pairs(robot)
-    paths = {"triangle": triangle, "circle": circle}
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
@@ -164,7 +164,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
-        "path": choice("path", paths.keys()),
+        "path": choice("path", ["triangle", "circle"]),
         "size": slider("side or diameter in mm", 40, 320, 5, 240),
         "torque": slider("torque limit in mN m", 20, 200, 5, 85),
     }

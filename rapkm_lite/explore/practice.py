@@ -9,6 +9,7 @@ import numpy as np
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.laws import PD, AntagonismFilter
 from ..figures import marks
+from ..figures.maps import mode_name
 from ..figures.style import NEUTRAL
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
@@ -124,7 +125,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     N, middle = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - middle
     out = along / np.linalg.norm(along, axis=1, keepdims=True)
-    modes = {"".join("+" if s > 0 else "−" for s in mode): mode for mode in working_modes(robot)}
+    modes = {mode_name(mode): mode for mode in working_modes(robot)}
     offset = np.resize(OFFSET, N)
 
     def draw(picture, radius, proximal, distal, load, mode):
