@@ -104,7 +104,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             picture.line("opinions", *np.stack([rest, target]).T, color=arm_colour(i), linewidth=6, alpha=0.55)
             knob = level[i] * normal[i] + 0.72 * half * along
             words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
-            picture.text("opinions", *(knob + 0.15 * half * normal[i]), f"{i + 1}", **words, zorder=6)
+            picture.text("opinions", *(knob + 0.21 * half * normal[i]), f"{i + 1}", **words, zorder=6)
             picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
         corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
         if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
