@@ -100,7 +100,6 @@ from .lessons.lesson04.figures import (
 from .lessons.lesson05.figures import (
     film_mirror,
     plot_ee_paths,
-    plot_effective_gain,
     plot_feedback_along,
     plot_feedback_map,
     plot_lyapunov,
@@ -108,7 +107,6 @@ from .lessons.lesson05.figures import (
     plot_pairs,
     plot_partition_rules,
     plot_singular_poses,
-    plot_step_response,
     plot_torques_and_errors,
 )
 from .lessons.lesson06.figures import (
@@ -142,9 +140,11 @@ from .lessons.lesson10.figures import (
     plot_saturation,
 )
 from .lessons.lesson11.figures import (
+    plot_effective_gain,
     plot_law_bands,
     plot_loop_frequencies,
     plot_slow_error,
+    plot_step_response,
 )
 from .lessons.lesson12.figures import (
     plot_apex,

@@ -113,3 +113,95 @@ def test_offsets_shift_all_laws_with_a_model_alike():
     for law in (rk.PD(8.2, 0.5), rk.APD(300.0, 20.0, None), rk.CTC(K_P, K_D, None), rk.RedundantCTC(K_P, K_D)):
         run = rk.simulate(ROBOT, law, hold, offset)
         np.testing.assert_allclose(run.x[-1] - place, shift, atol=0.03 * np.linalg.norm(shift))
+
+
+def deviating():
+    """A pose, rates and measured angles beside a point of the path: (q, qd, q_a, qd_a, desired)."""
+    desired = PATH[900]
+    rng = np.random.default_rng(28)
+    q = rk.inverse_kinematics(ROBOT, desired.x + [4e-3, -3e-3])
+    qd = rk.orthogonal_complement(ROBOT, q, None) @ (desired.xd + [0.02, 0.01])
+    return q, qd, q[:3] + 1e-3 * rng.normal(size=3), qd[:3] + 1e-2 * rng.normal(size=3), desired
+
+
+def test_redundant_apd_with_gains_on_the_drives_is_filtered_pd_and_feed_forward():
+    """(28) with (29) feeds back what PD sends through the filter (16), for all errors: (A~^T)^+ K e = R K_a e_a."""
+    q, qd, _, _, desired = case = deviating()
+    pd = rk.PD([7.0, 5, 9], [0.2, 0.3, 0.1]).torque(ROBOT, *case)
+    R = rk.antagonism_filter(rk.control_matrix(ROBOT, q))
+    assert np.linalg.norm(pd - R @ pd) > 1e-3  # N m; there is something to filter
+    G, C, Q = rk.redundant_dynamics(ROBOT, q, qd)
+    A_tilde = rk.redundant_control_matrix(ROBOT, q)
+    model = rk.explicit_pseudoinverse(A_tilde, (0, 1)) @ (G @ desired.qdd + C @ desired.qd + Q)
+    law = rk.RedundantAPD([7.0, 5, 9], [0.2, 0.3, 0.1])
+    np.testing.assert_allclose(law.torque(ROBOT, *case), model + R @ pd, atol=1e-12)
+
+
+@pytest.mark.parametrize("line", [1, 2])
+@pytest.mark.parametrize("law", [rk.RedundantAPD, rk.RedundantCTC])
+def test_closed_loop_of_each_line_of_28_and_32(law, line):
+    """The plant is (22), N_J (G qdd + C qd + Q) = A~^T c, and A~^T (A~^T)^+ = N_J: each line makes an error equation,
+    with G and C of the tree in line 2 and with those between projectors in line 1."""
+    K_P, K_D = np.array([7.0, 5, 9, 1, 2, 3]), np.array([0.2, 0.3, 0.1, 0.4, 0.2, 0.1])
+    q, qd, q_a, qd_a, desired = case = deviating()
+    qdd = rk.forward_dynamics(ROBOT, q, qd, law(K_P, K_D, projected=line == 1).torque(ROBOT, *case))[0]
+    N = rk.nullspace_projector(ROBOT, q)
+    if line == 1:
+        G, C, _ = rk.redundant_dynamics(ROBOT, q, qd)
+    else:
+        G, C = rk.mass_matrix(ROBOT, q), rk.coriolis_matrix(ROBOT, q, qd)
+    e, ed = np.r_[q_a, q[3:]] - desired.q, np.r_[qd_a, qd[3:]] - desired.qd
+    if law is rk.RedundantAPD:
+        left = G @ (qdd - desired.qdd) + C @ (qd - desired.qd) + K_P * e + K_D * ed
+    else:
+        left = G @ (qdd - desired.qdd + K_P * e + K_D * ed)
+    np.testing.assert_allclose(N @ left, 0, atol=1e-11)
+
+
+@pytest.mark.parametrize("line", [1, 2])
+def test_both_lines_of_28_make_the_same_springs(line):
+    """What differs is the feed-forward: springs F^T K F at the end-effector in both, with (29) those of PD, A^T K A."""
+    K, D = np.array([5.0, 7.05, 9.0]), np.full(3, 0.2)
+    for k in SOME:
+        inertia = rk.minimal_dynamics(ROBOT, PATH.q[k], np.zeros(6), None)[0]
+        F = rk.orthogonal_complement(ROBOT, PATH.q[k], None)
+        for gains, rates in ((K, D), (np.r_[K, 1.0, 2.0, 3.0], np.full(6, 0.2))):
+            springs = np.linalg.solve(inertia, F.T @ np.diag(np.resize(np.r_[gains, np.zeros(3)], 6)) @ F)
+            found = stiffness(rk.RedundantAPD(gains, rates, projected=line == 1), PATH.x[k])
+            np.testing.assert_allclose(found, springs, atol=1e-3 * np.abs(springs).max())
+
+
+def test_second_line_of_32_with_gains_on_the_drives_has_complex_springs():
+    """Gbar^-1 F^T G K F, not the effective gain (F^T F)^-1 F^T K F; with one gain on all joints both are that gain."""
+    for k in SOME:
+        F, G = rk.orthogonal_complement(ROBOT, PATH.q[k], None), rk.mass_matrix(ROBOT, PATH.q[k])
+        for gains, chosen in ((np.full(3, K_P), ON_DRIVES), (K_P, np.eye(6))):
+            rates = gains * K_D / K_P
+            theory = K_P * np.linalg.solve(F.T @ G @ F, F.T @ G @ chosen @ F)
+            found = stiffness(rk.RedundantCTC(gains, rates, projected=False), PATH.x[k])
+            np.testing.assert_allclose(found, theory, atol=2e-3 * K_P)
+    np.testing.assert_allclose(theory, K_P * np.eye(2), atol=1e-9 * K_P)
+
+
+def test_equal_speed_of_all_laws_at_the_centroid():
+    """One number carries a gain in 1/s^2 into the unit of each law; all modes are then equal, as symmetry demands."""
+    q = rk.inverse_kinematics(ROBOT, np.zeros(2))
+    A, F, G = rk.control_matrix(ROBOT, q), rk.orthogonal_complement(ROBOT, q, None), rk.mass_matrix(ROBOT, q)
+    Gbar = F.T @ G @ F
+
+    def carried(springs, drives=()):
+        return 2 / np.trace(np.linalg.solve(Gbar, springs)) * K_P * np.ones(drives)
+
+    share = Gbar @ rk.effective_gain(F, ON_DRIVES)
+    laws = [
+        rk.PD(carried(A.T @ A), 0.2), rk.APD(carried(np.eye(2)), 20.0, None), rk.CTC(K_P, K_D, None),
+        rk.RedundantAPD(carried(A.T @ A, 3), np.full(3, 0.2)), rk.RedundantAPD(carried(F.T @ F), 0.2),
+        rk.RedundantAPD(carried(A.T @ A, 3), np.full(3, 0.2), projected=False), rk.RedundantCTC(K_P, K_D),
+        rk.RedundantCTC(carried(share, 3), np.full(3, K_D)),
+    ]  # fmt: skip
+    for law in laws:
+        np.testing.assert_allclose(stiffness(law, np.zeros(2)), K_P * np.eye(2), atol=1e-3 * K_P)
+    second = rk.RedundantCTC(carried(F.T @ G @ ON_DRIVES @ F, 3), np.full(3, K_D), projected=False)
+    values = np.linalg.eigvals(stiffness(second, np.zeros(2)))
+    np.testing.assert_allclose(values.real, K_P, rtol=1e-3)  # and a turning part that no gain of one number takes away
+    assert np.abs(values.imag).min() > 0.1 * K_P

@@ -79,8 +79,8 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     '1.22 mm'
     """
     robot = frictionless(robot)
-    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), 2.5, centre=robot.base.mean(axis=0))
-    q = path.q[0]
+    middle = robot.base.mean(axis=0)
+    path, q = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), 2.5, centre=middle), inverse_kinematics(robot, middle)
     A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
     # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
     carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))

@@ -1,7 +1,7 @@
-"""Answers to lesson 05: the feedback map, the explicit pseudoinverse, a dead encoder, the gain for a bandwidth."""
+"""Answers to lesson 05: the feedback map, the explicit pseudoinverse, a dead encoder."""
 
 import numpy as np
-from scipy.optimize import bisect, minimize
+from scipy.optimize import minimize
 
 import rapkm_lite as rk
 
@@ -224,97 +224,6 @@ def without_inverse(A, rows):
     return result
 
 
-def driven(robot):
-    return np.diag([1.0] * robot.n_arms + [0.0] * robot.n_arms)
-
-
-def shares(robot, q, independent=None):
-    F = rk.orthogonal_complement(robot, q, independent)
-    return np.linalg.eigvals(rk.effective_gain(F, driven(robot))).real
-
-
-def gain(robot, q, omega):
-    return omega**2 / shares(robot, q).min()
-
-
-def one_by_one(robot, q, omega):
-    return max(omega**2 / shares(robot, one).min() for one in q)
-
-
-def by_projector(robot, q, omega):
-    N = rk.nullspace_projector(robot, q)
-    return omega**2 / np.sort(np.linalg.eigvalsh(N @ driven(robot) @ N))[:, -2].min()
-
-
-def by_hand(robot, q, omega):
-    slow = []
-    for one in q:
-        F = rk.orthogonal_complement(robot, one, (0, 1))
-        slow.append(np.linalg.eigvals(np.linalg.inv(F.T @ F) @ F.T @ driven(robot) @ F).real.min())
-    return [omega**2 / min(slow)]
-
-
-def bisected(robot, q, omega):
-    return bisect(lambda K: K * shares(robot, q).min() - omega**2, 1.0, 1e6, xtol=1e-2)
-
-
-def random_directions(robot, q, omega):
-    """The slowest of many random directions: a share, searched."""
-    rng = np.random.default_rng(0)
-    F = rk.orthogonal_complement(robot, q)
-    v = np.einsum("kij,aj->kai", F, rng.normal(size=(20000, 2)))
-    return omega**2 / (np.sum(v[..., : robot.n_arms] ** 2, axis=-1) / np.sum(v**2, axis=-1)).min()
-
-
-def without_inertia(independent):
-    def answer(robot, q, omega):
-        F = rk.orthogonal_complement(robot, q, independent)
-        return omega**2 / np.linalg.eigvals(np.swapaxes(F, 1, 2) @ driven(robot) @ F).real.min()
-
-    return answer
-
-
-def second_line(robot, q, omega):
-    F, G = rk.orthogonal_complement(robot, q), rk.mass_matrix(robot, q)
-    left = np.swapaxes(F, 1, 2) @ G
-    return omega**2 / np.linalg.eigvals(np.linalg.solve(left @ F, left @ driven(robot) @ F)).real.min()
-
-
-GAINS = [
-    ("right", "smallest eigenvalue", gain),
-    ("right", "one pose at a time", one_by_one),
-    ("right", "projector", by_projector),
-    ("right", "by hand, in a list", by_hand),
-    ("right", "angles of two drives", lambda r, q, w: w**2 / shares(r, q, (0, 1)).min()),
-    ("right", "as an array", lambda r, q, w: np.array([gain(r, q, w)])),
-    ("close", "bisected", bisected),
-    ("close", "random directions", random_directions),
-    ("wrong", "fastest", lambda r, q, w: w**2 / shares(r, q).max(), "largest"),
-    ("wrong", "omega", lambda r, q, w: w / shares(r, q).min(), "squared"),
-    ("wrong", "multiplied", lambda r, q, w: w**2 * shares(r, q).min(), "divided"),
-    ("wrong", "first pose", lambda r, q, w: w**2 / shares(r, q[0]).min(), "first pose"),
-    ("wrong", "mean of poses", lambda r, q, w: w**2 / shares(r, q).min(axis=1).mean(), "mean"),
-    ("wrong", "mean of directions", lambda r, q, w: w**2 / shares(r, q).mean(axis=1).min(), "mean"),
-    ("wrong", "fast direction", lambda r, q, w: w**2 / shares(r, q).max(axis=1).min(), "fast"),
-    ("wrong", "printed, end-effector", without_inertia(None), "printed"),
-    ("wrong", "printed, drives 1 and 2", without_inertia((0, 1)), "printed"),
-    ("wrong", "line 2", second_line, "line 2"),
-    ("wrong", "all joints", lambda r, q, w: w**2, "all joints"),
-    ("wrong", "passive joints", lambda r, q, w: w**2 / (1 - shares(r, q)).min(), "passive"),
-    ("wrong", "negative", lambda r, q, w: -gain(r, q, w), "sign"),
-    ("wrong", "in Hz", lambda r, q, w: gain(r, q, 2 * np.pi * w), "factor"),
-    ("wrong", "twice", lambda r, q, w: 2 * gain(r, q, w), "twice"),
-    ("wrong", "root", lambda r, q, w: np.sqrt(gain(r, q, w)), "root"),
-    ("wrong", "square", lambda r, q, w: gain(r, q, w) ** 2, "square"),
-    ("wrong", "what omega^2 leaves", lambda r, q, w: w * np.sqrt(shares(r, q).min()), "natural frequency"),
-    ("wrong", "each pose", lambda r, q, w: w**2 / shares(r, q).min(axis=1), "shape"),
-    ("wrong", "K_D", lambda r, q, w: 2 * gain(r, q, w) / w, "factor omega"),
-    ("wrong", "three drives", lambda r, q, w: w**2 / (shares(r, q).min() * 3 / r.n_arms), "number of drives"),
-    ("wrong", "3/7 everywhere", lambda r, q, w: w**2 * 7 / 3, "centroid"),
-    ("wrong", "matrix", lambda r, q, w: rk.effective_gain(rk.orthogonal_complement(r, q), driven(r)), "shape"),
-]
-
-
 def alive_of(qd_a):
     return (qd_a != 0.0) | ~np.any(qd_a)
 
@@ -397,6 +306,5 @@ SURVIVORS = [
 ANSWERS = {
     "05.feedback_map": MAPS,
     "05.explicit_pseudoinverse": INVERSES,
-    "05.gain_for_bandwidth": GAINS,
     "05.dead_encoder": SURVIVORS,
 }

@@ -1,4 +1,5 @@
-"""Exercises of lesson 11: how fast springs make the machine, what a wrong model costs, one law for three duties."""
+"""Exercises of lesson 11: how fast springs make the machine, what a wrong model costs, what a gain of
+driven joints is worth, one law for three duties."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from ...mechanics.actuation import control_matrix
 from ...mechanics.dynamics import mass_matrix, minimal_dynamics
 from ..checker import Exercise
 from . import tasks
+from .bandwidth import GAIN_FOR_BANDWIDTH
 
 
 def _frequencies(robot, q, matrix) -> np.ndarray:
@@ -133,6 +135,7 @@ EXERCISES = {
             "these are forces in N, before the inertia is divided out": _force,
         },
     ),
+    "11.gain_for_bandwidth": GAIN_FOR_BANDWIDTH,
     "11.one_law": Exercise(
         lambda robot: CTC((4.4 * np.pi) ** 2, 8.8 * np.pi, None),
         hints=(

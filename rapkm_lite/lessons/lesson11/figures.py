@@ -1,11 +1,13 @@
-"""Figures of lesson 11: how fast each loop is along the path, and what laws cost over many machines."""
+"""Figures of lesson 11: how fast each loop is, what a gain is worth, and what laws cost over many machines."""
 
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...control.stability import effective_gain
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...mechanics.dynamics import orthogonal_complement
 
 _LOOKS = (
     {"color": NEUTRAL, "ls": "-", "marker": "o"},
@@ -71,4 +73,39 @@ def plot_slow_error(t, error, predicted, ax=None):
     ax.axhline(0, color="#BBBBBB", lw=0.8)
     ax.set(xlabel="time in s", ylabel="true − wanted place in mm", xlim=(t[0], t[-1]))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4)
+    return ax
+
+
+def plot_effective_gain(trajectory, K, ax=None):
+    """Both eigenvalues of the effective gain (F^T F)^-1 F^T K F of (35) along a path; K (2N, 2N) without unit.
+
+    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3); import numpy as np
+    >>> ax = plot_effective_gain(path, np.diag([1, 1, 1, 0, 0, 0]))
+    """
+    ax = axes_or_new(ax)
+    values = np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)).real
+    low, high = np.sort(values, axis=-1).T
+    ax.plot(trajectory.t, high, color=NEUTRAL, ls="--", label="fast direction")
+    ax.plot(trajectory.t, low, color=AFTER, label="slow direction")
+    ax.fill_between(trajectory.t, low, high, color="#DDDDDD", alpha=0.6, lw=0)
+    ax.set(xlabel="time in s", ylabel="effective / nominal gain", xlim=(0, trajectory.t[-1]), ylim=(0, 1.05))
+    ax.legend(ncols=2, loc="upper right")
+    return ax
+
+
+def plot_step_response(t, measured: dict, predicted: dict, ax=None):
+    """Simulated lines and predicted points (every 25th sample) of a deviation in mm, by label.
+
+    >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1.0, 0.4, 0.1]}, {"theory": [1.0, 0.4, 0.1]})
+    """
+    ax = axes_or_new(ax)
+    marks = (("o", AFTER), ("s", AFTER), ("x", ALARM))
+    for (label, y), line in zip(measured.items(), ("-", "--", ":"), strict=False):
+        ax.plot(t, 1e3 * np.asarray(y), line, color=AFTER, label=f"simulated, {label}")
+    for (label, y), (marker, colour) in zip(predicted.items(), marks, strict=False):
+        look = {"color": colour, "mfc": "white", "ms": 5}
+        ax.plot(t[::25], 1e3 * np.asarray(y[::25]), marker, label=f"predicted, {label}", **look)
+    ax.axhline(0.0, color=NEUTRAL, lw=0.8)
+    ax.set(xlabel="time in s", ylabel="deviation in mm", xlim=(0, t[-1]))
+    ax.legend(loc="upper right")
     return ax

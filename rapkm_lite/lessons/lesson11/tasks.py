@@ -102,8 +102,8 @@ def balance(got, robot, model, q, qd, xd, xdd, K_P) -> tuple[float, str]:
 
 @functools.cache
 def duties() -> tuple:
-    """The machine and its path, the machine with a payload that the law does not know."""
-    robot = load()
+    """The machine without friction and its path, the machine with a payload that the law does not know."""
+    robot = load().replace(friction=0.0)
     return robot, triangle(robot, 0.12, 2.5), robot.replace(load=PAYLOAD)
 
 

@@ -1,4 +1,4 @@
-"""Exercise of lesson 05 on what a gain of the driven joints is worth, and the machines that its exercises try."""
+"""Exercise of lesson 11 on what a gain of the driven joints is worth."""
 
 from __future__ import annotations
 
@@ -10,15 +10,7 @@ from ...mechanics.dynamics import mass_matrix, nullspace_projector, orthogonal_c
 from ...mechanics.kinematics import inverse_kinematics
 from ..checker import Case, Exercise
 
-
-def machines() -> dict:
-    """Machines without friction by the words that a verdict has for them."""
-    files = {"three equal arms": "testbed", "unequal arms": "asymmetric", "four arms": "four_arms"}
-    return {words: load(name).replace(friction=0.0) for words, name in files.items()}
-
-
-def poses(robot, rng, count: int) -> np.ndarray:
-    return inverse_kinematics(robot, rng.uniform(-0.06, 0.06, (count, 2)))
+_MACHINES = {"three equal arms": "testbed", "unequal arms": "asymmetric", "four arms": "four_arms"}
 
 
 def _driven(robot) -> np.ndarray:
@@ -36,8 +28,8 @@ def gain_for_bandwidth(robot, q, omega: float) -> float:
 
 def _bandwidths(rng) -> list[tuple]:
     return [
-        Case(words, robot, poses(robot, rng, 6), float(omega))
-        for words, robot in machines().items()
+        Case(words, robot, inverse_kinematics(robot, rng.uniform(-0.06, 0.06, (6, 2))), float(omega))
+        for words, robot in ((words, load(file)) for words, file in _MACHINES.items())
         for omega in rng.uniform(5.0, 40.0, 2)
     ]
 
