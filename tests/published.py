@@ -157,9 +157,6 @@ def numbers() -> list[Number]:
             for j, row in enumerate(("no filter", "filter"))
             for i in range(3)
         ),
-        Number("05", "effective gain at the centroid", _centroid_gain, EXACT, "3 / 7"),
-        Number("05", "lowest effective gain on the triangle", lambda: effective()[0], 1e-6, "0.19"),
-        Number("05", "highest effective gain on the triangle", lambda: effective()[1], 1e-6, "0.73"),
         Number("05", "stall torque at 24 V, N m", stall, EXACT, "1.02"),
         Number("05", "switches without hysteresis", lambda: switches(1.0), EXACT, "switches == 9"),
         Number("05", "switches with hysteresis 1.2", lambda: switches(1.2), EXACT, "switches == 3"),
@@ -375,8 +372,11 @@ def controllers() -> list[Number]:
         return np.sqrt(np.mean(raced(name).path_error ** 2))
 
     return [
+        Number("11", "effective gain at the centroid", _centroid_gain, EXACT, "3 / 7"),
+        Number("11", "lowest effective gain on the triangle", lambda: effective()[0], 1e-6, "0.19"),
+        Number("11", "highest effective gain on the triangle", lambda: effective()[1], 1e-6, "0.73"),
         Number("11", "frequency of PD, centroid, Hz", lambda: np.sqrt(_top_of(pull()) * 7.05) / (2 * np.pi), EXACT),
-        Number("11", "gains that (29) must be raised by", lambda: 1 / _centroid_gain(), EXACT, "7/3"),
+        Number("11", "gains that (29) must be raised by", lambda: 1 / _centroid_gain(), EXACT),
         Number("11", "mean miss of computed torque, m", lambda: rms("CTC"), RUN, "0.84 mm"),
         Number("11", "largest miss of PD, m", lambda: raced("PD").path_error.max(), RUN, "2 mm it is"),
         Number("11", "antagonistic energy of PD, J", lambda: rk.antagonistic_energy(raced("PD")), RUN, "2.4 J on"),
