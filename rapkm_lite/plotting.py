@@ -45,6 +45,7 @@ from .figures.style import (
     arm_line,
     arm_text_colour,
     axes_or_new,
+    plain_ticks,
     use_style,
 )
 from .figures.tables import (
@@ -78,13 +79,11 @@ from .lessons.lesson02.figures import (
 )
 from .lessons.lesson03.figures import (
     film_three_lines,
-    plot_chatter,
     plot_disagreement,
     plot_fight_map,
     plot_gain_ratio,
     plot_log,
     plot_rest_torques,
-    plot_torque_steps,
 )
 from .lessons.lesson04.figures import (
     film_filter,
@@ -123,8 +122,10 @@ from .lessons.lesson07.figures import (
 )
 from .lessons.lesson08.figures import (
     plot_bias,
+    plot_chatter,
     plot_counted,
     plot_places,
+    plot_torque_steps,
 )
 from .lessons.lesson09.figures import (
     plot_accelerations,
@@ -183,6 +184,7 @@ __all__ = [
     "pair_line",
     "pair_measures",
     "pair_name",
+    "plain_ticks",
     "plane_axes",
     "plane_limits",
     "plot_accelerations",

@@ -133,8 +133,6 @@ def numbers() -> list[Number]:
         Number("02", "centroid to the nearest pair curve, m", nearest_curve, 1e-5, "0.101 m"),
         Number("02", "eta_3 = 0 first, s", lambda: mirror_times()[0], 1e-5),
         Number("02", "entry of eta at the centroid", lambda: abs(rk.null_vector(robot(), at().q)[0]), EXACT),
-        Number("03", "one count of 2000, rad", lambda: rk.Sensors(encoder=2000).count or 0.0, EXACT, "3.14$ mrad"),
-        Number("03", "friction of a drive, N m", lambda: robot().friction[0], EXACT, "4.2 mN m"),
         Number(
             "03",
             "antagonism at rest, centroid, N m",
@@ -166,6 +164,8 @@ def numbers() -> list[Number]:
         Number("06", "energy by the form at (4, -2, 5) mrad, J", lambda: OFFSET @ small() @ OFFSET, RUN),
         Number("07", "via points every 3.75 mm, rad", lambda: gap(64), 1e-6, "0.11"),
         Number("07", "inherent antagonism at 1 kHz, share", _inherent(frictionless), 1e-3, "0.1 % of the energy"),
+        Number("08", "one count of 2000, rad", lambda: rk.Sensors(encoder=2000).count or 0.0, EXACT, "3.14$ mrad"),
+        Number("08", "friction of a drive, N m", lambda: robot().friction[0], EXACT, "4.2 mN m"),
         *calibration(),
         *allocation(),
         *imperfections(),

@@ -140,8 +140,8 @@ def test_secrets_are_not_handed_out(capsys):
 def test_strict_mode_raises_unless_solved(monkeypatch, capsys):
     monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
     with pytest.raises(AssertionError, match="opposite sign"):
-        check("03.counts", lambda K_P, friction: -np.pi * K_P / friction)
-    assert check("03.counts", lambda K_P, friction: np.pi * K_P / friction)(7.05, 4.2e-3) > 5000
+        check("08.counts", lambda K_P, friction: -np.pi * K_P / friction)
+    assert check("08.counts", lambda K_P, friction: np.pi * K_P / friction)(7.05, 4.2e-3) > 5000
 
 
 def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):

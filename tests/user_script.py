@@ -82,4 +82,4 @@ plotting.plot_torques(run, ax, "torques")
 panel = {"a": {"xlabel": "time in s"}}
 shown = explore.explorer(lambda picture, gain: {"gain": f"{gain}"}, {"gain": explore.slider("gain", 1, 9, 1, 5)}, panel)
 shown.set(gain=3)
-answer = check("03.counts", lambda K_P, friction: np.pi * K_P / friction)
+answer = check("08.counts", lambda K_P, friction: np.pi * K_P / friction)

@@ -55,6 +55,34 @@ def fixed(places):
 
 PAIRS = np.array([55, 65, 175, 185, 295, 305])
 
+COUNTS = [
+    ("right", "formula", lambda K_P, friction: np.pi * K_P / friction),
+    ("right", "through the quantum", lambda K_P, friction: 2 * np.pi / (2 * friction / K_P)),
+    ("close", "rounded up", lambda K_P, friction: np.ceil(np.pi * K_P / friction)),
+    (
+        "close",
+        "searched one by one",
+        lambda K_P, friction: next(n for n in range(1, 10**6) if K_P * 2 * np.pi / n <= 2 * friction),
+    ),
+    ("close", "pi of 3.14", lambda K_P, friction: 3.14 * K_P / friction),
+    ("wrong", "half the band", lambda K_P, friction: 2 * np.pi * K_P / friction, "factor of 2"),
+    ("wrong", "band twice", lambda K_P, friction: np.pi * K_P / friction / 2, "half"),
+    ("wrong", "degrees", lambda K_P, friction: 180 * K_P / friction, "degrees"),
+    ("wrong", "reciprocal", lambda K_P, friction: friction / (np.pi * K_P), "reciprocal"),
+    ("wrong", "largest step", lambda K_P, friction: 2 * friction / K_P, "step"),
+    ("wrong", "per radian", lambda K_P, friction: K_P / (2 * friction), "2 pi"),
+    ("wrong", "lines", lambda K_P, friction: np.pi * K_P / friction / 4, "factor of 4"),
+    ("wrong", "fixed", lambda K_P, friction: 2000.0, "depend"),
+    ("wrong", "of the testbed", lambda K_P, friction: np.pi * K_P / 4.2e-3, "friction"),
+    ("wrong", "nominal gain", lambda K_P, friction: np.pi * 7.05 / friction, "K_P"),
+    ("wrong", "gain forgotten", lambda K_P, friction: np.pi / friction, "K_P"),
+    ("wrong", "opposite sign", lambda K_P, friction: -np.pi * K_P / friction, "sign"),
+    ("wrong", "zero", lambda K_P, friction: 0, "zero"),
+    ("wrong", "multiplied", lambda K_P, friction: np.pi * K_P * friction, "friction"),
+    ("wrong", "squared", lambda K_P, friction: np.pi * K_P**2 / friction, "K_P"),
+    ("wrong", "text", lambda K_P, friction: "5273", "numeric"),
+]
+
 ANSWERS = {
     "08.self_calibrate": [
         ("right", "reference", tasks.self_calibrate),
@@ -113,4 +141,5 @@ ANSWERS = {
         ("wrong", "in mm", lambda robot: rk.circle(robot, 120.0, 4.0), ""),
         ("wrong", "the path itself", rk.circle(rk.load(), 0.12, 4.0), "function"),
     ],
+    "08.counts": COUNTS,
 }

@@ -1,4 +1,4 @@
-"""Exercises of lesson 03: rest pose, springs in series, offsets that nobody sees, encoder counts, and the logs."""
+"""Exercises of lesson 03: rest pose, springs in series, offsets that nobody sees, and the logs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,6 @@ from .readings import READINGS
 def _error(change):
     """A wrong rest error from A, gains and offset."""
     return lambda A, K_P, offset: change(A, K_P, offset)
-
-
-def counts_needed(K_P, friction):
-    """Smallest counts per turn, not rounded, with K_P 2 pi / counts <= 2 f_c."""
-    return np.pi * K_P / friction
 
 
 def _mu(weight):
@@ -152,42 +147,6 @@ EXERCISES = {
                 lambda f: np.abs(tasks.asked(f)[0]).max() > 1.0
             ),
             "the offsets are 1000 times too small (units)": lambda f: np.abs(tasks.asked(f)[0]).max() < 2e-5,
-        },
-    ),
-    "03.counts": Exercise(
-        counts_needed,
-        called="counts_needed",
-        hints=(
-            "By how much does the torque of one drive jump from count to count, and what can friction take up?",
-            "One step of the torque is K_P 2 pi / counts; the friction band reaches from -f_c to f_c.",
-            "K_P 2 pi / counts <= 2 f_c, so counts >= np.pi * K_P / friction.",
-        ),
-        unit="counts",
-        cases=lambda rng: list(zip(rng.uniform(1, 20, 5), rng.uniform(1e-3, 1e-2, 5), strict=True)),
-        invariant=lambda counts, K_P, friction: (
-            abs(K_P * 2 * np.pi / counts - 2 * friction),
-            "difference of the torque step from 2 f_c, in N m",
-        ),
-        tolerance=1e-8,
-        close=5e-3,
-        improve="leave the number of counts as it comes, without rounding",
-        mistakes={
-            "the friction band is 2 f_c wide, from -f_c to f_c: a factor of 2 is missing": (
-                lambda K_P, friction: 2 * np.pi * K_P / friction
-            ),
-            "a turn has 2 pi radians, not 360 (units, degrees)": lambda K_P, friction: 180 * K_P / friction,
-            "the reciprocal: this is the size of something per count, not the counts per turn": (
-                lambda K_P, friction: friction / (np.pi * K_P)
-            ),
-            "this is the largest step of the angle in rad, not the counts per turn": (
-                lambda K_P, friction: 2 * friction / K_P
-            ),
-            "counts per radian; a turn has 2 pi of them (a factor of 2 pi is missing)": (
-                lambda K_P, friction: K_P / (2 * friction)
-            ),
-            "these are the lines; each one is counted four times, the answer is in counts (a factor of 4)": (
-                lambda K_P, friction: np.pi * K_P / friction / 4
-            ),
         },
     ),
 } | READINGS

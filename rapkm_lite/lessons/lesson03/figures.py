@@ -1,4 +1,4 @@
-"""Steady state under PD control with offsets: disagreeing drives, rest torques, gains, encoder steps."""
+"""Steady state under PD control with offsets: disagreeing drives, rest torques, gains, logs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...figures.film import film
 from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+from ...figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line, axes_or_new, plain_ticks
 from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
 from ...mechanics.kinematics import inverse_kinematics
@@ -86,15 +86,9 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
         ylabel="largest rest torque in mN m",
         title=title,
     )
-    _plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
+    plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
     ax.legend()
     return ax
-
-
-def _plain_ticks(ax, values) -> None:
-    """Marks on a logarithmic x axis, written as plain numbers."""
-    ax.set_xticks(values, [f"{v:g}" for v in values])
-    ax.set_xticks([], minor=True)
 
 
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
@@ -114,54 +108,6 @@ def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, t
         plot_path(trajectory, ax, color="white", ls="--")
     plane_axes(robot, ax)
     ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], title=title)
-    return ax
-
-
-def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = ""):
-    """Torque of one drive with a stepped angle against its true angle, and the band that friction can hold.
-
-    K_P in N m/rad, quantum in rad, friction in N m; `target` is where the desired angle lies between two counts.
-
-    >>> ax = plot_torque_steps(7.05, 3.14e-3, 4.2e-3)
-    """
-    ax = axes_or_new(ax, figsize=(4.4, 3.4))
-    angle = np.linspace(-2.0, 3.0, 4001)
-    torque = -1e3 * K_P * quantum * (np.floor(angle + 0.5) - target)
-    held = np.abs(torque) <= 1e3 * friction
-    ax.axhspan(-1e3 * friction, 1e3 * friction, color="#DDE3EA", label="friction holds")
-    ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
-    flat = np.abs(np.gradient(torque)) == 0.0
-    ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
-    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, can rest here")
-    ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
-    ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
-    return ax
-
-
-def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
-    """Torque jumps per second of many runs (k,) against K_P quantum / (2 f_c) (k,).
-
-    can_rest : (k,); open circles where a place of rest exists, crosses where none does.
-
-    >>> ax = plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
-    """
-    ax = axes_or_new(ax)
-    ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
-    ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
-    ax.axvline(1.0, color=NEUTRAL, lw=1.0)
-    dots: dict[str, Any] = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}
-    crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
-    ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
-    ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
-    ax.set(
-        xscale="log",
-        title=title,
-        xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
-        ylabel="torque jumps per second",
-    )
-    _plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
-    ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
-    ax.legend(loc="center left")
     return ax
 
 

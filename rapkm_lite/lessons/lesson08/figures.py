@@ -1,12 +1,14 @@
-"""Figures of lesson 08: places and their null vectors, readings that count, and what a residual does not tell."""
+"""Figures of lesson 08: places and their null vectors, readings and rests that count, what a residual does not tell."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plane_axes, plot_workspace
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new, plain_ticks
 from ...mechanics.antagonism import null_vector
 from ...mechanics.kinematics import inverse_kinematics
 
@@ -62,6 +64,54 @@ def plot_counted(t, gap, exact, axes=None):
     axes[0].set_ylim(top=1.25 * top)
     axes[0].legend(loc="upper center", ncols=2, markerscale=4)
     return axes
+
+
+def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = ""):
+    """Torque of one drive with a stepped angle against its true angle, and the band that friction can hold.
+
+    K_P in N m/rad, quantum in rad, friction in N m; `target` is where the desired angle lies between two counts.
+
+    >>> ax = plot_torque_steps(7.05, 3.14e-3, 4.2e-3)
+    """
+    ax = axes_or_new(ax, figsize=(4.4, 3.4))
+    angle = np.linspace(-2.0, 3.0, 4001)
+    torque = -1e3 * K_P * quantum * (np.floor(angle + 0.5) - target)
+    held = np.abs(torque) <= 1e3 * friction
+    ax.axhspan(-1e3 * friction, 1e3 * friction, color="#DDE3EA", label="friction holds")
+    ax.plot(angle, -1e3 * K_P * quantum * (angle - target), ":", color=BEFORE, label="exact angle")
+    flat = np.abs(np.gradient(torque)) == 0.0
+    ax.plot(angle, np.where(flat & ~held, torque, np.nan), color=ALARM, label="measured, is driven on")
+    ax.plot(angle, np.where(flat & held, torque, np.nan), color=AFTER, lw=3.5, label="measured, can rest here")
+    ax.axvline(target, color=NEUTRAL, lw=0.8, label="desired angle")
+    ax.set(xlabel="true angle in encoder counts", ylabel="torque in mN m", title=title)
+    return ax
+
+
+def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
+    """Torque jumps per second of many runs (k,) against K_P quantum / (2 f_c) (k,).
+
+    can_rest : (k,); open circles where a place of rest exists, crosses where none does.
+
+    >>> ax = plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
+    """
+    ax = axes_or_new(ax)
+    ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
+    ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
+    ax.axvline(1.0, color=NEUTRAL, lw=1.0)
+    dots: dict[str, Any] = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}
+    crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
+    ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
+    ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
+    ax.set(
+        xscale="log",
+        title=title,
+        xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
+        ylabel="torque jumps per second",
+    )
+    plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
+    ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
+    ax.legend(loc="center left")
+    return ax
 
 
 def plot_bias(residual, bias, names, ax=None):
