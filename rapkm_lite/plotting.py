@@ -45,7 +45,6 @@ from .figures.style import (
     arm_line,
     arm_text_colour,
     axes_or_new,
-    plain_ticks,
     use_style,
 )
 from .figures.tables import (
@@ -184,7 +183,6 @@ __all__ = [
     "pair_line",
     "pair_measures",
     "pair_name",
-    "plain_ticks",
     "plane_axes",
     "plane_limits",
     "plot_accelerations",

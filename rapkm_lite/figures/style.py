@@ -66,9 +66,3 @@ def axes_or_new(ax=None, **figure):
     fig = plt.figure(layout="constrained", **settings)
     with matplotlib.style.context(STYLE):
         return fig.add_subplot()
-
-
-def plain_ticks(ax, values) -> None:
-    """Marks on a logarithmic x axis, written as plain numbers."""
-    ax.set_xticks(values, [f"{v:g}" for v in values])
-    ax.set_xticks([], minor=True)

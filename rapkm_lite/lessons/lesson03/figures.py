@@ -11,7 +11,7 @@ from ...figures.film import film
 from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
-from ...figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line, axes_or_new, plain_ticks
+from ...figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
 from ...mechanics.kinematics import inverse_kinematics
@@ -86,9 +86,15 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
         ylabel="largest rest torque in mN m",
         title=title,
     )
-    plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
+    _plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
     ax.legend()
     return ax
+
+
+def _plain_ticks(ax, values) -> None:
+    """Marks on a logarithmic x axis, written as plain numbers."""
+    ax.set_xticks(values, [f"{v:g}" for v in values])
+    ax.set_xticks([], minor=True)
 
 
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):

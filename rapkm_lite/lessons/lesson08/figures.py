@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...figures.machine import plane_axes, plot_workspace
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new, plain_ticks
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.antagonism import null_vector
 from ...mechanics.kinematics import inverse_kinematics
 
@@ -108,7 +108,9 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
         xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
         ylabel="torque jumps per second",
     )
-    plain_ticks(ax, [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5])
+    marks = [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5]
+    ax.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    ax.set_xticks([], minor=True)
     ax.set_xlim(ratio.min() / 1.15, ratio.max() * 1.15)
     ax.legend(loc="center left")
     return ax
