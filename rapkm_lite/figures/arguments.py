@@ -161,7 +161,8 @@ def _pairs(name: str, value, known: Known) -> None:
 
 
 def _arms(name: str, value, known: Known) -> None:
-    if isinstance(value, list | tuple | range | np.ndarray) and np.ndim(value) == 1 and len(value) == 1:
+    listed = value.ndim == 1 if isinstance(value, np.ndarray) else isinstance(value, list | tuple | range)
+    if listed and len(value) == 1:
         whole_number(name, value[0], 0)
     else:
         joint_indices(name, list(value) if isinstance(value, range) else value, _drives(known), None, "arm")
