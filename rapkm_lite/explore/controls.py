@@ -51,15 +51,19 @@ def choice(label: str, options, value=None) -> widgets.Widget:
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
         raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
     options = list(options)
-    for option in options:
-        pair = isinstance(option, tuple) and len(option) == 2
-        if not (pair or isinstance(option, str) or (isinstance(option, int | float) and math.isfinite(option))):
-            raise ValueError(f"options holds {short(option)}; allowed: words, numbers, or pairs (word, value)")
-    known = [option[1] if isinstance(option, tuple) else option for option in options]
+    known = [_meaning(option) for option in options]
     if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
         raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
-    first = options[0][1] if isinstance(options[0], tuple) else options[0]
-    return widgets.Dropdown(options=options, value=first if value is None else value, description=label, **_common())
+    return widgets.Dropdown(options=options, value=known[0] if value is None else value, description=label, **_common())
+
+
+def _meaning(option):
+    """The value of an option of a list."""
+    if isinstance(option, tuple) and len(option) == 2:
+        return option[1]
+    if isinstance(option, str) or (isinstance(option, int | float) and math.isfinite(option)):
+        return option
+    raise ValueError(f"options holds {short(option)}; allowed: words, numbers, or pairs (word, value)")
 
 
 def switch(label: str, value: bool = False) -> widgets.Widget:

@@ -85,9 +85,7 @@ def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -
     if kind == "bool" or isinstance(default, bool):
         switch(name, value)
     elif kind == "str" or isinstance(default, str):
-        of_kind(name, value, str, "text")
-        if name == "colour":
-            _colour(name, value)
+        _text(name, value)
     elif kind == "dict":
         _dictionary(name, value)
     elif kind.startswith("int"):
@@ -100,6 +98,12 @@ def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -
         _RULES[name](name, value, known)
     elif name in _CURVES:
         curve(name, value, known)
+
+
+def _text(name: str, value) -> None:
+    of_kind(name, value, str, "text")
+    if name == "colour":
+        _colour(name, value)
 
 
 def _dictionary(name: str, value) -> None:

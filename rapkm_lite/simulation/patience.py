@@ -6,6 +6,7 @@ import contextlib
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from ..machine.arguments import short
 
@@ -62,7 +63,7 @@ def _display(widget) -> Callable[[], None]:
     from IPython.display import display
 
     view = {"version_major": 2, "version_minor": 0, "model_id": widget.model_id}
-    shown = display({"application/vnd.jupyter.widget-view+json": view}, raw=True, display_id=True)
+    shown: Any = display({"application/vnd.jupyter.widget-view+json": view}, raw=True, display_id=True)
 
     def leave() -> None:
         widget.close()
