@@ -13,6 +13,10 @@ import math
 
 from .jit import COMPILED, leaf
 
+# Largest |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the angle in rad by which a step
+# that is longer may err, as where a machine is thrown about.
+FAST, FINE = 0.6, 3e-9
+
 
 @leaf
 def solve2(m11, m12, m22, fx, fy):
@@ -155,3 +159,17 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
         by,
         near,
     )
+
+
+@leaf
+def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
+    """What friction of a drive asks of a hold: lambda dt, steps across the bend, and 1 where the drive can pass zero.
+
+    lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
+    """
+    gx, gy = solve2(m11, m12, m22, bx, by)
+    yields = friction * (bx * gx + by * gy)
+    qdd = abs(bx * kx + by * ky + acc)
+    passes = abs(rate) < 20.0 / sharpness + (qdd + 2.0 * yields) * dt
+    steps = min((qdd + yields) * dt * sharpness / FAST, yields * dt * dt / FINE)
+    return yields * sharpness * dt, steps, 1.0 if passes and friction > 0.0 else 0.0

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2
+from .leaves import drag, geometry, share, small_angle, solve2, stiffness
 from .rows import *
 from .tables import *
 
-# Largest lambda h and |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law; the angle in rad by which
-# a step that is longer may err, as where a machine is thrown about; and the most steps.
-STIFF, FAST, FINE, MOST_STEPS = 1.0, 0.6, 3e-9, 4000.0
+# Largest lambda h of a Runge-Kutta step across the bend of the friction law, and the most steps.
+STIFF, MOST_STEPS = 1.0, 4000.0
 
 
 @outlined
@@ -137,20 +136,6 @@ def join(lanes, arms, w):
         w[of(KX, j, W, L)], w[of(KY, j, W, L)] = solve2(m11, m12, m22, fx, fy)
 
 
-@leaf
-def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
-    """What friction of a drive asks of a hold: lambda dt, steps across the bend, and 1 where the drive can pass zero.
-
-    lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
-    """
-    gx, gy = solve2(m11, m12, m22, bx, by)
-    yields = friction * (bx * gx + by * gy)
-    qdd = abs(bx * kx + by * ky + acc)
-    passes = abs(rate) < 20.0 / sharpness + (qdd + 2.0 * yields) * dt
-    steps = min((qdd + yields) * dt * sharpness / FAST, yields * dt * dt / FINE)
-    return yields * sharpness * dt, steps, 1.0 if passes and friction > 0.0 else 0.0
-
-
 @outlined
 def count_steps(lanes, arms, w, dt):
     """Steps of equal length that each run needs in a hold because of friction; returns the largest number."""
@@ -187,40 +172,57 @@ def count_steps(lanes, arms, w, dt):
 
 
 @leaf
-def stage(lanes, arms, w, part, weight):
-    """Add a stage to the sums with a weight, and go to the state of the next one, a part of the step away."""
+def first_stage(lanes, arms, w):
+    """Begin the sums of a step of length STEP, and go half of it ahead."""
+    L, W = len(lanes), len(arms)
+    for j in range(L):
+        h = 0.5 * w[of(STEP, j, W, L)]
+        vx, vy, kx, ky = w[of(VX, j, W, L)], w[of(VY, j, W, L)], w[of(KX, j, W, L)], w[of(KY, j, W, L)]
+        w[of(TX, j, W, L)], w[of(TY, j, W, L)], w[of(TVX, j, W, L)], w[of(TVY, j, W, L)] = vx, vy, kx, ky
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)] + h * vx, w[of(Y, j, W, L)] + h * vy
+        w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = vx + h * kx, vy + h * ky
+
+
+@leaf
+def stage(lanes, arms, w, part):
+    """Add a stage to the sums, and go a part of the step ahead."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         h = part * w[of(STEP, j, W, L)]
         vx, vy, kx, ky = w[of(SVX, j, W, L)], w[of(SVY, j, W, L)], w[of(KX, j, W, L)], w[of(KY, j, W, L)]
-        w[of(TX, j, W, L)] += weight * vx
-        w[of(TY, j, W, L)] += weight * vy
-        w[of(TVX, j, W, L)] += weight * kx
-        w[of(TVY, j, W, L)] += weight * ky
+        w[of(TX, j, W, L)] += 2.0 * vx
+        w[of(TY, j, W, L)] += 2.0 * vy
+        w[of(TVX, j, W, L)] += 2.0 * kx
+        w[of(TVY, j, W, L)] += 2.0 * ky
         w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)] + h * vx, w[of(Y, j, W, L)] + h * vy
         w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)] + h * kx, w[of(VY, j, W, L)] + h * ky
 
 
 @leaf
-def step(lanes, arms, extra, w):
-    """A Runge-Kutta step (order 4) of length STEP after its first stage."""
+def last_stage(lanes, arms, w):
+    """The state at the end of the step."""
     L, W = len(lanes), len(arms)
     for j in range(L):
-        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
-        w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-        w[of(TX, j, W, L)] = w[of(TY, j, W, L)] = w[of(TVX, j, W, L)] = w[of(TVY, j, W, L)] = 0.0
-    stage(lanes, arms, w, 0.5, 1.0)
+        h = w[of(STEP, j, W, L)] / 6.0
+        w[of(X, j, W, L)] += h * (w[of(TX, j, W, L)] + w[of(SVX, j, W, L)])
+        w[of(Y, j, W, L)] += h * (w[of(TY, j, W, L)] + w[of(SVY, j, W, L)])
+        w[of(VX, j, W, L)] += h * (w[of(TVX, j, W, L)] + w[of(KX, j, W, L)])
+        w[of(VY, j, W, L)] += h * (w[of(TVY, j, W, L)] + w[of(KY, j, W, L)])
+
+
+@leaf
+def step(lanes, arms, extra, w):
+    """A Runge-Kutta step (order 4) of length STEP after the accelerations of its first stage.
+
+    Few and long loops over the runs: short ones would be unrolled before they could become vector instructions.
+    """
+    first_stage(lanes, arms, w)
     for s in range(3):
         pull(lanes, arms, extra, w)
         join(lanes, arms, w)
-        # The last stage leaves its state unused.
-        stage(lanes, arms, w, 0.5 if s == 0 else 1.0, 1.0 if s == 2 else 2.0)
-    for j in range(L):
-        h = w[of(STEP, j, W, L)] / 6.0
-        w[of(X, j, W, L)] += h * w[of(TX, j, W, L)]
-        w[of(Y, j, W, L)] += h * w[of(TY, j, W, L)]
-        w[of(VX, j, W, L)] += h * w[of(TVX, j, W, L)]
-        w[of(VY, j, W, L)] += h * w[of(TVY, j, W, L)]
+        if s < 2:
+            stage(lanes, arms, w, 0.5 if s == 0 else 1.0)
+    last_stage(lanes, arms, w)
 
 
 @leaf

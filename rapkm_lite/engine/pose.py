@@ -203,10 +203,10 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         for _ in range(12):
             if count > 0:
                 count = newton_step(lanes, drives, arms, table, o, w, tolerance)
-    rough = 0.0
+    rough = 0
     for j in range(L):
-        rough += w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)]
-    if rough > 0.0:
+        rough += 1 if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 else 0
+    if rough > 0:
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
                 px, py, found = gauss_newton(

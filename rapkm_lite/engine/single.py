@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from .jit import index, kernel, leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2
-from .plant import MOST_STEPS, STIFF, judge, mend, stiffness
+from .leaves import drag, geometry, share, small_angle, solve2, stiffness
+from .plant import MOST_STEPS, STIFF, judge, mend
 from .rows import *
 from .tables import *
 
