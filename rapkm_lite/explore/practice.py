@@ -76,7 +76,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders.
 
     >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
-    '1.22 mm'
+    '1.19 mm'
     """
     robot = frictionless(robot)
     middle = robot.base.mean(axis=0)
