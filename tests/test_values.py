@@ -114,6 +114,19 @@ def test_values_of_the_package_stay_as_they_are(value):
                 array.setflags(write=True)
 
 
+@pytest.mark.parametrize("machine", ["testbed", "five_bar", "four_arms"])
+def test_a_run_that_was_not_looked_at_is_right(machine):
+    """Runs of the engine skip the checks of `Run`: made again with them, field by field, they are the same."""
+    robot = rk.load(machine)
+    run = rk.simulate(robot, rk.RedundantCTC(400.0, 40.0), rk.triangle(robot, duration=0.2, side=0.02), 1e-3)
+    fields = {name: getattr(run, name) for name in run.__dataclass_fields__}
+    assert type(run)(**fields) == run
+    for name in ("x", "xd", "q_a", "qd_a", "c"):
+        assert frozen(fields[name]) is fields[name] and np.all(np.isfinite(fields[name])), name
+    assert np.abs(rk.inverse_kinematics(robot, run.x)[:, : robot.n_arms] - run.q_a).max() < 1e-12
+    assert np.all(run.pairs == -1)
+
+
 def test_no_law_can_shift_the_path_through_its_sample():
     sample = PATH[17]
     for name in ("x", "xd", "xdd", "q", "qd", "qdd", "q_a", "qd_a", "qdd_a"):

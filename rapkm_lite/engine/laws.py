@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import accelerations, drag, geometry, inertia, small_angle, solve2
+from .leaves import accelerations, drag, inertia, small_angle, solve2
 from .minimal import best_pair, minimal_feedback, reference
 from .rows import *
 from .single import fetch
@@ -22,9 +22,9 @@ def arm_shares(w, p, P, extra, env, rates, links):
     """Write the shares of an arm, entry p of pair rows of P numbers, in M and h, and the accelerations of its joints
     at zero xdd.
 
-    rates : v and the reference rate u.  links : b, l, a.d, 1 / (a x d) and a x d of the arm.
+    rates : v and the reference rate u.  links : as `geometry` gives them.
     """
-    (vx, vy, ux, uy), (bx, by, lx, ly, ad, inv, den) = rates, links
+    (vx, vy, ux, uy), (bx, by, lx, ly, ad, inv, _) = rates, links
     base = bx * vx + by * vy
     base_acc, back_acc = accelerations(
         base,
@@ -40,8 +40,7 @@ def arm_shares(w, p, P, extra, env, rates, links):
         w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], bx, by, lx, ly, base_acc, back_acc
     )
     if len(extra) > 0:
-        place = lx * den, ly * den, bx * den, by * den, ad, inv, 0.0
-        gx, gy = drag(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], w[(MODEL + FRICTION) * P + p], env, place, base)
+        gx, gy = drag(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], w[(MODEL + FRICTION) * P + p], env, links, base)
         fx, fy = fx + gx, fy + gy
     w[P11 * P + p], w[P12 * P + p], w[P22 * P + p] = m11, m12, m22
     w[GX * P + p], w[GY * P + p] = -fx, -fy
@@ -50,10 +49,8 @@ def arm_shares(w, p, P, extra, env, rates, links):
 
 @leaf
 def pose_of(w, j, W, L):
-    """Pose of a run, its velocity, and the environment of the model."""
+    """Velocity of the pose of a run, and the environment of the model."""
     return (
-        w[of(PX, j, W, L)],
-        w[of(PY, j, W, L)],
         w[of(PVX, j, W, L)],
         w[of(PVY, j, W, L)],
         (
@@ -64,10 +61,23 @@ def pose_of(w, j, W, L):
     )
 
 
+@leaf
+def links_of(w, i, j, W, L):
+    """The links of an arm of the model, as `geometry` gave them to the pose."""
+    return (
+        w[at(A1, i, j, W, L)],
+        w[at(A2, i, j, W, L)],
+        w[at(L1, i, j, W, L)],
+        w[at(L2, i, j, W, L)],
+        w[at(MAD, i, j, W, L)],
+        w[at(MINV, i, j, W, L)],
+        w[at(MDEN, i, j, W, L)],
+    )
+
+
 @outlined
 def look(lanes, drives, arms, extra, table, o, w):
-    """The model at the pose: rows b and l of its rates, a.d, a x d and its inverse, and the errors of the elbows; the
-    shares of the arms at the rate of the pose."""
+    """The model at the pose: the errors of the elbows, and the shares of the arms at the rate of the pose."""
     L, N, W = len(lanes), len(drives), len(arms)
     # What the arms of a single run share is read once: read among what is written it would keep the loop from vectors.
     alone = pose_of(w, 0, W, L)
@@ -75,32 +85,20 @@ def look(lanes, drives, arms, extra, table, o, w):
         cos, sin = desired(table, o, w, ELBOW_COS, i, W, L), desired(table, o, w, ELBOW_SIN, i, W, L)
         rate = desired(table, o, w, ELBOW_RATE, i, W, L)
         for j in range(L):
-            x, y, vx, vy, env = alone if L == 1 else pose_of(w, j, W, L)
-            ax, ay, dx, dy, ad, inv, _ = geometry(
-                w[at(MODEL + BX, i, j, W, L)],
-                w[at(MODEL + BY, i, j, W, L)],
-                w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)],
-                w[at(MODEL + MEAN, i, j, W, L)],
-                w[at(MODEL + MODE, i, j, W, L)],
-                x,
-                y,
-            )
-            bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
-            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)] = bx, by, lx, ly
-            den = ax * dy - ay * dx
-            w[at(MAD, i, j, W, L)], w[at(MDEN, i, j, W, L)], w[at(MINV, i, j, W, L)] = ad, den, inv
+            vx, vy, env = alone if L == 1 else pose_of(w, j, W, L)
+            links = links_of(w, i, j, W, L)
+            bx, by, lx, ly, ad, _, den = links
             # a x d and a.d are the sine and cosine of the elbow angle times both lengths.
             s, t = cos * den - sin * ad, cos * ad + sin * den
             s *= w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
             w[at(ELBOW_E, i, j, W, L)] = small_angle(s)
             w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             w[at(ELBOW_ED, i, j, W, L)] = -(bx + lx) * vx - (by + ly) * vy - rate
-            arm_shares(w, i * L + j, W * L, extra, env, (vx, vy, vx, vy), (bx, by, lx, ly, ad, inv, den))
-    near = 0.0
+            arm_shares(w, i * L + j, W * L, extra, env, (vx, vy, vx, vy), links)
+    far = 0
     for p in range(N * L):
-        near = min(near, w[NEAR * W * L + p])
-    if near < 0.0:
+        far += 1 if w[NEAR * W * L + p] < 0.0 else 0
+    if far > 0:
         for i in range(N):
             cos, sin = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
             for j in range(L):
@@ -117,18 +115,9 @@ def shares(lanes, drives, arms, extra, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            _, _, vx, vy, env = pose_of(w, j, W, L)
+            vx, vy, env = pose_of(w, j, W, L)
             rates = vx, vy, w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
-            links = (
-                w[at(A1, i, j, W, L)],
-                w[at(A2, i, j, W, L)],
-                w[at(L1, i, j, W, L)],
-                w[at(L2, i, j, W, L)],
-                w[at(MAD, i, j, W, L)],
-                w[at(MINV, i, j, W, L)],
-                w[at(MDEN, i, j, W, L)],
-            )
-            arm_shares(w, i * L + j, W * L, extra, env, rates, links)
+            arm_shares(w, i * L + j, W * L, extra, env, rates, links_of(w, i, j, W, L))
 
 
 @outlined
@@ -145,53 +134,97 @@ def gram(lanes, drives, arms, w):
 
 
 @outlined
-def redundant_feedback(lanes, drives, arms, law, table, o, w):
-    """w and g of (28) and (32) in all joints: w = F^+ (v - Fdot u), or F^T G (v - Fdot u) as a force in line 2."""
+def ask(lanes, drives, arms, law, table, o, w):
+    """What (28) and (32) ask of the joints: their desired accelerations less those at zero xdd, and the feedback, in
+    APD laws as a force."""
     L, N, W = len(lanes), len(drives), len(arms)
-    force = law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2
-    line2 = law.form == REDUNDANT_CTC_LINE2 or law.form == REDUNDANT_APD_LINE2
-    for j in range(L):
-        wx = wy = gx = gy = tx = ty = 0.0
-        vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
-        for i in range(N):
-            bx, by, lx, ly = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(L1, i, j, W, L)], w[at(L2, i, j, W, L)]
-            ex, ey = -(bx + lx), -(by + ly)
+    # As a number: a choice among what is written would keep the arms of a single run from vectors.
+    force = 1.0 if law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2 else 0.0
+    for i in range(N):
+        base, elbow = desired(table, o, w, ACCELERATION, i, W, L), desired(table, o, w, ELBOW_ACCELERATION, i, W, L)
+        for j in range(L):
+            bx, by, lx, ly, _, _, _ = links_of(w, i, j, W, L)
             s = w[at(GAIN_P, i, j, W, L)] * w[at(E, i, j, W, L)] + w[at(GAIN_D, i, j, W, L)] * w[at(ED, i, j, W, L)]
             t = (
                 w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
                 + w[at(ELBOW_D, i, j, W, L)] * w[at(ELBOW_ED, i, j, W, L)]
             )
-            r = desired(table, o, w, ACCELERATION, i, W, L) - w[at(ACC_B, i, j, W, L)]
-            q = desired(table, o, w, ELBOW_ACCELERATION, i, W, L) - w[at(ACC_E, i, j, W, L)]
-            ad, inv = w[at(MAD, i, j, W, L)], w[at(MINV, i, j, W, L)]
-            l1sq, l2sq = w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)]
-            if force:
-                gx, gy = gx - bx * s - ex * t, gy - by * s - ey * t
-                # The part of the desired rates that is not tangent, turned by Fdot^T; in line 2 it meets C.
-                base, back = inv * (bx * vx + by * vy), inv * (lx * vx + ly * vy)
-                rest = want(table, o, RATE, i, W) - (bx * ux + by * uy)
-                bend = want(table, o, ELBOW_RATE, i, W) - (ex * ux + ey * uy)
-                if line2:
-                    couple = w[at(MODEL + TIP, i, j, W, L)] * w[at(MDEN, i, j, W, L)]
-                    p, b = couple * (lx * vx + ly * vy) * (rest + bend), couple * (bx * vx + by * vy) * rest
-                    gx, gy = gx + bx * p - lx * b, gy + by * p - ly * b
-                else:
-                    p = base * ad * (rest - bend) - base * l1sq * bend
-                    b = back * l2sq * (rest - bend) - back * ad * bend
-                    tx, ty = tx + bx * p + lx * b, ty + by * p + ly * b
-            else:
-                r, q = r - s, q - t
-            if line2:
-                tip, link = w[at(MODEL + TIP, i, j, W, L)], r + q
-                p = (w[at(MODEL + S1, i, j, W, L)] + tip * l1sq) * r + tip * ad * link
-                b = (w[at(MODEL + S2, i, j, W, L)] + tip * l2sq) * link + tip * ad * r
-                gx, gy = gx + bx * p - lx * b, gy + by * p - ly * b
-            else:
-                wx, wy = wx + bx * r + ex * q, wy + by * r + ey * q
+            r, q = base - w[at(ACC_B, i, j, W, L)], elbow - w[at(ACC_E, i, j, W, L)]
+            w[at(ASK_B, i, j, W, L)], w[at(ASK_E, i, j, W, L)] = r - (1.0 - force) * s, q - (1.0 - force) * t
+            w[at(GX, i, j, W, L)] += force * ((bx + lx) * t - bx * s)
+            w[at(GY, i, j, W, L)] += force * ((by + ly) * t - by * s)
+
+
+@outlined
+def tangent(lanes, drives, arms, w):
+    """The end-effector acceleration F^+ of what the joints ask."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for j in range(L):
+        fx, fy = w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)]
+        for i in range(N):
+            r, q = w[at(ASK_B, i, j, W, L)], w[at(ASK_E, i, j, W, L)]
+            a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
+            fx += a1 * r - (a1 + w[at(L1, i, j, W, L)]) * q
+            fy += a2 * r - (a2 + w[at(L2, i, j, W, L)]) * q
         w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = solve2(
-            w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], wx + tx, wy + ty
+            w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy
         )
-        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = gx, gy
+        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = 0.0, 0.0
+
+
+@outlined
+def unprojected(lanes, drives, arms, w):
+    """Line 2 of (28) and (32): F^T G of what the joints ask is a force."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for i in range(N):
+        for j in range(L):
+            bx, by, lx, ly, ad, _, _ = links_of(w, i, j, W, L)
+            r, tip = w[at(ASK_B, i, j, W, L)], w[at(MODEL + TIP, i, j, W, L)]
+            link = r + w[at(ASK_E, i, j, W, L)]
+            p = (w[at(MODEL + S1, i, j, W, L)] + tip * w[at(MODEL + L1SQ, i, j, W, L)]) * r + tip * ad * link
+            b = (w[at(MODEL + S2, i, j, W, L)] + tip * w[at(MODEL + L2SQ, i, j, W, L)]) * link + tip * ad * r
+            w[at(GX, i, j, W, L)] += bx * p - lx * b
+            w[at(GY, i, j, W, L)] += by * p - ly * b
+            w[at(ASK_B, i, j, W, L)], w[at(ASK_E, i, j, W, L)] = 0.0, 0.0
+
+
+@outlined
+def bend(lanes, drives, arms, law, table, o, w):
+    """In APD laws the part of the desired rates that is not tangent, turned by Fdot^T; in line 2 it meets C."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for j in range(L):
+        tx = ty = 0.0
+        vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
+        for i in range(N):
+            bx, by, lx, ly, ad, inv, den = links_of(w, i, j, W, L)
+            base, back = bx * vx + by * vy, lx * vx + ly * vy
+            rest = want(table, o, RATE, i, W) - (bx * ux + by * uy)
+            both = rest + want(table, o, ELBOW_RATE, i, W) + ((bx + lx) * ux + (by + ly) * uy)
+            if law.form == REDUNDANT_APD_LINE2:
+                couple = w[at(MODEL + TIP, i, j, W, L)] * den
+                p, b = couple * back * both, couple * base * rest
+                w[at(GX, i, j, W, L)] += bx * p - lx * b
+                w[at(GY, i, j, W, L)] += by * p - ly * b
+            else:
+                elbow, l1sq, l2sq = both - rest, w[at(MODEL + L1SQ, i, j, W, L)], w[at(MODEL + L2SQ, i, j, W, L)]
+                p = inv * base * (ad * (rest - elbow) - l1sq * elbow)
+                b = inv * back * (l2sq * (rest - elbow) - ad * elbow)
+                tx, ty = tx + bx * p + lx * b, ty + by * p + ly * b
+        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = tx, ty
+
+
+@leaf
+def redundant_feedback(lanes, drives, arms, law, table, o, w):
+    """w and g of (28) and (32) in all joints: w = F^+ (v - Fdot u), or F^T G (v - Fdot u) as a force in line 2."""
+    L, W = len(lanes), len(arms)
+    ask(lanes, drives, arms, law, table, o, w)
+    if law.form == REDUNDANT_CTC_LINE2 or law.form == REDUNDANT_APD_LINE2:
+        unprojected(lanes, drives, arms, w)
+    for j in range(L):
+        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = 0.0, 0.0
+    if law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2:
+        bend(lanes, drives, arms, law, table, o, w)
+    tangent(lanes, drives, arms, w)
 
 
 @outlined

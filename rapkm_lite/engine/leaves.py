@@ -27,12 +27,12 @@ def solve2(m11, m12, m22, fx, fy):
 
 @leaf
 def small_angle(s):
-    """arcsin(s) for |s| < 0.1 by its series."""
+    """arcsin(s) for |s| < 0.1 by its series: the next term is below 2e-18 of the first."""
     z = s * s
     z2 = z * z
     # In pairs, so that less waits for each other.
-    low = 1.0 + z * (1 / 6) + z2 * (3 / 40 + z * (5 / 112))
-    high = 35 / 1152 + z * (63 / 2816) + z2 * (231 / 13312 + z * (143 / 10240) + z2 * (6435 / 557056))
+    low = (1.0 + z * (1 / 6)) + z2 * (3 / 40 + z * (5 / 112))
+    high = (35 / 1152 + z * (63 / 2816)) + z2 * (231 / 13312 + z * (143 / 10240))
     return s * (low + z2 * z2 * high)
 
 
@@ -66,25 +66,33 @@ tanh = smooth_sign if COMPILED else math.tanh
 
 @leaf
 def geometry(base_x, base_y, l1sq, half, mean, mode, x, y):
-    """An arm with its tip at (x, y): arm vectors a, d, their product a.d, 1 / (a x d), and (a x d)^2, which is not
-    positive outside the reach."""
+    """An arm with its tip at (x, y): chord r, k, h; links b, l, a.d, 1 / (a x d), a x d; and (a x d)^2, which is
+    not positive outside the reach.
+
+    r is the way from the base to the tip.  With r' = (r_y, -r_x) the links are a = k r + h r' and d = (1 - k) r - h r';
+    as a x d = h r^2, the part of b and l along r' is -1 / r^2 and 1 / r^2, whatever the root.  One division serves all.
+    """
     X, Y = x - base_x, y - base_y
     rho2 = X * X + Y * Y
     kappa = 0.5 * rho2 + half
     area2 = l1sq * rho2 - kappa * kappa
     inside = max(area2, 1e-300)
-    root, inverse = math.sqrt(inside), 1.0 / rho2
-    k, h = kappa * inverse, root * (mode * inverse)
-    rest = 1.0 - k
-    return (
-        k * X + h * Y,
-        k * Y - h * X,
-        rest * X - h * Y,
-        rest * Y + h * X,
-        0.5 * rho2 - mean,
-        root * (mode / inside),
-        area2,
-    )
+    root, quotient = math.sqrt(inside), mode / (rho2 * inside)
+    # Arms that only fill up a row have mode 0: all of theirs is zero.
+    across = mode * inside * quotient
+    near, far, inv = root * (kappa * quotient), root * ((rho2 - kappa) * quotient), root * (rho2 * quotient)
+    bx, by = far * X - across * Y, far * Y + across * X
+    lx, ly = near * X + across * Y, near * Y - across * X
+    chord = X, Y, kappa * across, root * (mode * across)
+    return chord, (bx, by, lx, ly, 0.5 * rho2 - mean, inv, mode * root), area2
+
+
+@leaf
+def turned(chord, ux, uy):
+    """Sine and cosine of the angle from a vector u to the proximal link, times the lengths of both."""
+    X, Y, k, h = chord
+    along, across = ux * X + uy * Y, ux * Y - uy * X
+    return k * across - h * along, k * along + h * across
 
 
 @leaf
@@ -111,23 +119,22 @@ def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
 
 
 @leaf
-def drag(w1, w2, friction, env, place, base):
+def drag(w1, w2, friction, env, links, base):
     """Force of gravity and friction on an arm whose base turns at the rate `base`.
 
     env : gravity vector, and the sharpness 1 / v0 of the friction law.
     """
-    ax, ay, dx, dy, _, inv, _ = place
-    drive = w1 * (env[0] * ay - env[1] * ax) + friction * tanh(base * env[2])
-    distal = w2 * (env[0] * dy - env[1] * dx)
-    return inv * (ax * distal - dx * drive), inv * (ay * distal - dy * drive)
+    bx, by, lx, ly, _, _, den = links
+    drive = w1 * den * (env[0] * ly - env[1] * lx) + friction * tanh(base * env[2])
+    distal = w2 * den * (env[0] * by - env[1] * bx)
+    return lx * distal - bx * drive, ly * distal - by * drive
 
 
 @leaf
-def share(s1, s2, l1sq, l2sq, place, vx, vy):
+def share(s1, s2, l1sq, l2sq, links, vx, vy):
     """An arm in the equations of motion: m11, m12, m22, fx, fy of `inertia`; b; base rate and its part of the base
     acceleration at zero xdd; decay rate of a x d, 1/s."""
-    ax, ay, dx, dy, ad, inv, _ = place
-    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
+    bx, by, lx, ly, ad, inv, _ = links
     base, back = bx * vx + by * vy, lx * vx + ly * vy
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
@@ -136,15 +143,14 @@ def share(s1, s2, l1sq, l2sq, place, vx, vy):
 
 @leaf
 def pose_terms(l2sq, scale, place, ux, uy, e):
-    """An arm in the least-squares pose of the measured base angles: Hessian and gradient of half the squared error,
-    its row of A, and a number that is negative where the series does not hold or the arm does not reach.
+    """An arm in the least-squares pose of the measured base angles: Hessian and gradient of half the squared error, and
+    a number that is negative where the series does not hold or the arm does not reach.
 
     u : unit vector of the desired proximal link.  e : measured minus desired base angle, rad.
     """
-    ax, ay, dx, dy, ad, inv, area2 = place
-    bx, by, lx, ly = dx * inv, dy * inv, ax * inv, ay * inv
-    s = (ux * ay - uy * ax) * scale
-    near = min(min(0.1 - abs(s), ux * ax + uy * ay), area2)
+    chord, (bx, by, lx, ly, ad, inv, _), area2 = place
+    s, t = turned(chord, scale * ux, scale * uy)
+    near = min(min(0.1 - abs(s), t), area2)
     r = e - small_angle(s)
     # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
     h = r * inv
@@ -155,8 +161,6 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
         g1 * by * by - g2 * ly * ly,
         bx * r,
         by * r,
-        bx,
-        by,
         near,
     )
 

@@ -1,6 +1,6 @@
 """The sampled closed loop of every law: sense, measure, find the pose, command, record, hold.
 
-One source serves a single run (its arms side by side, with a history) and a study (16 runs side by side, with sums).
+One source serves a single run (its arms side by side, with a history) and a study (many runs side by side, with sums).
 All that a run does depends on its own column of the work table only, so that its numbers are the same in whatever
 company it runs.
 """
@@ -117,16 +117,18 @@ def break_drives(lanes, arms, faults, w, k):
 
 
 @leaf
-def record(arms, history, N, w, row):
-    """A sample of a single run of N drives: a row in each column of its history, which are flat."""
-    W = len(arms)
-    x, xd, q, qd, c, joints = history
-    x[2 * row], x[2 * row + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
-    xd[2 * row], xd[2 * row + 1] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
-    for i in range(N):
-        o = N * row + i
-        q[o], qd[o], c[o] = w[Q * W + i], w[QD * W + i], w[C * W + i]
-    joints[2 * row], joints[2 * row + 1] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
+def record(arms, history, w, k):
+    """Sample k of a single run: a row in each flat column of its history.
+
+    What arms that fill up a row leave behind the drives, the next sample writes over.
+    """
+    W, o = len(arms), history.drives * k
+    history.x[2 * k], history.x[2 * k + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
+    history.xd[2 * k], history.xd[2 * k + 1] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    move(W, w, Q * W, history.q, o)
+    move(W, w, QD * W, history.qd, o)
+    move(W, w, C * W, history.c, o)
+    history.joints[2 * k], history.joints[2 * k + 1] = w[of(JOINT_J, 0, W, 1)], w[of(JOINT_K, 0, W, 1)]
 
 
 @outlined
@@ -175,10 +177,10 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled; an `else` would stay.
-    history, study : the flat columns of a single run, or () for a study; the other one is None.
+    history, study : the `History` of a single run, or () for a study; the other one is None.
     modelled : None for laws without a model; else the `extra` of the model.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
-    clock : a long run is made in parts, whose state is in w; table and history hold those of one part.
+    clock : a long run is made in parts, whose state is in w; the table holds the samples of one part.
     """
     dt = clock.dt
     lanes, drives, arms, faulty, extra = kind
@@ -199,7 +201,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         if law.posed:
-            find_pose(lanes, drives, arms, history, study, sensor, law, table, o, w, k)
+            find_pose(lanes, drives, arms, modelled, history, study, sensor, law, table, o, w, k)
         if study is not None:
             if k + 1 == clock.samples:
                 return
@@ -213,7 +215,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         if study is not None:
             add_up(lanes, drives, arms, w)
         if history is not None:
-            record(arms, history, len(history[2]) // rows, w, row)
+            record(arms, history, w, k)
             if k + 1 == clock.samples:
                 last_torque(drives, arms, w, k)
                 return

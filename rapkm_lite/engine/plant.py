@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2, stiffness
+from .leaves import drag, geometry, share, small_angle, solve2, stiffness, turned
 from .rows import *
 from .tables import *
 
@@ -26,7 +26,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
         wanted, wanted_rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            place = geometry(
+            chord, links, area2 = geometry(
                 w[at(BX, i, j, W, L)],
                 w[at(BY, i, j, W, L)],
                 w[at(L1SQ, i, j, W, L)],
@@ -41,31 +41,31 @@ def sense(lanes, arms, extra, table, o, w, dt):
                 w[at(S2, i, j, W, L)],
                 w[at(L1SQ, i, j, W, L)],
                 w[at(L2SQ, i, j, W, L)],
-                place,
+                links,
                 w[of(VX, j, W, L)],
                 w[of(VY, j, W, L)],
             )
             if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
                 gx, gy = drag(
-                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, place, rate
+                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, links, rate
                 )
                 fx, fy = fx + gx, fy + gy
-            ax, ay = place[0], place[1]
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
-            s, t = (ux * ay - uy * ax) * w[at(SCALE, i, j, W, L)], ux * ax + uy * ay
+            scale = w[at(SCALE, i, j, W, L)]
+            s, t = turned(chord, scale * ux, scale * uy)
+            w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)] = s, t
             w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             angle = small_angle(s)
             w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
             w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
             w[at(ED, i, j, W, L)] = rate - wanted_rate
-            w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)], w[at(AD, i, j, W, L)] = ax, ay, place[4]
-            w[at(INV, i, j, W, L)], w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = place[5], bx, by
+            w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = bx, by
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)], w[at(ACC, i, j, W, L)] = fx, fy, acc
             # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector
             # coordinates a Runge-Kutta step could jump over that instant.
-            w[at(LOW, i, j, W, L)] = min(place[6], 1.0 - dt * decay)
+            w[at(LOW, i, j, W, L)] = min(area2, 1.0 - dt * decay)
     for p in range(W * L):
         count += 1 if w[NEAR * W * L + p] < 0.0 else 0
     return count
@@ -76,11 +76,9 @@ def mend(lanes, arms, table, o, w):
     """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent."""
     L, W = len(lanes), len(arms)
     for i in range(W):
-        ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            ax, ay = w[at(AX, i, j, W, L)], w[at(AY, i, j, W, L)]
-            s, t = ux * ay - uy * ax, ux * ax + uy * ay
-            if not (abs(s * w[at(SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
+            s, t = w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)]
+            if not (abs(s) <= 0.1 and t >= 0.0):
                 angle = math.atan2(s, t)
                 w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + angle
                 w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
@@ -92,7 +90,7 @@ def pull(lanes, arms, extra, w):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            place = geometry(
+            _, links, area2 = geometry(
                 w[at(BX, i, j, W, L)],
                 w[at(BY, i, j, W, L)],
                 w[at(L1SQ, i, j, W, L)],
@@ -107,20 +105,20 @@ def pull(lanes, arms, extra, w):
                 w[at(S2, i, j, W, L)],
                 w[at(L1SQ, i, j, W, L)],
                 w[at(L2SQ, i, j, W, L)],
-                place,
+                links,
                 w[of(SVX, j, W, L)],
                 w[of(SVY, j, W, L)],
             )
             if extra is not None:
                 env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
                 gx, gy = drag(
-                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, place, rate
+                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, links, rate
                 )
                 fx, fy = fx + gx, fy + gy
             c = w[at(C, i, j, W, L)]
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c
-            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], place[6])
+            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
 
 
 @outlined

@@ -5,33 +5,44 @@ from __future__ import annotations
 import math
 
 from .jit import kernel, leaf, outlined
-from .leaves import geometry, pose_terms, solve2
+from .leaves import geometry, pose_terms, solve2, turned
 from .rows import *
 from .tables import *
 
 
+@leaf
+def keep(modelled, w, p, P, links):
+    """Write the row of A of an arm, entry p of pair rows of P numbers; for laws with a model all of its links."""
+    bx, by, lx, ly, ad, inv, den = links
+    w[A1 * P + p], w[A2 * P + p] = bx, by
+    if modelled is not None:
+        w[L1 * P + p], w[L2 * P + p], w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p] = lx, ly, ad, inv, den
+
+
 @outlined
-def true_pose(lanes, drives, arms, law, w):
+def true_pose(lanes, drives, arms, modelled, law, w):
     """The true end-effector position and velocity, and A there."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         w[of(PX, j, W, L)], w[of(PY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-    if law.same:
+    if modelled is not None:
+        link_rows(lanes, drives, arms, modelled, w)
+    elif law.same:
         for i in range(W):
             for j in range(L):
                 w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)]
     else:
-        control_rows(lanes, drives, arms, w)
+        link_rows(lanes, drives, arms, modelled, w)
 
 
 @outlined
-def control_rows(lanes, drives, arms, w):
-    """Rows b = d / (a x d) of A at the pose."""
+def link_rows(lanes, drives, arms, modelled, w):
+    """The links of the model at the pose, above all the rows b of A."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            place = geometry(
+            _, links, _ = geometry(
                 w[at(MODEL + BX, i, j, W, L)],
                 w[at(MODEL + BY, i, j, W, L)],
                 w[at(MODEL + L1SQ, i, j, W, L)],
@@ -41,11 +52,11 @@ def control_rows(lanes, drives, arms, w):
                 w[of(PX, j, W, L)],
                 w[of(PY, j, W, L)],
             )
-            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = place[2] * place[5], place[3] * place[5]
+            keep(modelled, w, i * L + j, W * L, links)
 
 
 @outlined
-def newton_step(lanes, drives, arms, table, o, w, tolerance):
+def newton_step(lanes, drives, arms, modelled, table, o, w, tolerance):
     """One Newton step for the least-squares pose of all runs; returns how many need another one."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
@@ -61,12 +72,12 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
                 w[of(PX, j, W, L)],
                 w[of(PY, j, W, L)],
             )
-            p11, p12, p22, gx, gy, bx, by, near = pose_terms(
+            p11, p12, p22, gx, gy, near = pose_terms(
                 w[at(MODEL + L2SQ, i, j, W, L)], w[at(MODEL + SCALE, i, j, W, L)], place, ux, uy, w[at(E, i, j, W, L)]
             )
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = p11, p12, p22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)], w[at(NEAR, i, j, W, L)] = gx, gy, near
-            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
+            keep(modelled, w, i * L + j, W * L, place[1])
     count = 0
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
@@ -88,7 +99,7 @@ def newton_step(lanes, drives, arms, table, o, w, tolerance):
 
 
 @leaf
-def single_step(arms, w, x, y):
+def single_step(arms, modelled, w, x, y):
     """`newton_step` of one run, its arms side by side: the shares of the arms at (x, y)."""
     W = len(arms)
     m = MODEL * W
@@ -103,7 +114,7 @@ def single_step(arms, w, x, y):
             x,
             y,
         )
-        p11, p12, p22, gx, gy, bx, by, near = pose_terms(
+        p11, p12, p22, gx, gy, near = pose_terms(
             w[m + L2SQ * W + i],
             w[m + SCALE * W + i],
             place,
@@ -112,17 +123,18 @@ def single_step(arms, w, x, y):
             w[E * W + i],
         )
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
-        w[A1 * W + i], w[A2 * W + i], w[NEAR * W + i] = bx, by, near
+        w[NEAR * W + i] = near
+        keep(modelled, w, i, W, place[1])
 
 
 @outlined
-def single_newton(drives, arms, w, tolerance):
+def single_newton(drives, arms, modelled, w, tolerance):
     """The pose of one run by Newton steps; returns how many more it needs, and whether they lead nowhere."""
     N, W = len(drives), len(arms)
     x, y = w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)]
     w[of(TODO, 0, W, 1)] = 1.0
     for _ in range(12):
-        single_step(arms, w, x, y)
+        single_step(arms, modelled, w, x, y)
         m11, m12, m22, fx, fy = w[P11 * W], w[P12 * W], w[P22 * W], w[GX * W], w[GY * W]
         near = w[NEAR * W]
         for i in range(1, N):
@@ -148,18 +160,18 @@ def nearest(drives, arms, w, q_a, x, y):
         w[(MOTION + COS) * W + i], w[(MOTION + SIN) * W + i] = math.cos(angle), math.sin(angle)
         w[E * W + i] = 0.0
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] = x, y, 0.0
-    single_newton(drives, arms, w, 1e-13 / w[(MODEL + SCALE) * W])
+    single_newton(drives, arms, None, w, 1e-13 / w[(MODEL + SCALE) * W])
     return w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] + w[of(TODO, 0, W, 1)] == 0.0
 
 
 @outlined
-def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
+def gauss_newton(drives, arms, modelled, table, o, w, j, L, x, y, tolerance):
     """Least-squares pose of one run from a rough start; returns it, and whether it converged."""
     N, W = len(drives), len(arms)
     for _ in range(50):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            ax, ay, dx, dy, _, inv, area2 = geometry(
+            chord, links, area2 = geometry(
                 w[at(MODEL + BX, i, j, W, L)],
                 w[at(MODEL + BY, i, j, W, L)],
                 w[at(MODEL + L1SQ, i, j, W, L)],
@@ -171,10 +183,10 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
             )
             if not area2 > 0.0:
                 return x, y, False
-            bx, by = dx * inv, dy * inv
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
-            r = w[at(E, i, j, W, L)] - math.atan2(ux * ay - uy * ax, ux * ax + uy * ay)
-            w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = bx, by
+            s, t = turned(chord, ux, uy)
+            r, bx, by = w[at(E, i, j, W, L)] - math.atan2(s, t), links[0], links[1]
+            keep(modelled, w, i * L + j, W * L, links)
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
         sx, sy = solve2(m11, m12, m22, fx, fy)
         if abs(sx) < tolerance and abs(sy) < tolerance:
@@ -184,7 +196,7 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
 
 
 @outlined
-def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
+def measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
     tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
@@ -197,12 +209,12 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
     if history is not None:
-        single_newton(drives, arms, w, tolerance)
+        single_newton(drives, arms, modelled, w, tolerance)
     if study is not None:
         count = L
         for _ in range(12):
             if count > 0:
-                count = newton_step(lanes, drives, arms, table, o, w, tolerance)
+                count = newton_step(lanes, drives, arms, modelled, table, o, w, tolerance)
     rough = 0
     for j in range(L):
         rough += 1 if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 else 0
@@ -210,7 +222,7 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
                 px, py, found = gauss_newton(
-                    drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
+                    drives, arms, modelled, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
                 )
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
@@ -231,10 +243,10 @@ def measured_rate(lanes, drives, arms, table, o, w):
 
 
 @leaf
-def find_pose(lanes, drives, arms, history, study, sensor, law, table, o, w, k):
+def find_pose(lanes, drives, arms, modelled, history, study, sensor, law, table, o, w, k):
     """Pose, its velocity, and A there, from the source that the law asks for."""
     if law.pose == MEASURED:
-        measured_pose(lanes, drives, arms, history, study, table, o, w, k, not sensor.quantized)
+        measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, not sensor.quantized)
         measured_rate(lanes, drives, arms, table, o, w)
     else:
-        true_pose(lanes, drives, arms, law, w)
+        true_pose(lanes, drives, arms, modelled, law, w)

@@ -14,8 +14,9 @@ BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBO
 MODEL = 15
 # What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
 OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
-# The machine at the sample: angle and rate, geometry, shares of the arms; what tells a lost arm and a far one.
-(Q, QD, AX, AY, AD, INV, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 17)
+# The machine at the sample: angle and rate, sine and cosine of the angle error, rows b, shares of the arms; what
+# tells a lost arm and a far one.
+(Q, QD, SINE, COSINE, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 15)
 # The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
 (
     E,
@@ -40,12 +41,14 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
     ACC_E,
     ELBOW_E,
     ELBOW_ED,
+    ASK_B,
+    ASK_E,
     C,
     PUSH,
     OLD,
     COPPER,
     WORK,
-) = range(FY + 1, FY + 28)
+) = range(FY + 1, FY + 30)
 # The desired motion of a sample of a single run, in the order of the blocks of `tables.motion_table`.
 MOTION = WORK + 1
 BLOCKS = MOTION + 9
@@ -134,6 +137,18 @@ def want(table, o, block, i, W):
 def desired(table, o, w, block, i, W, L):
     """As `want`, of a single run from its work table, into which `single.fetch` has copied it."""
     return w[(MOTION + block) * W + i] if L == 1 else table[o + 6 + block * W + i]
+
+
+@index
+def move(W, source, s, target, t):
+    """Copy W numbers; four are read before they are written, as one vector: a loop beside another array is not."""
+    if W % 4 == 0:
+        for i in range(0, W, 4):
+            a, b, c, d = source[s + i], source[s + i + 1], source[s + i + 2], source[s + i + 3]
+            target[t + i], target[t + i + 1], target[t + i + 2], target[t + i + 3] = a, b, c, d
+    else:
+        for i in range(W):
+            target[t + i] = source[s + i]
 
 
 @index

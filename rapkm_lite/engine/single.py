@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .jit import index, kernel, leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2, stiffness
+from .leaves import drag, geometry, share, small_angle, solve2, stiffness, turned
 from .plant import MOST_STEPS, STIFF, judge, mend
 from .rows import *
 from .tables import *
@@ -13,22 +13,8 @@ from .tables import *
 
 @index
 def fetch(block, W, table, o, w):
-    """Copy a block of the desired motion into its row; four numbers are read before they are written, as one vector.
-
-    Beside another array loops over arms would not become vector instructions.
-    """
-    row = MOTION + block
-    if W == 4:
-        a, b, c, d = (
-            want(table, o, block, 0, W),
-            want(table, o, block, 1, W),
-            want(table, o, block, 2, W),
-            want(table, o, block, 3, W),
-        )
-        w[row * W], w[row * W + 1], w[row * W + 2], w[row * W + 3] = a, b, c, d
-    else:
-        for i in range(W):
-            w[row * W + i] = want(table, o, block, i, W)
+    """Copy a block of the desired motion into its row."""
+    move(W, table, o + 6 + block * W, w, (MOTION + block) * W)
 
 
 @leaf
@@ -42,26 +28,26 @@ def sense(arms, extra, table, o, w, dt):
     fetch(RATE, W, table, o, w)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        place = geometry(
+        chord, links, area2 = geometry(
             w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
         )
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], links, vx, vy
         )
         if extra is not None:
-            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
+            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, links, rate)
             fx, fy = fx + gx, fy + gy
-        ax, ay, ux, uy = place[0], place[1], desired(table, o, w, COS, i, W, 1), desired(table, o, w, SIN, i, W, 1)
-        s, t = (ux * ay - uy * ax) * w[SCALE * W + i], ux * ax + uy * ay
+        scale = w[SCALE * W + i]
+        s, t = turned(chord, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
+        w[SINE * W + i], w[COSINE * W + i] = s, t
         w[NEAR * W + i] = min(0.1 - abs(s), t)
         angle = small_angle(s)
         w[Q * W + i], w[QD * W + i] = desired(table, o, w, ANGLE, i, W, 1) + angle, rate
         w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - desired(table, o, w, RATE, i, W, 1)
-        w[AX * W + i], w[AY * W + i], w[AD * W + i] = ax, ay, place[4]
-        w[INV * W + i], w[B1 * W + i], w[B2 * W + i] = place[5], bx, by
+        w[B1 * W + i], w[B2 * W + i] = bx, by
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i], w[ACC * W + i] = fx, fy, acc
-        w[LOW * W + i] = min(place[6], 1.0 - dt * decay)
+        w[LOW * W + i] = min(area2, 1.0 - dt * decay)
     near = w[NEAR * W]
     for i in range(1, W):
         near = min(near, w[NEAR * W + i])
@@ -82,19 +68,19 @@ def acceleration(arms, extra, acting, w, x, y, vx, vy):
     W = len(arms)
     env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
-        place = geometry(
+        _, links, area2 = geometry(
             w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
         )
         m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], place, vx, vy
+            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], links, vx, vy
         )
         if extra is not None:
-            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, place, rate)
+            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, links, rate)
             fx, fy = fx + gx, fy + gy
         c = w[acting * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
-        w[LOW * W + i] = min(w[LOW * W + i], place[6])
+        w[LOW * W + i] = min(w[LOW * W + i], area2)
     return join(arms, w)
 
 

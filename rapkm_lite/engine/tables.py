@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import namedtuple
 
 import numpy as np
@@ -24,6 +25,8 @@ Kind = namedtuple("Kind", "lanes drives arms faulty extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 # The sample with which a table begins, the samples of the whole run, and the sampling time.
 Clock = namedtuple("Clock", "first samples dt")
+# Flat columns of a single run, those of the drives with room for the rest of a row behind them; the number of drives.
+History = namedtuple("History", "x xd q qd c joints drives")
 Law = namedtuple("Law", "form filter posed pose same switched asks")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
@@ -90,6 +93,7 @@ def sizes(count: int) -> tuple:
     return ((),) * count
 
 
+@functools.lru_cache(maxsize=64)
 def extra(robot) -> tuple | None:
     """None for a machine without friction and gravity; an entry where there is gravity."""
     return sizes(1) if robot.gravity.any() else () if robot.friction.any() else None

@@ -118,7 +118,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             link = base + want(table, o, ELBOW_RATE, i, W)
             den = ax * dy - ay * dx
         else:
-            ax, ay, dx, dy, _, inv, _ = geometry(
+            _, (bx, by, lx, ly, _, _, den), _ = geometry(
                 w[m + BX * W],
                 w[m + BY * W],
                 l1sq,
@@ -128,9 +128,9 @@ def fill_matrices(drives, arms, law, table, o, w, room):
                 w[of(PX, 0, W, 1)],
                 w[of(PY, 0, W, 1)],
             )
-            den = 1.0 / inv
+            ax, ay, dx, dy = den * lx, den * ly, den * bx, den * by
             vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
-            base, link = (dx * vx + dy * vy) / den, -(ax * vx + ay * vy) / den
+            base, link = bx * vx + by * vy, -(lx * vx + ly * vy)
         ad, tip = ax * dx + ay * dy, w[m + TIP * W]
         den_dot = (link - base) * ad
         F[i, 0], F[i, 1], F[N + i, 0], F[N + i, 1] = dx / den, dy / den, -(ax + dx) / den, -(ay + dy) / den

@@ -9,7 +9,7 @@ import numpy as np
 from ..control.compiled_law import CompiledLaw
 from ..engine import COMPILED, compiled, tables, without_compiler
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
-from ..machine.values import all_frozen
+from ..machine.values import room
 from ..mechanics.sampling import PART
 from .codes import Code, code_of
 from .patience import patience
@@ -17,6 +17,8 @@ from .setup import Outcome, Setup
 
 LAW_FAILED = -2
 """Status beside those of the engine: the law raised, or the user pressed Ctrl-C."""
+LANES = 32
+"""Runs side by side: in the first cache of a core, and enough of them that no register waits for another."""
 
 __all__ = [
     "COMPILED", "DONE", "LAW_FAILED", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled",
@@ -32,18 +34,25 @@ def encode(law: Any, model) -> Code | None:
 
 def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]:
     """One run with its history, and the Ctrl-C that stopped it; one before the first sample is raised."""
-    samples, N = len(setup.trajectory), setup.robot.n_arms
+    samples, N, interrupt = len(setup.trajectory), setup.robot.n_arms, None
+    spare = tables.width(N, True) - N
+    flat, kept = room(2 * samples, 2 * samples, *3 * [N * samples + spare], samples)
     # Kernels do not hear a Ctrl-C: what they have done when it is raised, the numbers tell.
-    history = [np.full((samples, 2), np.nan), *(np.zeros((samples, size)) for size in (2, N, N, N))]
-    history.append(np.zeros((samples, 2), np.int32))
+    flat[0][:] = np.nan
+    history = tables.History._make([*flat[:-1], flat[-1].view(np.int32), N])
     try:
         w = _run(setup, [code], setup.sensors.offset[None], history)
-    except KeyboardInterrupt as interrupt:
-        begun = int(np.append(np.isfinite(history[0][:, 0]), False).argmin())
+        status, sample = int(w("STATUS")[0]), int(w("SAMPLE")[0])
+    except KeyboardInterrupt as stop:
+        begun = int(np.append(np.isfinite(flat[0][::2]), False).argmin())
         if begun == 0:
             raise
-        return Outcome(LAW_FAILED, begun - 1, *all_frozen(history)), interrupt
-    return Outcome(int(w("STATUS")[0]), int(w("SAMPLE")[0]), *all_frozen(history)), None
+        status, sample, interrupt = LAW_FAILED, begun - 1, stop
+    # Elbows were counted after all arms of a row.
+    history.joints[history.joints >= N + spare] -= spare
+    kept[-1] = kept[-1].view(np.int32)
+    columns = [column[: n * samples].reshape(samples, n) for column, n in zip(kept, (2, 2, N, N, N, 2), strict=True)]
+    return Outcome._make([status, sample, *columns]), interrupt
 
 
 def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -57,7 +66,7 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
     for i, code in enumerate(codes):
         kinds.setdefault(code.kind, []).append(i)
     for rows in kinds.values():
-        width = (16 if compiled() else 1) if codes[rows[0]].user is None else 1
+        width = (LANES if compiled() else 1) if codes[rows[0]].user is None else 1
         for first in range(0, len(rows), width):
             # The last runs fill up with copies of themselves: a lane does not feel its neighbours.
             lanes = [rows[min(i, len(rows) - 1)] for i in range(first, first + width)]
@@ -100,7 +109,7 @@ def _work(setup: Setup, codes: list[Code], offsets, width: int):
         start = rows.GRAVITY_X + i * rows.ENVIRONMENT
         runs[start : start + rows.ENVIRONMENT] = environment[:, None]
     for name in codes[0].drives:
-        blocks[getattr(rows, name), :N] = np.stack([code.drives[name] for code in codes], axis=-1)
+        blocks[getattr(rows, name), :N] = np.array([code.drives[name] for code in codes]).T
     for name in codes[0].run:
         runs[getattr(rows, name)] = [code.run[name] for code in codes]
     # Elbows are counted after all arms of a row.
@@ -117,7 +126,7 @@ def _work(setup: Setup, codes: list[Code], offsets, width: int):
 def _run(setup: Setup, codes: list[Code], offsets, history):
     """Run as many runs as there are codes side by side; returns a function that gives the rows of the work table.
 
-    history : None for a study; the columns of an `Outcome` for a single run.
+    history : None for a study; the `History` of a single run.
     """
     from ..engine import rows
     from ..engine.loop import closed_loops
@@ -137,22 +146,23 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     count = tables.FEW if modelled is None and user is None else tables.ALL
     sensor, faulty = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
+    log = None if history is None else tables.History._make([*map(tables.plain, history[:-1]), N])
     with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
         for first in range(0, samples, PART):
             part = slice(first, min(first + PART, samples))
             table = _motion(trajectory, W, count, part)
             clock = tables.Clock(first, samples, trajectory.dt)
-            log = None if history is None else tuple(tables.plain(column[part].reshape(-1)) for column in history)
             try:
                 closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             finally:
-                if log is not None:
-                    _take(history, part, log, drives - N)
+                if history is not None and log is not None and not compiled():
+                    for column, values in zip(history[:-1], log, strict=False):
+                        column[:] = values
             work[:] = w
-            if not np.any(runs[rows.STATUS] == DONE):
+            if part.stop < samples and not np.any(runs[rows.STATUS] == DONE):
                 break
 
     def row(name: str) -> np.ndarray:
@@ -160,15 +170,6 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
         return blocks[index, :N] if name in ("COPPER", "WORK") else runs[index]
 
     return row
-
-
-def _take(history, part: slice, log, filled: int) -> None:
-    """Lists that were filled without a compiler, into the columns of a history; elbows follow `filled` arms sooner."""
-    if not compiled():
-        for column, values in zip(history, log, strict=True):
-            column[part] = np.reshape(values, (-1, column.shape[1]))
-    pairs, N = history[-1][part], history[1].shape[1]
-    pairs[pairs >= N + filled] -= filled
 
 
 def _law(code: Code, asks: int, same: bool) -> tables.Law:

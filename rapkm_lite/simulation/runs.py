@@ -228,7 +228,9 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
         table = np.concatenate(columns, axis=-1)[rows]
         rows = slice(int(np.append(np.all(np.isfinite(table), axis=-1), False).argmin()))
     columns = [column[rows] for column in (setup.trajectory.t, *columns)]
-    return Run(setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns)
+    # What a kernel has finished is finite and frozen.
+    make = Run if status != DONE or columns[1].flags.writeable else Run.trusted
+    return make(setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns)
 
 
 def hand_over(error, partial, note: str) -> None:

@@ -1,4 +1,4 @@
-"""The engine's kernels next to C, and next to its own PD law: single runs, and 16 runs side by side on one core."""
+"""The engine's kernels next to C, and next to its own PD law: single runs, and runs side by side on one core."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from . import yardsticks
 from .turns import OWN_TIME, in_turns
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
-BLOCK = np.random.default_rng(0).normal(0.0, 5e-3, (16, 3))
+BLOCK = np.random.default_rng(0).normal(0.0, 5e-3, (compiled.LANES, 3))
 PD = rk.PD(7.05, 0.225)
 FILTER, TRUE_FILTER = rk.AntagonismFilter(PD), rk.AntagonismFilter(PD, pose="true")
 # What the C kernel is told to do for the same law: filtered, measured pose.
@@ -56,7 +56,7 @@ def single(robot, law, path):
 
 
 def block(robot, law, path):
-    """16 runs of the kernel side by side, in one thread."""
+    """As many runs as the kernel takes side by side, in one thread."""
     setup, code = prepare(robot, path, Sensors()), compiled.encode(law, robot)
     return lambda: compiled.many(setup, [code] * len(BLOCK), BLOCK)
 
@@ -110,8 +110,9 @@ def studies(robot, folder: Path) -> None:
     jobs = {name: block(machine, law, path) for name, machine, law, path in cases(robot)}
     against = yards(folder, robot, 8, ["PD"])
     t = in_turns(15, OWN_TIME, **jobs, **against)
-    # Sixteen runs here, eight in C.
-    t |= {name: type(t[name])(2 * t[name].median, 2 * t[name].least) for name in against}
+    # Eight runs at a time in C.
+    turns = len(BLOCK) // 8
+    t |= {name: type(t[name])(turns * t[name].median, turns * t[name].least) for name in against}
     print("\nStudies, speed per core as a multiple of C SIMD over runs (PD), and of our PD in lanes")
     print(f"{'':40}{'runs/s':>8}{'C SIMD':>14}{'C, friction':>15}{'our PD':>14}")
     for name in jobs:
@@ -120,7 +121,7 @@ def studies(robot, folder: Path) -> None:
             f"{name:40}{len(BLOCK) / t[name].median:8.0f}{columns[0]:>14}{columns[1]:>15}"
             f"{t[own_pd(name)].over(t[name]):>14}"
         )
-    offsets = np.tile(BLOCK, (16, 1))
+    offsets = np.tile(BLOCK, (8, 1))
     sweeps = {
         name: lambda law=law, path=path, machine=machine: rk.sweep(machine, law, path, offsets)
         for name, machine, law, path in cases(robot)
