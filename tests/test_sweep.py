@@ -87,7 +87,7 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
             ROBOT,
             PD,
             PATH,
-            OFFSETS,
+            OFFSETS[:3],
             *(getattr(study, name)[[0, 2, 3]] for name in COLUMNS),
             study.failed[[0, 2, 3]],
             study.failure_time[[0, 2, 3]],

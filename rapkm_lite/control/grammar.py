@@ -13,7 +13,6 @@ Errors are measured minus desired.
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +21,7 @@ import numpy as np
 
 from ..machine.arguments import (
     bounded,
+    callable_with,
     check_leading,
     joint_vectors,
     of_kind,
@@ -88,15 +88,7 @@ class Function(Law):
 
     def start(self, model, dt):
         """A function that cannot be called so is refused before the run."""
-        try:
-            inspect.signature(self.function).bind("t", "q_a", "qd_a", "desired")
-        except TypeError as error:
-            raise ValueError(
-                f"law = {short(self.function)} cannot be called ({error}); allowed: a function "
-                "(t, q_a, qd_a, desired) -> c"
-            ) from None
-        except ValueError:
-            pass  # built-in functions have no signature
+        callable_with("law", self.function, "t", "q_a", "qd_a", "desired")
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
@@ -110,6 +102,27 @@ def as_law(law) -> Law:
         if callable(law):
             return Function(law)
     raise ValueError(f"law = {short(law)}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
+
+
+def begin(law, model: Manipulator, dt: float):
+    """`start` of a law or callable, after a check that a run can call it.
+
+    Raises ValueError where a method of a user's law takes other arguments.
+    """
+    law = as_law(law)
+    for name, given in _METHODS.items():
+        if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
+            callable_with(f"law.{name}", getattr(law, name), *given)
+    return law.start(model, dt)
+
+
+_METHODS = {
+    "start": ("model", "dt"),
+    "step": ("memory", "sample"),
+    "coordinates": ("memory",),
+    "torque": ("model", "q", "qd", "q_a", "qd_a", "desired"),
+}
+"""What a run gives the methods of a law; `torque` only where the law has no step of its own."""
 
 
 def coordinates(law, memory) -> tuple[int, int] | None:

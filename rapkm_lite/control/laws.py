@@ -12,7 +12,7 @@ from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
-from .grammar import LawLike, LawValue, as_law, ask, coordinates, gain, measured
+from .grammar import LawLike, LawValue, as_law, ask, begin, coordinates, gain, measured
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +141,7 @@ class AntagonismFilter(LawValue):
         super().__post_init__()
 
     def start(self, model, dt):
-        return as_law(self.law).start(model, dt)
+        return begin(self.law, model, dt)
 
     def step(self, memory, sample):
         c, memory = ask(self.law, memory, sample)

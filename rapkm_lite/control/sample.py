@@ -13,7 +13,7 @@ from ..mechanics.at import at
 from ..mechanics.closure import estimate_pose
 from ..mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
-from .grammar import as_law, ask, coordinates, measured
+from .grammar import ask, begin, coordinates, measured
 
 
 class NoPose(ConvergenceError):
@@ -119,7 +119,7 @@ class Controller:
         self.law, self.model, self.dt = law, manipulator(model, "model"), positive_number("dt", dt)
         self.x: ArrayLike | None = None
         self.nearest: Callable[..., tuple[float, float] | None] | None = None
-        self.memory = as_law(law).start(model, self.dt)
+        self.memory = begin(law, model, self.dt)
 
     @property
     def pair(self) -> tuple[int, int] | None:

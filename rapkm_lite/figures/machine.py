@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..machine.arguments import bounded, exact_array
 from ..mechanics.kinematics import arm_vectors
 from ..mechanics.maps import sampling_box, workspace_grid
 from .style import NEUTRAL, arm_colour, arm_text_colour, axes_or_new
@@ -90,6 +91,7 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     >>> plane_limits(rk.load())["aspect"]
     'equal'
     """
+    margin = bounded("margin", exact_array("margin", margin), 0.0, strict=False)
     room = robot.lengths[:, 0].max() + margin * robot.lengths.max()
     low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
     return {

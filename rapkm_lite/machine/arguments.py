@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import sys
 from collections.abc import Sequence
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 
 _FLOAT = np.dtype(float)
+_LEAST = 1e-100
+_NO_NUMBERS = str, bytes, bool, np.bool_
 
 
 class ConvergenceError(RuntimeError, ValueError):
@@ -58,7 +61,9 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value)
         # NumPy would read "1.0", True and bytes as numbers, and drop the imaginary part of a complex array.
-        if value is None or isinstance(value, bytearray) or array.dtype.kind not in "iufO":
+        if value is None or isinstance(value, bytearray | memoryview) or array.dtype.kind not in "iufO":
+            raise TypeError
+        if array.dtype.hasobject and any(isinstance(entry, _NO_NUMBERS) for entry in array.flat):
             raise TypeError
         array = array.astype(float, copy=False)
     except OverflowError:
@@ -123,12 +128,16 @@ def wide_matrix(name: str, value) -> np.ndarray:
 
 
 def bounded(name: str, array: np.ndarray, low: float, *, strict: bool) -> np.ndarray:
-    """Return `array` when every entry is above `low` (not below it when `strict` is false)."""
-    bad = array <= low if strict else array < low
+    """Return `array` when every entry is above `low` (not below it when `strict` is false).
+
+    Above zero means 1e-100 at least: what is divided by less may leave a function as infinity.
+    """
+    bad = array < low if not strict else array < _LEAST if low == 0.0 else array <= low
     if np.any(bad):
         where = np.argwhere(bad)[0]
-        sign = ">" if strict else ">="
-        raise ValueError(f"{name}{_at(where)} = {array[tuple(where)]:g}; allowed: {sign} {low:g}")
+        number, sign = array[tuple(where)], ">" if strict else ">="
+        least = f", from {_LEAST:g} on" if strict and number > low else ""
+        raise ValueError(f"{name}{_at(where)} = {number:g}; allowed: {sign} {low:g}{least}")
     return array
 
 
@@ -169,7 +178,7 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     if skew > 1e-12 * np.abs(array).max(initial=0.0):
         raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
     smallest = np.linalg.eigvalsh(array).min(initial=np.inf)
-    if smallest <= 1e-14 * np.abs(array).max(initial=0.0):
+    if smallest <= max(1e-14 * np.abs(array).max(initial=0.0), _LEAST):
         raise ValueError(f"{name} has the eigenvalue {smallest:.3g}; allowed: symmetric positive definite")
     return array
 
@@ -215,6 +224,19 @@ def function(name: str, value: Any) -> Any:
     """Return `value` when it can be called, and is no class."""
     if not callable(value) or isinstance(value, type):
         raise ValueError(f"{name} = {short(value)}; allowed: a function")
+    return value
+
+
+def callable_with(name: str, value: Any, *given: str) -> Any:
+    """Return `value` when it can be called with the arguments `given`, by position."""
+    try:
+        inspect.signature(value).bind(*given)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} = {short(value)} cannot be called ({error}); allowed: a function ({', '.join(given)})"
+        ) from None
+    except ValueError:
+        pass  # built-in functions have no signature
     return value
 
 

@@ -67,6 +67,8 @@ class Manipulator(Value):
         if min(np.hypot(*(base[i] - base[j])) for i in range(N) for j in range(i)) == 0.0:
             raise ValueError(f"base = {base.tolist()} holds one point twice; allowed: N different points")
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
+        if lengths.max() > 1e6:
+            raise ValueError(f"lengths = {lengths.tolist()} m; allowed: up to 1e6 m")
         masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
         given: dict[str, Any] = {"base": base, "lengths": lengths, "masses": masses}
         inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
@@ -89,8 +91,8 @@ class Manipulator(Value):
         J_a, J_d, P = self.arm_inertias.T
         if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(
-                f"inertias = {given['inertias'].tolist()} with masses and centers let an arm move freely; "
-                "allowed: values with a positive definite mass matrix"
+                f"inertias = {given['inertias'].tolist()} with masses, centers and load = {given['load']:g} let an arm "
+                "move freely; allowed: values with a positive definite mass matrix"
             )
         if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
             raise ValueError(

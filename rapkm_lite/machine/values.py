@@ -65,7 +65,7 @@ def frozen(array) -> np.ndarray:
     Traceback (most recent call last):
     ValueError: assignment destination is read-only
     """
-    if masked(array):
+    if masked(array) and array is not np.ma.masked:
         if _is_frozen(array.data) and _is_frozen(np.ma.getmaskarray(array)):
             return array
         return np.ma.MaskedArray(frozen(array.data), frozen(np.ma.getmaskarray(array)), fill_value=array.fill_value)

@@ -51,7 +51,8 @@ def command_filter(A, K) -> np.ndarray:
     A = tall_matrix("A", A)
     K = positive_definite("K", K, A.shape[-2])
     check_leading(A=A.shape[:-2], K=K.shape[:-2])
-    return antagonism_filter(K @ A)
+    Q, _ = cores.full_rank("K A", K @ A)
+    return product(Q, Q.mT)
 
 
 def null_basis(A) -> np.ndarray:

@@ -61,7 +61,8 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     h = np.abs(loop_constraints(robot, q[worst])).max()
     raise ConvergenceError(
         f"close_loops found no configuration near q = {q0[worst].round(6).tolist()}: the closure error is {h:.3g} m at "
-        f"{q[worst].round(6).tolist()}; allowed: a q near a regular configuration of this machine"
+        f"{q[worst].round(6).tolist()}, tolerance = {tolerance:g} of the longest link; allowed: a q near a regular "
+        "configuration of this machine"
     )
 
 

@@ -54,6 +54,11 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
     # So close to it that rounding was magnified, what was clipped is another force.
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
+    if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
+        raise ValueError(
+            f"prestress = {c0.tolist()} is so far beyond limit = {limit.tolist()} that rounding hides the nearest "
+            "torques; allowed: a prestress of the size of the limits"
+        )
     return np.clip(edge, -limit, limit) if missed else c
 
 

@@ -56,6 +56,18 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
         )
 
 
+def slow_turns(t: np.ndarray, turns) -> float:
+    """The turns of a circle, unless samples would show another one; a quintic is 15/8 times as fast as on average."""
+    turns = positive_number("turns", turns)
+    largest = 15 / 8 * 2 * np.pi * turns / (len(t) - 1)
+    if largest > np.pi / 2:
+        raise ValueError(
+            f"turns = {turns:g} in {t[-1]:g} s are up to {largest:.3g} rad per sample; allowed: up to pi / 2, so fewer "
+            "turns, a longer duration or a shorter dt"
+        )
+    return turns
+
+
 def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q, qd = F xd and qdd = F xdd + Fdot xd, each (k, 2N), for some samples of a path; `before` is the row of q
     from which the base angles go on, if there is one.

@@ -10,7 +10,7 @@ import numpy as np
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, all_frozen, frozen
-from .sampling import PART, Motion, check_rates, equidistant, joint_motion, refuse, sample_times
+from .sampling import PART, Motion, check_rates, equidistant, joint_motion, refuse, sample_times, slow_turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,7 +200,7 @@ def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
     t = sample_times(duration, dt)
-    rest = float(exact_array("rest", rest))
+    duration, rest = positive_number("duration", duration), float(exact_array("rest", rest))
     if not 0.0 <= 2 * rest < duration:
         raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
     edges = len(corners)
@@ -254,7 +254,8 @@ def circle(
     manipulator(robot)
     radius = positive_number("radius", radius)
     t = sample_times(duration, dt)
-    full, middle = 2 * np.pi * positive_number("turns", turns), exact_array("centre", centre, 2)[:, None]
+    duration, middle = positive_number("duration", duration), exact_array("centre", centre, 2)[:, None]
+    full = 2 * np.pi * slow_turns(t, turns)
 
     def motion(rows: slice):
         way, rate, rate_dot = quintic(t[rows] / duration)

@@ -36,7 +36,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
     c = real_array("c", c, manipulator(robot).n_arms)
     if c.ndim < 2:
         raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
-    positive_number("dt", dt)
+    dt = positive_number("dt", dt)
     parts = (c[..., k : k + PART, :] for k in range(0, max(1, c.shape[-2]), PART))
     heats = [np.sum(joule_heat(part, dt, robot.resistance, robot.torque_constant), axis=-2) for part in parts]
     return np.sum(heats, axis=0)

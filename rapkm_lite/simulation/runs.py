@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import matvec, short
+from ..machine.arguments import masked, matvec, real_array, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -89,11 +89,13 @@ class Run(Value):
     pairs: np.ndarray
 
     def __post_init__(self):
+        as_law(self.law)
         self._set(faults=check_faults(self.faults))
         super().__post_init__()
-        as_law(self.law)
         for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
             shape = self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
+            if masked(getattr(self, name)):
+                real_array(name, getattr(self, name))
             if getattr(self, name).shape != shape:
                 raise ValueError(
                     f"{name} has shape {getattr(self, name).shape}; allowed: {shape}, t has {self.t.shape}"

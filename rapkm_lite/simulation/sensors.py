@@ -9,6 +9,9 @@ import numpy as np
 from ..machine.arguments import bounded, exact_array, real_array, whole_number
 from ..machine.values import Array, OptionalCount, Value, default
 
+_MOST = 10**12
+"""Counts per turn; finer ones are lost in the rounding of the angles."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sensors(Value):
@@ -33,7 +36,7 @@ class Sensors(Value):
         if self.offset.ndim > 1 or self.offset.size == 0:
             raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or (N,), one per drive")
         if self.encoder is not None:
-            self._set(encoder=whole_number("encoder", self.encoder, 1))
+            self._set(encoder=whole_number("encoder", self.encoder, 1, _MOST))
         if self.velocity_filter is not None:
             tau = bounded("velocity_filter", exact_array("velocity_filter", self.velocity_filter), 0.0, strict=False)
             self._set(velocity_filter=float(tau))

@@ -69,10 +69,19 @@ class Sweep(Value):
         for law in self.law if isinstance(self.law, list | tuple) else [self.law]:
             as_law(law)
         self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
+        if type(self.stopped) not in (list, tuple) or any(not isinstance(w, str | None) for w in self.stopped):
+            raise ValueError(f"stopped = {short(self.stopped)}; allowed: a tuple, a string or None for each run")
         super().__post_init__()
+        if self.failed.ndim != 1:
+            raise ValueError(f"failed has shape {self.failed.shape}; allowed: (k,), one truth value per run")
+        blank = Columns.blank(len(self), self.robot.n_arms)
+        for name in ("offsets", *Columns._fields[:-2]):
+            given, shape = getattr(self, name).shape, getattr(blank, name, blank.energies).shape
+            if given != shape:
+                raise ValueError(f"{name} has shape {given}; allowed: {shape}, a row per run")
         words = self.stopped or tuple("it failed" if failed else None for failed in self.failed)
-        if len(words) != len(self) or not all(word is None or isinstance(word, str) for word in words):
-            raise ValueError(f"stopped = {short(self.stopped)}; allowed: a string or None for each of {len(self)} runs")
+        if len(words) != len(self):
+            raise ValueError(f"stopped = {short(words)}; allowed: a string or None for each of {len(self)} runs")
         self._set(stopped=words)
 
     @cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...machine.arguments import positive_number
 from ...mechanics.actuation import drive_pairs
 from ..machine import arm_points
 from ..maps import pair_line, pair_name
@@ -93,6 +94,7 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
     >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}})
     >>> bars(picture, "a", [([1.0, 2.0, 1.5], {})])
     """
+    width = positive_number("width", width)
     zero_line(picture, panel)
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...machine.arguments import bounded, exact_array, function, of_kind, short
+from ...machine.arguments import bounded, callable_with, exact_array, function, of_kind, short
 from .palette import Palette, checked
 
 # Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
@@ -40,7 +40,9 @@ class Picture:
     """
 
     def __init__(self, panels: dict, layout=None, widths=None, size=(9.4, 3.3), setup=None):
-        for name, settings in of_kind("panels", panels, dict, "a dict of name -> keywords of a panel").items():
+        if not of_kind("panels", panels, dict, "a dict of name -> keywords of a panel"):
+            raise ValueError("panels = {}; allowed: one panel at least, name -> keywords")
+        for name, settings in panels.items():
             of_kind(f"panels[{name!r}]", settings, dict, "a dict of keywords")
             unknown = sorted(set(settings) - PANEL)
             if unknown:
@@ -53,7 +55,7 @@ class Picture:
         self.frames = {k: [*p.get("xlim", (0, 1)), *p.get("ylim", (0, 1))] for k, p in panels.items()}
         self.begin()
         if setup is not None:
-            function("setup", setup)(self)
+            callable_with("setup", function("setup", setup), "picture")(self)
         for name, panel in panels.items():
             if "legend" in panel:
                 self.legend(name, panel["legend"])

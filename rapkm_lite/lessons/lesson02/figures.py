@@ -87,8 +87,9 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
 
     >>> import rapkm_lite as rk; ax = plot_prestress_maps(rk.load(), n=21)
     """
-    if axes is None:
-        axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1]
+    if robot.n_arms != 3:
+        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3, whose torques that move nothing are one vector")
+    axes = plt.subplots(1, 3, figsize=(10.4, 3.5), sharey=True)[1] if axes is None else axes
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
     share = on_grid(inside, np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]))
