@@ -21,7 +21,6 @@ GROUPS = {
         "test_engine",
         "test_engine_js",
         "test_explore",
-        "test_causes",
         "test_figures",
         "test_hostile",
         "test_locked_down",

@@ -117,6 +117,75 @@ SETS += [
 ]
 
 
+def stiff(t, q_a, qd_a, desired):
+    return -2e4 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
+
+
+def stiffer(t, q_a, qd_a, desired):
+    return 20.0 * stiff(t, q_a, qd_a, desired)
+
+
+@rk.compiled
+def empty(t, q_a, qd_a, d):
+    if t > 0.1:
+        raise ValueError("the table is empty")
+    return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+
+
+FAST = rk.circle(FOUR, 0.08, 0.5)
+HEXAGON = rk.Manipulator(
+    base=0.23 * np.stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3)], -1),
+    lengths=0.2,
+    masses=0.1,
+    rotor_inertia=1e-5,
+)
+SETS += [
+    ("unstable gain: ", HEXAGON, rk.PD(1e6, 0.2), rk.hold(HEXAGON, [0.0, 0.0], 0.2), {"offset": 1e-3 * np.arange(6)}),
+    ("unstable gain: near the desired state", ROBOT, rk.PD(1e12, 0.2), HOLD, {"offset": OFFSET}),
+    ("unstable gain: in the end the torques swung", ROBOT, stiff, HOLD, {"offset": OFFSET}),
+    ("unstable gain: in the end the torques swung", ROBOT, rk.AntagonismFilter(stiffer), HOLD, {"offset": OFFSET}),
+    (r"ValueError: the table is empty \(line \d+ of test_causes.py: raise", ROBOT, empty, CIRCLE, {}),
+    (
+        "unstable gain: in the end the torques swung",
+        FOUR,
+        rk.AntagonismFilter(stiff),
+        HOLD_FOUR,
+        {"offset": [4e-3, 0.0, 0.0, 1e-3]},
+    ),
+    ("velocity_filter = 0.5 s delays", FOUR, mine, FAST, {"velocity_filter": 0.5}),
+    (
+        r"OffsetJump\(1, 0.1, -2.0\)",
+        ROBOT,
+        FILTER,
+        TRIANGLE,
+        fault(rk.OffsetJump(1, 0.1, -2.0), *(rk.DeadDrive(i, 0.2) for i in range(3)), rk.OffsetJump(0, 0.2, 2.0)),
+    ),
+]
+
+
+@pytest.mark.parametrize("gain", [14772.0, 31371295.0])
+@pytest.mark.parametrize("around", [lambda law: law, rk.AntagonismFilter], ids=["PD", "filter"])
+def test_a_state_beyond_all_measure_is_no_answer_of_the_law(gain, around):
+    """The law follows a machine that was lost in the hold before; the samples up to there are kept."""
+    offset = [0.0001, 0.0047, -0.0014, 0.0038] if gain < 1e5 else [-0.0029, -0.0028, -0.0038, -0.0038]
+    with pytest.raises(rk.SimulationError, match="unstable gain") as caught:
+        rk.simulate(FOUR, around(rk.PD(gain * np.eye(4), 0.2)), HOLD_FOUR, offset)
+    partial = caught.value.partial
+    assert len(partial) in (round(caught.value.time / 1e-3), round(caught.value.time / 1e-3) + 1)
+    assert np.abs(partial.qd_a).max() < 1e9 and np.all(np.isfinite(partial.c))
+
+
+def test_a_law_that_fails_beside_a_lost_machine_is_kept_as_the_cause():
+    def picky(t, q_a, qd_a, desired):
+        if np.abs(qd_a).max() > 1e9:
+            raise KeyError("no such rate")
+        return -14772.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
+
+    with pytest.raises(rk.SimulationError, match="the machine left the workspace") as caught:
+        rk.simulate(FOUR, picky, HOLD_FOUR, [0.0001, 0.0047, -0.0014, 0.0038])
+    assert isinstance(caught.value.__cause__, KeyError)
+
+
 @pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
 def test_growth_of_an_integral_against_routh(name):
     """m s^3 + K_D s^2 + K_P s + K_I has its roots in the left half plane for K_I < K_P K_D / m and no longer.

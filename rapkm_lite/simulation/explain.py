@@ -22,7 +22,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
 from .faults import Fault, TorqueLimit, blank_table
-from .growth import growth, inner_law
+from .growth import growth, inner_law, swinging
 from .loop import closed_loop
 from .setup import Setup
 
@@ -32,11 +32,12 @@ REASONS = {
     SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
     TOO_STIFF: "friction is too stiff for the sampling time",
 }
+_NONE = np.empty((0, 2))
 _FOREIGN = Path(__file__).parents[1], Path(linecache.__file__).parent
 
 
-def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None) -> str:
-    """What went wrong at sample k."""
+def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None, c: np.ndarray = _NONE) -> str:
+    """What went wrong at sample k, before which the torques c (k, N) acted."""
     if status not in REASONS:
         if isinstance(cause, BadAnswer):
             return str(cause)
@@ -48,7 +49,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         # In Python it did neither; what a compiled function raises does not leave it.
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
-    words = next(_causes(setup, law, k, written is None), "look at gains, offsets and the path")
+    words = next(_causes(setup, law, k, written is None, c), "look at gains, offsets and the path")
     return f"{REASONS[status]} ({words})"
 
 
@@ -92,25 +93,27 @@ def too_stiff(setup: Setup) -> str:
     )
 
 
-def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
+def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
     """What may have been the cause, the surest first."""
     t, wrong = float(setup.trajectory.t[k]), _difference(setup.model, setup.robot)
     begun = sorted((fault for fault in setup.broken if _begin(fault) <= t), key=_begin)
+    setup = _with(setup, begun)  # what comes later is not to blame, and acts in no repetition
     if not ours:
-        yield from _seen(setup, begun)
+        yield from _seen(setup, begun, c)
         return
     factor = growth(setup, law, k)
     if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
         yield f"the controller's model has {wrong}; with the machine's own it is not lost"
     yield from _broken(setup, law, k, begun)
     yield from _integral(setup, law, k, factor)
-    yield from _singular(setup, law, k)
+    yield from _singular(setup, law, slice(k, k + 1), 0.3)
     if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
         yield (
             f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
             f"sample of {setup.trajectory.dt:g} s"
         )
     yield from _sensors(setup, law, k)
+    yield from _singular(setup, law, slice(k), 0.1)
     if factor is not None and factor > 1.001:
         yield f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
     if factor is not None:
@@ -120,22 +123,30 @@ def _causes(setup: Setup, law, k: int, ours: bool) -> Iterator[str]:
         )
 
 
-def _seen(setup: Setup, begun: list[Fault]) -> Iterator[str]:
+def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
     """Without repeating the run: a model that is far off was so from the start, a fault since it began."""
     if _far_off(setup.model, setup.robot):
         yield f"the controller's model has {_difference(setup.model, setup.robot)}"
     yield from map(_words, begun)
+    if swinging(c) > 1.5:
+        yield (
+            "unstable gain: in the end the torques swung to and fro within 12 samples of "
+            f"{setup.trajectory.dt:g} s and grew {swinging(c):.3g}-fold"
+        )
     if np.abs(setup.sensors.offset).max() > 0.1:
         yield f"{_offsets(setup)}, is large"
     count = setup.sensors.count
     if count is not None and count > 0.1:
         yield f"encoder = {setup.sensors.encoder} counts per turn are {count:.2g} rad each"
+    delay = setup.sensors.velocity_filter
+    if delay is not None and delay > 10.0 * setup.trajectory.dt:
+        yield f"velocity_filter = {delay:g} s delays the rates by many samples"
 
 
 def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
     """Faults that have begun, the first one first, and a limit of the law's own."""
     for fault in begun:
-        if _runs(_with(setup, [f for f in setup.broken if f is not fault]), law, k):
+        if _runs(_with(setup, [f for f in begun if f is not fault]), law, k):
             yield f"{_words(fault)}; without that it is not lost"
     if len(begun) > 1 and _runs(_with(setup, []), law, k):
         yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
@@ -158,13 +169,13 @@ def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
         )
 
 
-def _singular(setup: Setup, law, k: int) -> Iterator[str]:
-    """Independent drives whose angles are nearly no coordinates at the desired pose."""
+def _singular(setup: Setup, law, rows: slice, least: float) -> Iterator[str]:
+    """Independent drives whose angles are nearly no coordinates at a desired pose among some samples."""
     pair, pairs = coordinates(law, None), drive_pairs(setup.model)
-    if pair is not None and (min(pair), max(pair)) in pairs:
-        crossed = distal_cross_products(setup.model, setup.trajectory.q[k])
-        measure = abs(crossed[pairs.index((min(pair), max(pair)))])
-        if measure < 0.3:
+    if pair is not None and (min(pair), max(pair)) in pairs and len(setup.trajectory.q[rows]):
+        crossed = np.abs(distal_cross_products(setup.model, setup.trajectory.q[rows]))
+        measure = crossed[:, pairs.index((min(pair), max(pair)))].min()
+        if measure < least:
             yield (
                 f"near a parameterization singularity of its independent drives "
                 f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose"

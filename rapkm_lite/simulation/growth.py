@@ -24,7 +24,6 @@ def growth(setup: Setup, law, k: int) -> float | None:
     start: Any = as_law(law).start(model, dt)
     integral: np.ndarray = start if isinstance(inner_law(law), PID) else np.zeros(0)
     centre = np.concatenate([trajectory.x[k], trajectory.xd[k], integral])
-    step, columns = 1e-6, []
 
     def following(state):
         controller, (x, xd, memory) = Controller(law, model, dt), np.split(state, (2, 4))
@@ -34,12 +33,30 @@ def growth(setup: Setup, law, k: int) -> float | None:
         held, kept = plant.hold(state[:4], c, dt), controller.memory if len(memory) else memory
         return np.concatenate([np.asarray(held, dtype=float), np.asarray(kept)])
 
-    try:
-        for direction in step * np.eye(len(centre)):
-            columns.append((following(centre + direction) - following(centre - direction)) / (2 * step))
-        return float(np.max(np.abs(np.linalg.eigvals(np.array(columns)))))
-    except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
-        return None
+    for step in (1e-6, 1e-9, 1e-12):  # huge gains throw the machine out of the workspace by the larger ones
+        try:
+            columns = [(following(centre + d) - following(centre - d)) / (2 * step) for d in step * np.eye(len(centre))]
+            return float(np.max(np.abs(np.linalg.eigvals(np.array(columns)))))
+        except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
+            pass
+    return None
+
+
+def swinging(c: np.ndarray) -> float:
+    """How much larger torques (k, N) became within the last dozen samples of a run, if they swung to and fro there.
+
+    The largest ones of the second half over those of the first; 0 where less than a quarter of the signs changed.
+
+    >>> swinging((-2.0) ** np.arange(12)[:, None]), swinging(2.0 ** np.arange(12)[:, None])
+    (64.0, 0.0)
+    """
+    last = c[-12:]
+    half = len(last) // 2
+    if half == 0:
+        return 0.0
+    drive = last[:, np.abs(last).max(axis=0).argmax()]
+    changes, first = np.count_nonzero(drive[1:] * drive[:-1] < 0.0), np.abs(drive[:half]).max()
+    return float(np.abs(drive[half:]).max() / first) if changes >= max(1, len(last) // 4) and first > 0.0 else 0.0
 
 
 def inner_law(law):

@@ -10,9 +10,12 @@ import copy
 import numpy as np
 
 from ..control.sample import Controller, NoPose
-from .compiled import DONE, LAW_FAILED, NO_POSE, Plant
+from .compiled import DONE, LAW_FAILED, LEFT_WORKSPACE, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup, blank
+
+LOST = 1e9
+"""Rates in rad/s that say that the machine was lost in the hold before; what a law makes of them is no fault of its."""
 
 
 def own_copy(law):
@@ -33,6 +36,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     """One run with a law or callable that nobody else uses; returns it and the exception that stopped it.
 
     What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
+    A law that fails because the state is beyond all measure is not to blame: the machine was lost in the hold before.
     """
     robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
@@ -63,6 +67,8 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     except BaseException as error:
         if k == 0:
             raise
+        if isinstance(error, Exception) and np.abs(qd).max() > LOST:
+            return Outcome(LEFT_WORKSPACE, k - 1, *history), error
         return Outcome(LAW_FAILED, k, *history), error
     return Outcome(DONE, last, *history), None
 
@@ -77,4 +83,6 @@ def again_in_python(setup: Setup, law, outcome: Outcome) -> tuple[Outcome, BaseE
         again, cause = closed_loop(setup.begin(outcome.sample + 1), law)
     if again.status == LAW_FAILED and again.sample == outcome.sample:
         return outcome._replace(status=LAW_FAILED), cause
+    if again.status == LEFT_WORKSPACE and cause is not None:
+        return again, cause
     return outcome, None if isinstance(cause, Exception) else cause

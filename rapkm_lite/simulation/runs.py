@@ -215,7 +215,7 @@ def complete(setup: Setup, law) -> Run:
             raise cause
         if outcome.status == DONE:
             return run
-        reason = explain(setup, law, outcome.status, outcome.sample, cause)
+        reason = explain(setup, law, outcome.status, outcome.sample, cause, run.c)
     except BaseException as error:  # also a Ctrl-C while the cause is looked for
         hand_over(error, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
         raise
