@@ -33,6 +33,8 @@ html_theme = "furo"
 html_title = "rapkm_lite"
 html_static_path = ["pages/static"]
 html_css_files = ["site.css"]
+# An excerpt would show formulas as they are typed, and from disk a browser may not read it.
+html_show_search_summary = False
 html_favicon = "pages/static/icon.svg"
 html_copy_source = False
 html_show_sourcelink = False

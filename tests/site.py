@@ -80,13 +80,18 @@ def links(root: Path) -> list[str]:
     return wrong
 
 
-def look(context, base: str, name: str, shots: Path | None) -> list[str]:
-    """What is wrong with a page as a visitor sees it."""
-    wrong: list[str] = []
-    page = context.new_page()
+def opened(context, base: str) -> tuple:
+    """A new page, and a list of what its browser complains of and of what it asks from elsewhere."""
+    page, wrong = context.new_page(), []
     page.on("request", lambda r: None if r.url.startswith((base, "data:", "blob:")) else wrong.append(r.url))
     page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda e: wrong.append(str(e)))
+    return page, wrong
+
+
+def look(context, base: str, name: str, shots: Path | None) -> list[str]:
+    """What is wrong with a page as a visitor sees it."""
+    page, wrong = opened(context, base)
     page.goto(f"{base}/{name}")
     page.wait_for_function(READY)
     wrong += page.evaluate(LOOK)
@@ -97,20 +102,22 @@ def look(context, base: str, name: str, shots: Path | None) -> list[str]:
 
 
 def search(context, base: str) -> list[str]:
-    """Type into the search box of a page; the first lesson that is found opens."""
-    page = context.new_page()
+    """Type into the search box of a page; what is found is looked at on a telephone, the first of it opens."""
+    page, wrong = opened(context, base)
     page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
     page.fill("input[name=q] >> nth=0", "antagonism")
     page.press("input[name=q] >> nth=0", "Enter")
     try:
         page.wait_for_selector("ul.search li a", timeout=60_000)
+        page.wait_for_load_state("networkidle")
+        page.set_viewport_size({"width": 360, "height": 740})
+        wrong += page.evaluate(LOOK)
         page.click("ul.search li a >> nth=0")
         page.wait_for_selector("article h1")
-        return []
     except Exception as error:
-        return [f"{base.split(':')[0]} search: {str(error).splitlines()[0]}"]
-    finally:
-        page.close()
+        wrong.append(str(error).splitlines()[0])
+    page.close()
+    return [f"{base.split(':')[0]} search: {what}" for what in wrong]
 
 
 def main() -> int:
