@@ -86,7 +86,8 @@ def _first(cells, pattern: str) -> int | None:
 def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
     """A notebook for the site.
 
-    anchors : of the equations that are explained here.  depth : the way from its page to the folder of the index.
+    anchors : of the equations that are explained here.  depth : the way from its page to the folder of the index; the
+    pages of solutions have one, and say in their titles what they are.
     """
     notebook = json.loads(path.read_text(encoding="utf-8"))
     cells = notebook["cells"]
@@ -99,6 +100,8 @@ def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
                 for a in found.get(k, [])
             )
             text = linked(text).replace("](solutions)", "](solutions/index.md)")
+            if depth:
+                text = re.sub(r"\A# ", "# Solution ", text)
             # A heading stays the first line of its cell.
             head, rest = re.match(r"(#[^\n]*\n?)?(.*)", text, re.DOTALL).groups()
             cell["source"] = f"{head or ''}\n{marks}\n{rest}" if marks else text
