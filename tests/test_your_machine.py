@@ -1,5 +1,6 @@
 """The 4RRR machine of lesson 12: its matrices against MuJoCo and SymPy, and what the lesson says about it."""
 
+import sys
 from functools import cache
 
 import numpy as np
@@ -31,6 +32,12 @@ def poses(k, box=(0.15, 0.15, 0.3), seed=5):
 
 def A_tilde(pose):
     return rk.projector(machine().J(four_rrr.angles(pose)))[..., :4, :]
+
+
+def test_without_sympy_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sympy", None)
+    with pytest.raises(ImportError, match="python -m pip install sympy"):
+        four_rrr.symbols()
 
 
 # The matrices.

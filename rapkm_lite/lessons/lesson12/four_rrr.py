@@ -16,7 +16,7 @@ from ...machine.arguments import matvec
 from ...mechanics.cores import wrap
 from ...mechanics.matrices import complement, complement_dot
 from ...mechanics.trajectory import quintic
-from .mechanism import Mechanism, derive
+from .mechanism import Mechanism, derive, symbolic
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 BASE, PLATFORM = 0.5 * CORNERS, 0.1 * CORNERS  # m
@@ -31,8 +31,7 @@ def symbols():
     A point is reached over links (length, joints, bend): a vector of that length at the sum of the joints' angles, plus
     the bend.  The square of its velocity then holds only differences of angles.
     """
-    import sympy as sp
-
+    sp = symbolic()
     q, qd = sp.symbols("theta1:5 phi1:5 psi"), sp.symbols("thetadot1:5 phidot1:5 psidot")
     angle = lambda link: sum(q[j] for j in link[1]) + link[2]  # noqa: E731
     spin = lambda link: sum(qd[j] for j in link[1])  # noqa: E731
@@ -74,8 +73,7 @@ def four_rrr() -> Mechanism:
 @functools.cache
 def with_pose() -> Mechanism:
     """The same loops in twelve coordinates, the nine angles and the pose, which h ties to them; without masses."""
-    import sympy as sp
-
+    sp = symbolic()
     q, qd, h, _, pose = symbols()
     x, xd = sp.symbols("x y alpha"), sp.symbols("xdot ydot alphadot")
     return derive([*q, *x], [*qd, *xd], [*h, *(a - b for a, b in zip(pose, x, strict=True))], 0, m=4)

@@ -26,6 +26,15 @@ class Mechanism:
     terms: Callable
 
 
+def symbolic():
+    """SymPy, which the package needs nowhere else."""
+    try:
+        import sympy
+    except ImportError as error:
+        raise ImportError("a mechanism is derived with SymPy, which is missing: python -m pip install sympy") from error
+    return sympy
+
+
 def derive(q, qd, h, T, m: int, U=0) -> Mechanism:
     """The mechanism with angles q and rates qd (SymPy symbols), constraints h, kinetic energy T and potential U.
 
@@ -36,8 +45,7 @@ def derive(q, qd, h, T, m: int, U=0) -> Mechanism:
     >>> lever.J(np.array([0.0, 0.0]))
     array([[ 1., -1.]])
     """
-    import sympy as sp
-
+    sp = symbolic()
     q, qd, n = list(q), list(qd), len(q)
     h = sp.Matrix(list(h))
     J = h.jacobian(q)
@@ -54,8 +62,7 @@ def derive(q, qd, h, T, m: int, U=0) -> Mechanism:
 
 def _numbers(q, qd, *matrices) -> Callable:
     """One function of q, or of (q, qd), that evaluates all the matrices; columns (k, 1) become vectors (..., k)."""
-    import sympy as sp
-
+    sp = symbolic()
     shapes = [m.shape if m.shape[1] > 1 else m.shape[:1] for m in matrices]
     flat = [e for m in matrices for e in m]
     busy = [k for k, e in enumerate(flat) if e != 0]
