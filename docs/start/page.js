@@ -41,7 +41,7 @@ const made = new Map();
 function lap(filter, dt) {
   const key = [...offsets(), filter, dt].join();
   if (!made.has(key)) {
-    if (made.size > 40) made.clear();
+    if (made.size > 100) made.clear();
     made.set(key, simulate(robot, path(dt), { K_P, K_D, offset: offsets(), filter }));
   }
   return made.get(key);
