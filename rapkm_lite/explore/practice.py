@@ -38,7 +38,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     """Distance from the path and torques that act, with links too long, weak drives and one fault.
 
     >>> imperfections().set(longer=0).numbers["largest torque"]
-    '59 mN m'
+    '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
     path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
@@ -56,7 +56,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         off, torque = draw_distance(picture, run, (1.0, 20.0))
         return {
             "farthest from the path": f"{off.max():.2f} mm{lost}",
-            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "largest torque": f"{np.abs(torque).max():.0f} of {limit:.0f} mN m",
             "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1) + " mN m",
             "electric energy": f"{run.energy.sum():.2f} J",
         }
