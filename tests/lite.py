@@ -43,15 +43,17 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
         pass
 
 
-def key(now: float, least: float, most: float) -> str:
-    """What moves a slider for certain: a leap to the side that has more room; one press is one picture."""
-    return "PageUp" if now - least <= most - now else "PageDown"
+def key(now: float, least: float, most: float, leaps: bool = True) -> str:
+    """What moves a slider for certain: a leap to the side that has more room; one press is one picture.  On a dashboard
+    a leap turns the screens, so there it is a step."""
+    return ("Page" if leaps else "Arrow") + ("Up" if now - least <= most - now else "Down")
 
 
 def idle_sliders(page, patience: float = 30.0, limit: float = 600.0) -> list[str]:
     """Move every slider of every explorer on a page; says which changed nothing within `patience` s, and what is left
     when `limit` s are over."""
     wrong, end = [], time.monotonic() + limit
+    leaps = page.locator(".rapkm-screen").count() == 0
     for slider in page.evaluate(SLIDERS):
         name = f"slider {slider['place'] + 1}, {slider['label'] or 'without a label'},"
         if not slider["shown"]:
@@ -61,7 +63,10 @@ def idle_sliders(page, patience: float = 30.0, limit: float = 600.0) -> list[str
             break
         before, handle = page.evaluate(LOOK, slider["place"]), page.locator(HANDLE).nth(slider["place"])
         handle.scroll_into_view_if_needed()
-        handle.press(key(slider["now"], slider["min"], slider["max"]))
+        # The first focus makes its cell the active one, and JupyterLab takes the focus there.
+        handle.focus()
+        page.wait_for_timeout(200)
+        handle.press(key(slider["now"], slider["min"], slider["max"], leaps))
         try:
             page.wait_for_function(
                 f"([place, before]) => ({LOOK})(place) !== before",
@@ -111,7 +116,8 @@ def drive(context, address: str, notebook: str, limit: float, cells: int = 0) ->
     wrong += page.evaluate(ERRORS)
     said = "; ".join(wrong) or "well"
     print(f"{notebook}: run all {took:.0f} s{slowest}, {len(sliders)} sliders, {folded} folded, {said}", flush=True)
-    page.close()
+    # With its page alone a kernel would stay.
+    context.close()
     return wrong
 
 

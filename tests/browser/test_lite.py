@@ -22,6 +22,7 @@ for start in (1.0, 4.0):
 @pytest.mark.parametrize(("now", "pressed"), [(0, "PageUp"), (5, "PageUp"), (6, "PageDown"), (10, "PageDown")])
 def test_a_slider_leaps_to_where_there_is_room(now, pressed):
     assert lite.key(now, 0, 10) == pressed
+    assert lite.key(now, 0, 10, leaps=False) == pressed.replace("Page", "Arrow")
 
 
 def test_every_slider_of_every_explorer_has_its_turn_and_an_idle_one_is_named(browser, laboratory):
