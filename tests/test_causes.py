@@ -143,6 +143,20 @@ SETS += [
     ("unstable gain: ", HEXAGON, rk.PD(1e6, 0.2), rk.hold(HEXAGON, [0.0, 0.0], 0.2), {"offset": 1e-3 * np.arange(6)}),
     ("unstable gain: near the desired state", ROBOT, rk.PD(1e12, 0.2), HOLD, {"offset": OFFSET}),
     ("unstable gain: in the end the torques swung", ROBOT, stiff, HOLD, {"offset": OFFSET}),
+    (
+        "unstable gain: in the end the torques swung",
+        ROBOT,
+        stiff,
+        HOLD,
+        fault(rk.TorqueLimit(1e6), rk.OffsetJump(0, 0.0, 1e-3)) | {"offset": OFFSET},
+    ),
+    (
+        "offset = .* is large",
+        ROBOT,
+        rk.AntagonismFilter(mine),
+        HOLD,
+        fault(rk.TorqueLimit(1e6), rk.OffsetJump(0, 0.0, 1e-3)) | {"offset": [1.5, -1.5, 1.5]},
+    ),
     ("unstable gain: in the end the torques swung", ROBOT, rk.AntagonismFilter(stiffer), HOLD, {"offset": OFFSET}),
     (r"ValueError: the table is empty \(line \d+ of test_causes.py: raise", ROBOT, empty, CIRCLE, {}),
     (

@@ -124,15 +124,15 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
 
 
 def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
-    """Without repeating the run: a model that is far off was so from the start, a fault since it began."""
+    """Without repeating the run: a model that is far off was so from the start, a fault that is felt since it began."""
     if _far_off(setup.model, setup.robot):
         yield f"the controller's model has {_difference(setup.model, setup.robot)}"
-    yield from map(_words, begun)
     if swinging(c) > 1.5:
         yield (
             "unstable gain: in the end the torques swung to and fro within 12 samples of "
             f"{setup.trajectory.dt:g} s and grew {swinging(c):.3g}-fold"
         )
+    yield from (_words(fault) for fault in begun if fault.felt(c))
     if np.abs(setup.sensors.offset).max() > 0.1:
         yield f"{_offsets(setup)}, is large"
     count = setup.sensors.count

@@ -43,6 +43,10 @@ class Fault(Value):
         """Write this fault into the table of a run with the times t (k,)."""
         raise NotImplementedError
 
+    def felt(self, c: np.ndarray) -> bool:
+        """Can it have cost a run in which the torques c (k, N) acted?"""
+        return True
+
     def _check(self) -> None:
         """Drive and times of a fault, each a plain number."""
         given = self._fields()
@@ -74,6 +78,9 @@ class TorqueLimit(Fault):
         if self.limit.shape not in ((), table.limit.shape):
             raise ValueError(f"limit has shape {self.limit.shape}; allowed: one number or {table.limit.shape}")
         np.minimum(table.limit, self.limit, out=table.limit)
+
+    def felt(self, c):
+        return bool(np.any(np.abs(c) >= self.limit))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,6 +147,9 @@ class OffsetJump(Fault):
 
     def mark(self, table, t):
         table.jump[_from(t, self.time), self.drive] += self.jump
+
+    def felt(self, c):
+        return abs(self.jump) > 0.02  # less is an offset as machines have them
 
 
 def kinds() -> dict[str, type[Fault]]:
