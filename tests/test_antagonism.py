@@ -9,6 +9,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import K_P, hidden
+from rapkm_lite.mechanics.antagonism import null_direction
 
 ROOT = Path(__file__).parents[1]
 QUANTUM = 2 * np.pi / 2000
@@ -152,3 +153,18 @@ def test_jitter_costs_the_mean_square_of_the_delay():
     # Rates by central differences of late positions err by qd times (t1 - t2)/(2 ms), mean square 4/4: K_D qd against
     # the steady delay's K_P qd 2 ms.
     np.testing.assert_allclose((jumping - none) / (steady - none), 6 / 4 + (0.225 / (7.05 * 2e-3)) ** 2, rtol=0.1)
+
+
+def test_numerators_of_the_null_vector_are_those_of_unit_distal_links():
+    """(a_i x d_i)(d_j x d_k), |d| = 1, in m, for distal links of different lengths; and A^T n = 0."""
+    robot = rk.load().replace(lengths=[[0.2, 0.22], [0.2, 0.18], [0.2, 0.25]])
+    q = rk.inverse_kinematics(robot, [0.02, 0.03])
+    pose, n = rk.at(robot, q), null_direction(robot, q)
+    d = pose.d / np.linalg.norm(pose.d, axis=1)[:, None]
+
+    def crossed(u, v):
+        return u[0] * v[1] - u[1] * v[0]
+
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        assert abs(n[i] - crossed(pose.a[i], d[i]) * crossed(d[j], d[k])) < 1e-15
+    assert np.abs(pose.A.T @ n).max() < 1e-12

@@ -237,3 +237,22 @@ def test_a_study_names_the_cause_too():
 def test_a_model_that_cannot_follow_is_refused_before_the_run():
     with pytest.raises(ValueError, match=r"model cannot follow the trajectory: .*outside the workspace"):
         rk.simulate(ROBOT, PD, TRIANGLE, model=ROBOT.replace(lengths=0.12))
+
+
+def lost(**options):
+    with pytest.raises(rk.SimulationError) as error:
+        rk.simulate(ROBOT, options.pop("law", FILTER), options.pop("path", TRIANGLE), **options)
+    return error.value.reason
+
+
+def test_a_model_is_blamed_for_what_differs_and_nothing_else():
+    said = lost(model=LONGER)
+    assert "lengths" in said
+    for other in ("base", "masses", "rotor_inertia", "gravity", "friction", "load"):
+        assert f"{other} that are off" not in said and "another working" not in said, other
+    assert "lengths" not in lost(path=CIRCLE, **mode(-1, -1, -1))
+
+
+def test_a_right_model_and_right_encoders_are_not_blamed():
+    said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET)
+    assert "controller's model" not in said and "offset =" not in said

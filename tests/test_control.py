@@ -7,6 +7,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, norm, random_motion, random
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
+from rapkm_lite.control.computed_torque import joint_gain
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
@@ -486,3 +487,10 @@ def test_table_1_measured_and_simulated():
     table = rk.table1()
     assert_allclose(table.measured, [[1.3347, 1.5414, 1.6844], [0.4574, 0.7010, 1.0801]])
     assert np.abs(table.deviation).max() < 0.04  # the chapter's six energies, by one reading of many
+
+
+@pytest.mark.parametrize("gains", [[400.0, 0.0, 400.0], [400.0, -1.0, 400.0]])
+def test_gains_of_driven_joints_are_positive_each(gains):
+    with pytest.raises(ValueError, match=r"K_P\[1\] = (0|-1); allowed: > 0"):
+        joint_gain("K_P", gains, 3)
+    assert np.array_equal(joint_gain("K_P", [1.0, 2.0, 3.0], 3), np.diag([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]))

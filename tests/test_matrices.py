@@ -130,3 +130,25 @@ def test_minors_are_for_stacks_of_two_columns_alone():
     assert many_inverses(A) is None and many_inverses(A[0, :, :2]) is None
     A = A[..., :2]
     assert_allclose(many_inverses(A), np.linalg.pinv(A.mT), rtol=0, atol=1e-12)
+
+
+def test_thin_matrices_are_left_to_factorizations_whatever_their_size():
+    """Rows that are nearly parallel to a part in 1e7 lose their rank in the minors; metres or millimetres."""
+    thin = np.array([[1.0, 0.0], [1.0, 1e-7], [1.0, 0.0]])
+    for size in (1e-4, 1.0, 1e4):
+        assert many_inverses(size * thin[None]) is None
+        assert many_inverses(size * np.eye(3, 2)[None]) is not None
+
+
+def test_one_force_serves_many_motions():
+    """A Q, C or G of one pose beside many rates is broadcast; a number that fits neither is refused."""
+    robot = FRICTIONLESS
+    q = rk.inverse_kinematics(robot, [0.02, 0.03])
+    qd = np.array([rk.at(robot, q).F @ v for v in np.random.default_rng(3).normal(size=(4, 2))])
+    many = rk.at(robot, np.tile(q, (4, 1)), qd)
+    alone = many.Q[0]
+    G2, C2, Q2 = rk.minimal_terms(many.F, many.F_dot, many.G[0], many.C, alone)
+    assert G2.shape == C2.shape == (4, 2, 2) and Q2.shape == (4, 2)
+    assert_allclose(Q2, np.tile(many.F[0].T @ alone, (4, 1)), rtol=0, atol=1e-14)
+    with pytest.raises(ValueError, match=r"G|C|Q"):
+        rk.minimal_terms(many.F, many.F_dot, many.G, many.C, np.zeros((3, robot.n_joints)))

@@ -1,5 +1,7 @@
 """Runs end well or say when and why; sensors against a few lines of NumPy; energies against what must be conserved."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import rapkm_lite as rk
 from rapkm_lite.simulation.energy import root_mean_square_torque
 
 ROBOT = rk.load().replace(friction=0.0)
+LONGER = ROBOT.replace(lengths=0.28)
 PD = rk.PD(7.05, 0.225)
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 
@@ -156,3 +159,20 @@ def test_gains_too_weak_for_the_load_are_named():
         rk.SimulationError, match=r"the gains do not hold it: .* grows by the factor 1\.0\d+ per sample"
     ):
         rk.simulate(hanging, rk.PD(0.1, 0.01), rk.hold(hanging, [0.0, 0.0], 0.5))
+
+
+def test_columns_of_a_study_are_those_of_its_runs():
+    path, offsets = rk.triangle(ROBOT, side=0.05, duration=0.2), 1e-3 * np.array([[4.0, -2.0, 5.0], [0.0, 3.0, 1.0]])
+    study = rk.sweep(ROBOT, rk.PD(7.05, 0.225), path, offsets)
+    for i, offset in enumerate(offsets):
+        run = rk.simulate(ROBOT, rk.PD(7.05, 0.225), path, offset)
+        np.testing.assert_allclose(study.rms_path_error[i], np.sqrt(np.mean(run.path_error**2)), rtol=1e-9)
+        np.testing.assert_allclose(study.largest_path_error[i], run.path_error.max(), rtol=1e-9)
+        np.testing.assert_allclose(study.torque_norm[i], root_mean_square_torque(run), rtol=1e-10)
+        np.testing.assert_allclose(study.energies[i], run.energy, rtol=0, atol=1e-12)
+    assert study.model is ROBOT and dataclasses.replace(study, model=LONGER).model == LONGER
+
+
+def test_a_hold_lasts_a_second_and_a_compiled_law_has_no_memory_unless_asked():
+    assert rk.hold(ROBOT, [0.0, 0.0]).t[-1] == 1.0
+    assert rk.compiled(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory == 0
