@@ -91,7 +91,7 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     >>> plane_limits(rk.load())["aspect"]
     'equal'
     """
-    margin = bounded("margin", exact_array("margin", margin), 0.0, strict=False)
+    margin = float(bounded("margin", exact_array("margin", margin), 0.0, strict=False))
     room = robot.lengths[:, 0].max() + margin * robot.lengths.max()
     low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
     return {
