@@ -144,24 +144,27 @@ class SwitchedCTC(LawValue):
 
     def choose(self, model: Manipulator, q, current: tuple[int, int] | None = None) -> tuple[int, int]:
         """The pair to use at one pose q (2N,), given the current one."""
-        measure = np.abs(distal_cross_products(model, exact_array("q", q, manipulator(model, "model").n_joints)))
-        pairs, best = drive_pairs(model), int(np.argmax(measure))
-        if current is not None:
-            j, k = sorted(joint_indices("current", current, model.n_arms, 2, "drive"))
-            current = j, k
-            if measure[best] <= self.hysteresis * measure[pairs.index(current)]:
-                return current
-        return pairs[best]
+        q = exact_array("q", q, manipulator(model, "model").n_joints)
+        now = () if current is None else joint_indices("current", current, model.n_arms, 2, "drive")
+        return self._choices(model, q[None], now)[0]
 
     def pairs(self, model: Manipulator, q) -> np.ndarray:
         """The pairs (k, 2) used along the poses q (k, 2N); `Run.switches` counts the changes."""
-        q, current, chosen = real_array("q", q, manipulator(model, "model").n_joints), None, []
+        q = real_array("q", q, manipulator(model, "model").n_joints)
         if q.ndim != 2:
             raise ValueError(f"q has shape {q.shape}; allowed: (k, {model.n_joints}), poses in the order of time")
-        for pose in q:
-            current = self.choose(model, pose, current)
-            chosen.append(current)
-        return np.array(chosen, dtype=int).reshape(-1, 2)
+        return np.array(self._choices(model, q), dtype=int).reshape(-1, 2)
+
+    def _choices(self, model: Manipulator, q, current=()) -> list[tuple[int, int]]:
+        """The pairs along the poses q (k, 2N), beginning with the current one."""
+        pairs, chosen = drive_pairs(model), []
+        now = pairs.index((min(current), max(current))) if current else None
+        for measure in np.abs(distal_cross_products(model, q)).tolist():
+            most = max(measure)
+            if now is None or most > self.hysteresis * measure[now]:
+                now = measure.index(most)
+            chosen.append(pairs[now])
+        return chosen
 
     def fixed(self, pair) -> CTC:
         """The CTC law in force while `pair` is used."""
@@ -178,10 +181,7 @@ class SwitchedCTC(LawValue):
         c = np.empty_like(q_a)
         for pair in {tuple(p) for p in chosen.tolist()}:
             k = np.all(chosen == pair, axis=-1)
-            part = Desired(
-                desired.n_arms,
-                *(v[k] for v in (desired.x, desired.xd, desired.xdd, desired.q, desired.qd, desired.qdd)),
-            )
+            part = Desired(desired.n_arms, *(getattr(desired, v)[k] for v in ("x", "xd", "xdd", "q", "qd", "qdd")))
             c[k] = self.fixed(pair).torque(model, q[k], qd[k], q_a[k], qd_a[k], part)
         return c
 

@@ -90,22 +90,22 @@ class Trajectory(Desired):
 
     def __getitem__(self, k) -> Desired:
         if isinstance(k, int | np.integer):
-            return self._samples[k]
+            return self._samples.get(int(k)) or self._sample(k)
         return Desired(self.n_arms, *(getattr(self, name)[k] for name in _MOTION))
 
     def __iter__(self):
-        return iter(self._samples)
+        return map(self.__getitem__, range(len(self)))
 
     @cached_property
-    def _samples(self) -> list[Desired]:
-        """All samples, made once: a sampled loop asks for each of them, as often as it runs."""
-        names = (*_MOTION, "q_a", "qd_a", "qdd_a")
-        made = []
-        for row in zip(*(getattr(self, name) for name in names), strict=True):
-            sample = object.__new__(Desired)
-            sample.__dict__.update(zip(names, row, strict=True), n_arms=self.n_arms)
-            made.append(sample)
-        return made
+    def _samples(self) -> dict[int, Desired]:
+        """Samples that were asked for: a sampled loop asks for each of them, as often as it runs."""
+        return {}
+
+    def _sample(self, k) -> Desired:
+        k, sample = range(len(self))[k], object.__new__(Desired)
+        row = {name: getattr(self, name)[k] for name in (*_MOTION, "q_a", "qd_a", "qdd_a")}
+        sample.__dict__.update(row, n_arms=self.n_arms)
+        return self._samples.setdefault(k, sample)
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles)."""
