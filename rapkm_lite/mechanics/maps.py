@@ -45,8 +45,8 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     if not (left < right and low < high):
         raise ValueError(f"box = {(left, right, low, high)}; allowed: (x_min, x_max, y_min, y_max) with min < max")
     x, y = np.linspace(left, right, n), np.linspace(low, high, n)
-    points = np.stack(np.meshgrid(x, y), axis=-1)
-    reach = np.linalg.norm(points[..., None, :] - robot.base, axis=-1)
+    dx, dy = x[:, None] - robot.base[:, 0], y[:, None] - robot.base[:, 1]
+    reach = np.hypot(dx, dy[:, None])
     l1, l2 = robot.lengths.T
     # A hair inside the boundary, where an arm is stretched or folded and the end-effector is no coordinate.
     slack = 1e-9 * (l1 + l2)
