@@ -49,11 +49,19 @@ class Page:
         self.page.wait_for_function(script, arg=[name, value])
 
 
+# How far the middle of a ring is from the place it was given, in px.
+ASTRAY = """[...document.querySelectorAll('.rapkm-knob:not([hidden])')].map(e => {
+    const ring = e.getBoundingClientRect(), plot = e.parentElement.getBoundingClientRect();
+    const [x, y] = e.style.translate.split(' ').map(parseFloat);
+    return Math.hypot(ring.left + ring.width / 2 - plot.left - x, ring.top + ring.height / 2 - plot.top - y); })"""
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1024, 3840])
 def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme):
     seen = Page(browser, address, width, color_scheme=scheme)
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert max(seen.page.evaluate(ASTRAY)) < 0.5
     unnamed = "[...document.querySelectorAll('input, select, button, .rapkm-knob, canvas')].filter(e => !"
     unnamed += (
         "(e.getAttribute('aria-label') || e.closest('label')?.textContent.trim() || e.textContent.trim())).length"
