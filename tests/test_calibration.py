@@ -8,6 +8,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
 from rapkm_lite.mechanics.encoders import closure, poses
+from rapkm_lite.mechanics.rests import Rests, fitted_gain
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
 NAMES = ("testbed", "four_arms")
@@ -349,6 +350,29 @@ def test_nothing_left_over_shows_no_noise():
     with pytest.raises(ValueError, match="no reading was left over"):
         found.interval()
     assert np.all(np.diff(rk.calibrate(robot, q, noise=1e-4).interval(), axis=0) > 0)
+
+
+def test_a_gain_of_rests_has_the_error_of_a_weighted_mean():
+    """One rest: K_P = -c/e with the error sigma/|e|; several: the mean with the weights (e/sigma)^2, whose sum is
+    the inverse square of its error."""
+    e = np.array([[4e-3, -2e-3], [2e-3, 5e-3], [-1e-3, 3e-3]])
+    sigma = np.array([[1e-5, 3e-5], [2e-5, 1e-5], [4e-5, 2e-5]])
+    c, still = np.array([[-0.03, 0.015], [-0.013, -0.04], [0.006, -0.02]]), np.zeros((3, 2))
+    for k in (1, 3):
+        gain = fitted_gain(Rests(still[:k], e[:k], c[:k], sigma[:k], np.full(k, 10)))
+        weight = (e[:k] / sigma[:k]) ** 2
+        assert gain is not None
+        assert_allclose(gain.K_P, np.average(-c[:k] / e[:k], axis=0, weights=weight), rtol=1e-12)
+        assert_allclose(gain.error, weight.sum(axis=0) ** -0.5, rtol=1e-12)
+
+
+def test_a_small_singular_value_counts_down_to_ten_times_the_noise():
+    """Rows taken at wrong angles are wrong by about the noise: below ten times of that a combination is not known."""
+    angles = readings(TESTBED, 24)
+    smallest = 1.0 / rk.calibrate(TESTBED, angles).condition
+    assert rk.calibrate(TESTBED, angles, noise=smallest / 15).rank == 3
+    with pytest.raises(rk.CalibrationError, match="of 3 unknowns"):
+        rk.calibrate(TESTBED, angles, noise=smallest / 7)
 
 
 def test_torques_under_a_filter_show_no_gain():

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, machines, random_motion
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.cores import prestress_shares
 from rapkm_lite.mechanics.linalg import many_inverses, pivots
 
 
@@ -138,6 +139,16 @@ def test_thin_matrices_are_left_to_factorizations_whatever_their_size():
     for size in (1e-4, 1.0, 1e4):
         assert many_inverses(size * thin[None]) is None
         assert many_inverses(size * np.eye(3, 2)[None]) is not None
+
+
+def test_shares_of_a_prestress_are_the_rows_of_the_null_basis_in_any_unit():
+    """Metres or micrometres per radian: the null space does not change; all distal links parallel: no direction."""
+    A = np.random.default_rng(5).normal(size=(6, 4, 2))
+    rows = np.linalg.norm(rk.null_basis(A), axis=-1)
+    parallel = np.outer([1.0, 2.0, -1.0, 0.5], [0.6, 0.8])
+    for size in (1e-6, 1.0, 1e6):
+        assert_allclose(prestress_shares(size * A), rows, rtol=0, atol=1e-12)
+        assert np.all(np.isinf(prestress_shares(size * parallel)))
 
 
 def test_one_force_serves_many_motions():

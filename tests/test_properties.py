@@ -124,6 +124,7 @@ def test_feedback_norm_is_what_the_definition_says(drawn):
     directions = np.linalg.svd(redundant)[2]
     assert size > 0.0
     assert_allclose(size, np.linalg.norm(redundant @ directions[0]), rtol=1e-7)
+    assert_allclose(rk.feedback_norm(robot, np.stack([q, q])), [size, size], rtol=1e-12)  # many poses are many answers
     pair = (0, 1)
     hypothesis.assume(abs(np.linalg.det(at.A[list(pair)])) > 1e-3)
     chosen = at.using(pair)

@@ -80,6 +80,9 @@ def test_circle_holds_its_radius_and_turns():
     assert_allclose(np.linalg.norm(path.x - [0.01, 0], axis=-1), 0.1, atol=1e-15)
     angle = np.unwrap(np.arctan2(path.x[:, 1], path.x[:, 0] - 0.01))
     assert_allclose(angle[-1] - angle[0], 4 * np.pi, rtol=1e-12)
+    # In five seconds; a quintic is at most 15/8 times as fast as on average.
+    assert path.t[-1] == 5.0
+    assert_allclose(np.linalg.norm(path.xd, axis=-1).max(), 15 / 8 * 4 * np.pi * 0.1 / 5.0, rtol=1e-12)
 
 
 def test_rest_is_spent_at_the_first_corner():
