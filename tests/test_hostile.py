@@ -63,6 +63,17 @@ def test_too_many_survivors_fail_the_run_of_mutants():
     assert mutants.enough(180, 200) and not mutants.enough(179, 200) and not mutants.enough(0, 0)
 
 
+def test_the_changes_that_change_nothing_are_of_lines_that_stand():
+    """A line that was written anew needs a new look."""
+    pytest.importorskip("resource", reason="Windows has no such module")
+    import mutants
+
+    for name in mutants.equivalents():
+        module, source = name.rsplit(" | ", 1)[0].split(" | ", 1)
+        lines = (mutants.ROOT / "rapkm_lite" / module).read_text(encoding="utf-8").splitlines()
+        assert source in map(str.strip, lines), name
+
+
 @pytest.mark.parametrize("module", [rk, plotting, explore], ids=MODULES)
 def test_the_good_arguments_are_good(module):
     """The hostile calls differ in one argument from calls that work; a function without such a call is not covered."""
