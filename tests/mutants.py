@@ -15,6 +15,7 @@ import argparse
 import ast
 import copy
 import functools
+import importlib
 import json
 import os
 import random
@@ -144,7 +145,7 @@ class Tracer:
         self.seconds: dict[str, float] = {}
         self.failed: list[str] = []
 
-    # What a file of tests makes while it is imported belongs to all of them.
+    # What a file of tests makes while it is imported belongs to all of them; the package itself to no file.
     def pytest_collectstart(self, collector):
         self.coverage.switch_context(collector.nodeid if collector.nodeid.endswith(".py") else "")
 
@@ -211,6 +212,7 @@ def tests_by_line(folder: Path, names) -> dict:
         import pytest
 
         tracer = Tracer(folder)
+        importlib.import_module("rapkm_lite")
         pytest.main(["-n0", "-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
         found = {"seen": tracer.seen(folder), "seconds": tracer.seconds, "failed": tracer.failed}
         place.write_text(json.dumps(found))

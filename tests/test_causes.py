@@ -219,6 +219,24 @@ def test_growth_of_an_integral_against_routh(name):
         assert max(factors[:2]) < 1.0 + 1e-9 and 1.0 + 1e-6 < factors[2] < factors[3]
 
 
+@pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
+def test_growth_under_pd_is_that_of_a_double_integrator(name):
+    """At rest, without friction and gravity, the plant is linear to first order, xdd = Gbar^-1 A^T c, and so a hold is
+    dx + dt v + dt^2/2 xdd, v + dt xdd, with c = -(K_P A dx + K_D A v).
+
+    Differences over 1e-6 m err by rounding / 1e-6, some 1e-12, and by 1e-12 times a third derivative of order one.
+    """
+    robot = rk.load(name).replace(friction=0.0)
+    path = rk.hold(robot, [0.05, 0.05], 0.01)
+    at, dt, one = rk.at(robot, path.q[0], 0 * path.q[0]), path.dt, np.eye(2)
+    push = np.linalg.solve(at.minimal[0], at.A.T)
+    for K_P, K_D in ((7.0, 0.2), (7.0, 5.0), (7.0, 30.0)):
+        felt = -np.hstack([K_P * push @ at.A, K_D * push @ at.A])
+        step = np.block([[one, dt * one], [0 * one, one]]) + np.vstack([dt**2 / 2 * felt, dt * felt])
+        found = growth(prepare(robot, path, rk.Sensors()), rk.PD(K_P, K_D), 0)
+        assert found == pytest.approx(np.abs(np.linalg.eigvals(step)).max(), rel=1e-11, abs=0.0)
+
+
 @pytest.mark.parametrize(("cause", "robot", "law", "path", "options"), SETS, ids=range(len(SETS)))
 def test_the_cause_is_named(cause, robot, law, path, options):
     with pytest.raises((rk.SimulationError, ValueError), match=cause) as caught:

@@ -494,3 +494,27 @@ def test_gains_of_driven_joints_are_positive_each(gains):
     with pytest.raises(ValueError, match=r"K_P\[1\] = (0|-1); allowed: > 0"):
         joint_gain("K_P", gains, 3)
     assert np.array_equal(joint_gain("K_P", [1.0, 2.0, 3.0], 3), np.diag([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]))
+
+
+class Slowly(rk.AntagonismFilter):
+    """The same filter, which the engine does not know."""
+
+
+@pytest.mark.parametrize(
+    ("law", "options"),
+    [
+        (rk.RedundantAPD(7.0, 0.2), {"pose": "true"}),
+        (rk.APD(7.0, 0.2, pose="true"), {}),
+        (rk.APD(7.0, 0.2, W=[1.0, 2.0, 4.0]), {}),
+        (rk.APD(7.0, 0.2, W=[1.0, 2.0, 4.0]), {"W": [4.0, 1.0, 1.0]}),
+    ],
+    ids=["own pose", "true pose inside", "own weights", "both weights"],
+)
+def test_a_filter_has_its_own_pose_and_weights_and_so_has_the_law_inside(law, options):
+    """c = R c' with R at the pose and in the weights of the filter, c' in those of the law: as the classes say it."""
+    path = rk.circle(FRICTIONLESS, 0.05, 0.05)
+    fast, slow = (
+        rk.simulate(FRICTIONLESS, kind(law, **options), path, [4e-3, -2e-3, 5e-3])
+        for kind in (rk.AntagonismFilter, Slowly)
+    )
+    assert_allclose(fast.c, slow.c, rtol=0, atol=1e-9 * np.abs(slow.c).max())

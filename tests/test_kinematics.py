@@ -7,7 +7,7 @@ from samples import MODES, TESTBED, along, machines, modes, norm, random_motion,
 from scipy.optimize import least_squares, minimize
 
 import rapkm_lite as rk
-from rapkm_lite.mechanics.kinematics import wrap
+from rapkm_lite.mechanics.kinematics import tip_jacobians, wrap
 
 
 # Identities on V.
@@ -51,6 +51,16 @@ def test_angles_are_wrapped_to_the_half_open_turn():
 
 
 # Derivatives against finite differences.
+@machines
+def test_jacobians_of_the_tips_are_the_derivatives_of_the_tips(robot):
+    """Of each tip by its own two joints, the base angle first; one pose as many."""
+    q, N = np.random.default_rng(2).uniform(-3, 3, (20, robot.n_joints)), robot.n_arms
+    by_joint = [along(lambda p: rk.tips(robot, p), q, e, 1e-2) for e in np.eye(2 * N)]
+    wanted = np.stack([np.stack([by_joint[j][:, i] for j in (i, N + i)], axis=-1) for i in range(N)], axis=1)
+    assert_allclose(tip_jacobians(robot, q), wanted, atol=1e-12)
+    assert_allclose(tip_jacobians(robot, q[0]), wanted[0], atol=1e-12)
+
+
 @machines
 def test_jacobian_is_the_derivative_of_the_constraints(robot):
     q = np.random.default_rng(1).uniform(-3, 3, (200, robot.n_joints))

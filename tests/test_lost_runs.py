@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal
 import rapkm_lite as rk
 from rapkm_lite.engine import loop
 from rapkm_lite.simulation import compiled, runs
+from rapkm_lite.simulation.setup import Outcome, prepare
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.03, duration=0.3)
@@ -391,3 +392,51 @@ def test_gains_are_positive(law):
         law(0.0, 1.0)
     with pytest.raises(ValueError, match="K_D"):
         law(1.0, 0.0)
+
+
+@pytest.mark.parametrize("rate", [0.6e9, 1.6e9])
+def test_a_law_is_to_blame_up_to_a_milliard_radians_per_second(rate):
+    """The first torques give the drives that rate within a hold: c = (A^T)^+ Gbar xd / dt, from rest, without friction.
+
+    In 1e-12 s they go a thousandth of a radian, so the pose stays.
+    """
+    path = rk.hold(ROBOT, [0.02, 0.05], 3e-12, 1e-12)
+    pose = rk.at(ROBOT, path.q[0], 0 * path.q[0])
+    xd = rate / np.abs(pose.F[:3, 0]).max() * np.array([1.0, 0.0])
+    kick = np.linalg.pinv(pose.A.T) @ pose.minimal[0] @ xd / path.dt
+    rates = []
+
+    def law(t, q_a, qd_a, desired):
+        rates.append(np.abs(qd_a).max())
+        if t > 0.0:
+            raise KeyError("the gain table")
+        return kick
+
+    words = "KeyError: 'the gain table'" if rate < 1e9 else "the machine left the workspace"
+    with pytest.raises(rk.SimulationError, match=words):
+        rk.simulate(ROBOT, law, path)
+    np.testing.assert_allclose(rates[1], rate, rtol=0.02)
+
+
+def test_a_law_that_failed_in_a_later_chunk_is_not_run_again():
+    """The error of the run itself is kept, by the row of the study: the law raises once, here in run 3."""
+    raised = []
+
+    def boom_once():
+        raised.append(KeyError("gain table"))
+        raise raised[-1]
+
+    with pytest.raises(rk.SimulationError, match="run 3: ") as caught:
+        rk.sweep(ROBOT, [pd, pd, pd, FailsAt(0.01, boom_once)], PATH, OFFSET, executor=Pool(9, KeyError()), chunk=2)
+    assert len(raised) == 1 and caught.value.__cause__ is raised[0]
+
+
+@pytest.mark.parametrize("column", ["x", "qd_a", "c"])
+def test_what_is_kept_of_a_lost_run_ends_before_a_number_that_is_none(column):
+    setup, N = prepare(ROBOT, PATH, rk.Sensors()), ROBOT.n_arms
+    rows = {name: np.ones((len(PATH), size)) for name, size in {"x": 2, "xd": 2, "q_a": N, "qd_a": N, "c": N}.items()}
+    rows[column][7, 1] = np.inf
+    outcome = Outcome(compiled.LEFT_WORKSPACE, 20, **rows, pairs=np.full((len(PATH), 2), -1))
+    assert len(runs._run(setup, PD, outcome)) == 7
+    rows[column][7, 1] = 0.0
+    assert len(runs._run(setup, PD, outcome)) == 21
