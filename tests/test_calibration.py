@@ -1,5 +1,7 @@
 """Self-calibration: made-up truths found again, logs with hidden offsets, ranks by counting, refusals, bad logs."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -116,6 +118,9 @@ def test_one_place_is_refused_with_what_it_does_say():
         rk.calibrate(TESTBED, rk.mystery_run("offset_c"))
     error = caught.value
     assert error.rank == 1 and error.needed == 3
+    # The sentence tells the same numbers, but for what prints as nothing.
+    said = re.findall(r"([+-]\d\.\d{3}) offset (\d)", str(error))
+    assert said == [(f"{c:+.3f}", str(i + 1)) for i, c in enumerate(error.known[0]) if round(abs(c), 3) > 0.0]
     # One number is known, to second order in offsets of some milliradians.
     assert_allclose(error.known @ hidden("offset_c")[0], error.value, rtol=0, atol=2e-4)
 

@@ -220,7 +220,7 @@ def test_growth_of_an_integral_against_routh(name):
 
 
 @pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
-def test_growth_under_pd_is_that_of_a_double_integrator(name):
+def test_growth_is_that_of_a_double_integrator_under_feedback(name):
     """At rest, without friction and gravity, the plant is linear to first order, xdd = Gbar^-1 A^T c, and so a hold is
     dx + dt v + dt^2/2 xdd, v + dt xdd, with c = -(K_P A dx + K_D A v).
 
@@ -229,12 +229,31 @@ def test_growth_under_pd_is_that_of_a_double_integrator(name):
     robot = rk.load(name).replace(friction=0.0)
     path = rk.hold(robot, [0.05, 0.05], 0.01)
     at, dt, one = rk.at(robot, path.q[0], 0 * path.q[0]), path.dt, np.eye(2)
-    push = np.linalg.solve(at.minimal[0], at.A.T)
+    push, setup = np.linalg.solve(at.minimal[0], at.A.T), prepare(robot, path, rk.Sensors())
+
+    def per_sample(felt):
+        step = np.block([[one, dt * one], [0 * one, one]]) + np.vstack([dt**2 / 2 * felt, dt * felt])
+        return np.abs(np.linalg.eigvals(step)).max()
+
     for K_P, K_D in ((7.0, 0.2), (7.0, 5.0), (7.0, 30.0)):
         felt = -np.hstack([K_P * push @ at.A, K_D * push @ at.A])
-        step = np.block([[one, dt * one], [0 * one, one]]) + np.vstack([dt**2 / 2 * felt, dt * felt])
-        found = growth(prepare(robot, path, rk.Sensors()), rk.PD(K_P, K_D), 0)
-        assert found == pytest.approx(np.abs(np.linalg.eigvals(step)).max(), rel=1e-11, abs=0.0)
+        assert growth(setup, rk.PD(K_P, K_D), 0) == pytest.approx(per_sample(felt), rel=1e-11, abs=0.0)
+    for pose in ("true", "measured"):
+        # Computed torque: xdd = -(K_P dx + K_D v) itself; far from critical damping, which magnifies what errs.
+        felt = -np.hstack([900.0 * one, 20.0 * one])
+        law = rk.CTC(900.0, 20.0, None, pose=pose)
+        assert growth(setup, law, 0) == pytest.approx(per_sample(felt), rel=1e-11, abs=0.0)
+
+
+@pytest.mark.parametrize(("times", "cause"), [(2.5, "grew 2.5-fold"), (1.3, "left the workspace")])
+def test_torques_that_swing_are_an_unstable_gain_from_one_and_a_half_times_in_six_samples_on(times, cause):
+    """Torques of alternating sign that grow so whatever the machine does."""
+
+    def swing(t, q_a, qd_a, desired):
+        return 1e-3 * (-(times ** (1 / 6))) ** round(t / HOLD.dt) * np.ones(3)
+
+    said = lost(law=swing, path=HOLD)
+    assert cause in said and ("unstable gain" in said) == (times > 1.5)
 
 
 @pytest.mark.parametrize(("cause", "robot", "law", "path", "options"), SETS, ids=range(len(SETS)))
@@ -274,3 +293,12 @@ def test_a_model_is_blamed_for_what_differs_and_nothing_else():
 def test_a_right_model_and_right_encoders_are_not_blamed():
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET)
     assert "controller's model" not in said and "offset =" not in said
+
+
+@pytest.mark.parametrize(("samples", "named"), [(15, True), (7, False)])
+def test_a_filter_is_named_from_ten_samples_of_delay_on(samples, named):
+    """A law of a user, lost for its sign, is not run again: what is seen is the time constant."""
+    said = lost(
+        law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET, velocity_filter=samples * HOLD.dt
+    )
+    assert ("delays the rates by many samples" in said) == named

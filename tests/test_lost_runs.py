@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -440,3 +441,38 @@ def test_what_is_kept_of_a_lost_run_ends_before_a_number_that_is_none(column):
     assert len(runs._run(setup, PD, outcome)) == 7
     rows[column][7, 1] = 0.0
     assert len(runs._run(setup, PD, outcome)) == 21
+
+
+SINGULAR_START = """
+import rapkm_lite as rk
+
+robot = rk.load().replace(
+    friction=0.0, base=[[-0.25, 0.0], [0.25, 0.0], [0.0, 0.5]], lengths=[[0.25, 0.25], [0.25, 0.25], [0.3, 0.2]],
+    mode=[1, -1, 1],
+)
+path = rk.hold(robot, [0.0, 0.25], 0.05)
+try:
+    rk.simulate(robot, rk.CTC(900.0, 60.0, (0, 1)), path)
+except rk.SimulationError as error:
+    said = error.reason
+"""
+
+
+def test_a_division_by_zero_ends_a_run_without_a_compiler_too():
+    """Two elbows at one point and numbers that are powers of two: the distal links are parallel to the last bit.
+
+    Plain Python raises there; the reason is the one of the same run with infinite numbers.
+    """
+    code = f"{SINGULAR_START}\nprint(said)"
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env=os.environ | {"RAPKM_LITE_NUMBA": "0"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found: dict = {}
+    exec(SINGULAR_START, found)
+    for said in (done.stdout.strip(), found["said"]):
+        assert "near a parameterization singularity of its independent drives 1 and 2" in said, done.stderr
+    assert "the independent coordinates of the law became singular" in done.stdout

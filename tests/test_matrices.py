@@ -102,6 +102,10 @@ def test_the_filter_of_three_degrees_of_freedom_leaves_nothing():
         (lambda: rk.projector_dot(J0, J1[:2]), "J_dot has shape"),
         (lambda: rk.minimal_terms(np.ones((9, 3)), np.ones((9, 2)), *3 * [np.eye(9)]), "F_dot"),
         (lambda: rk.redundant_terms(np.eye(9), np.eye(9), np.eye(9), np.eye(9), np.ones(8)), "Q has shape"),
+        (
+            lambda: rk.redundant_terms(*2 * [np.ones((5, 2, 3))], *2 * [np.eye(3)], np.ones(3)),
+            r"N has shape \(5, 2, 3\)",
+        ),
         (lambda: rk.select_independent(np.eye(4), delta=5), "delta = 5"),
         (lambda: rk.explicit_pseudoinverse(np.eye(4), (0, 0)), "rows"),
     ],

@@ -7,6 +7,7 @@ import pytest
 
 import rapkm_lite as rk
 from rapkm_lite.simulation.energy import root_mean_square_torque
+from rapkm_lite.simulation.setup import friction_steps
 
 ROBOT = rk.load().replace(friction=0.0)
 LONGER = ROBOT.replace(lengths=0.28)
@@ -176,3 +177,24 @@ def test_columns_of_a_study_are_those_of_its_runs():
 def test_a_hold_lasts_a_second_and_a_compiled_law_has_no_memory_unless_asked():
     assert rk.hold(ROBOT, [0.0, 0.0]).t[-1] == 1.0
     assert rk.compiled(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory == 0
+
+
+def test_friction_asks_for_a_step_per_time_in_which_creep_decays():
+    """The rates of Gbar xdd = -A^T diag(f_c / v0) A xd add up to a trace; one step at least, also without friction."""
+    robot, x, dt = rk.load(), [0.02, 0.05], 1e-3
+    q = rk.inverse_kinematics(robot, x)
+    pose = rk.at(robot, q, 0 * q)
+    for times in (0.0, 1.0, 30.0):
+        stiff = robot.replace(friction=times * robot.friction)
+        drag = pose.A.T @ np.diag(stiff.friction / stiff.friction_velocity) @ pose.A
+        rates = np.linalg.eigvals(np.linalg.solve(pose.minimal[0], drag))
+        assert friction_steps(stiff, *x, dt) == max(1, int(np.ceil(dt * rates.sum())))
+
+
+def test_a_law_without_coordinates_shows_none():
+    """`pairs` is -1 then, whoever runs it; a law with coordinates shows them in every sample."""
+    path = rk.hold(ROBOT, [0.02, 0.03], 0.01)
+    task = rk.CTC(900.0, 60.0, None)
+    for law in (PD, task, lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a)):
+        assert np.all(rk.simulate(ROBOT, law, path, OFFSET).pairs == -1)
+    assert np.all(rk.simulate(ROBOT, rk.CTC(900.0, 60.0, (0, 2)), path, OFFSET).pairs == [0, 2])

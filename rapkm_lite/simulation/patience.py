@@ -28,7 +28,6 @@ def patience(*kind, after: float = 0.7, text: str = _TEXT):
         return
     clear = []
     timer = threading.Timer(after, lambda: clear.append(_show(text)))
-    timer.daemon = True
     try:
         timer.start()
     except RuntimeError:  # no thread to be had: then without a word
