@@ -125,3 +125,98 @@ def test_methods_of_a_law_with_other_parameters(law, name):
     for whole in (law, rk.AntagonismFilter(law)):
         with pytest.raises(ValueError, match=rf"law.{name} = .* cannot be called .*; allowed: a function \("):
             rk.simulate(TESTBED, whole, HOLD)
+
+
+class Joints(rk.Law):
+    """A law that answers what `found` is where it is asked for its independent joints."""
+
+    def __init__(self, found):
+        self.found = found
+
+    def step(self, memory, sample):
+        return np.zeros(3), memory
+
+    def coordinates(self, memory):
+        return self.found
+
+
+SAMPLE = rk.Sample(rk.Controller(PD, TESTBED), 0.0, HOLD.q_a[0], HOLD.qd_a[0], HOLD[0])
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: rk.singular_values(1e80 * A), r"A has .*e\+80 as largest entry; allowed: 1e-50 to 1e50 in magnitude"),
+        (lambda: rk.null_basis(1e-160 * A), r"A has .*e-160 as largest entry; allowed: 1e-50 to 1e50 in magnitude"),
+        (lambda: rk.effective_gain(1e-160 * A, 7.0), r"F has .*e-160 as largest entry; allowed: 1e-50 to 1e50"),
+        (lambda: rk.select_independent(np.full((3, 6), 1e80)), r"A_tilde has 1e\+80 as largest entry; allowed: "),
+        (lambda: rk.steady_state_torque(1e-160 * A, 7.0, [1e-3, 0, 0]), r"A has .*e-160 as largest entry; allowed: "),
+        (lambda: rk.CTC(400.0, 40.0, range(10**12)), r"independent = range.*; allowed: 2 different joint indices"),
+        (lambda: rk.simulate(TESTBED, PD, HOLD, faults=range(10**12)), r"faults holds 0; allowed: TorqueLimit"),
+        (lambda: PD.gains(10**7), r"m = 1e\+07; allowed: whole numbers >= 1, to 1000"),
+        (lambda: PD.start(3, 1e-3), r"model = 3; allowed: a Manipulator"),
+        (lambda: PD.step(None, 3), r"sample = 3; allowed: a Sample"),
+        (lambda: rk.CTC(400.0, 40.0).step(None, HOLD[0]), r"sample = .*; allowed: a Sample"),
+        (lambda: rk.PID(7.0, 1.0, 0.2).step([np.nan] * 3, SAMPLE), r"memory\[0\] = nan; allowed: finite numbers"),
+        (lambda: SAMPLE.pose(["true"]), r"source = \['true'\]; allowed: 'measured', 'true'"),
+        (lambda: rk.CommandFilter(PD).torque(3, Q, Q, Q[:3], Q[:3], HOLD[0]), r"model = 3; allowed: a Manipulator"),
+        (lambda: rk.Controller(PD, TESTBED)(0, HOLD.q_a, HOLD.qd_a, HOLD), r"desired.q has shape .*; allowed: \(6,\)"),
+        (lambda: rk.Controller(PD, TESTBED)(0, [Q[:3]], Q[:3], HOLD[0]), r"q_a has shape \(1, 3\); allowed: \(3,\)"),
+        (lambda: HOLD["x"], r"k = 'x'; allowed: a sample from 0 to 50, a slice, or an array"),
+        (lambda: HOLD[51], r"k = 51; allowed: a sample from 0 to 50"),
+        (
+            lambda: rk.hold(TESTBED, TESTBED.base[0]),
+            r"x\[0\] = .* m puts arm [12] on the boundary .*; allowed: points inside",
+        ),
+        (lambda: rk.triangle(TESTBED, duration=1e-90, dt=1e-91), r"dt = 1e-91 s; allowed: 1e-9 s or more"),
+        (
+            lambda: rk.follow(TESTBED, HOLD.t, HOLD.x, HOLD.xd, HOLD.xdd + 1e99),
+            r"xdd has .* 1e\+99 m/s\^2; allowed: up",
+        ),
+        (lambda: rk.antagonism_form(rk.load("four_arms"), HOLD, 7.0), r"trajectory has 3 arms, robot has 4; allowed"),
+        (lambda: rk.simulate(TESTBED, Joints("abc"), HOLD), r"law.coordinates\(memory\) = 'abc'; allowed: 2 different"),
+        (lambda: rk.simulate(TESTBED, Joints((0.5, 1)), HOLD), r"law.coordinates\(memory\) = \(0.5, 1\); allowed: 2"),
+        (
+            lambda: TESTBED.replace(base=1e-160 * TESTBED.base),
+            r"base = .* holds one point twice, to 1e-50 m; allowed: ",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_what_was_answered_with_nan_or_with_words_of_the_machinery(call, words):
+    with pytest.raises((ValueError, IndexError), match=words):
+        call()
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.longdouble, ">f8"])
+def test_results_are_kept_in_full_precision(kind):
+    run = rk.simulate(TESTBED, PD, HOLD, [4e-3, 0.0, 0.0])
+    other = rk.Run(**(run._fields() | {"c": run.c.astype(kind)}))
+    assert other.c.dtype == other.energy.dtype == float
+    assert_array_equal(other.energy, rk.Run(**(run._fields() | {"c": run.c.astype(kind).astype(float)})).energy)
+
+
+@pytest.mark.parametrize("count", [3.0, np.int8(3), Decimal(3), np.array(3)])
+def test_the_number_of_arms_is_a_plain_number(count):
+    desired = rk.Desired(**(HOLD[3]._fields() | {"n_arms": count}))
+    assert type(desired.n_arms) is int and desired == HOLD[3]
+    assert_array_equal(desired.q_a, HOLD[3].q_a)
+
+
+@pytest.mark.parametrize(
+    "law", [rk.APD(7.0, 0.2), rk.CTC(400.0, 40.0), rk.SwitchedCTC(400.0, 40.0), rk.RedundantCTC(400, 40)]
+)
+@pytest.mark.parametrize(
+    "form", [np.ndarray.tolist, lambda v: v.astype(object), np.ma.array], ids=["list", "object", "ma"]
+)
+def test_formulas_of_laws_take_lists(law, form):
+    d, q_a = HOLD[3], HOLD[3].q_a + 1e-3
+    c = law.torque(TESTBED, *map(form, (d.q, 0.01 * (d.q - d.q), q_a, d.qd_a)), d)
+    assert type(c) is np.ndarray and c.dtype == float
+    assert_array_equal(c, law.torque(TESTBED, d.q, 0 * d.q, q_a, d.qd_a, d))
+
+
+def test_the_formula_of_a_switched_law_repeats_what_is_given_once():
+    law, many = rk.SwitchedCTC(400.0, 40.0), HOLD[:4]
+    once = law.torque(TESTBED, HOLD.q[0], HOLD.qd[0], many.q_a + 1e-3, many.qd_a, many)
+    assert_allclose(once, law.torque(TESTBED, many.q, many.qd, many.q_a + 1e-3, many.qd_a, many), atol=1e-12)

@@ -37,7 +37,7 @@ from ..mechanics.dynamics import (
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .grammar import LawValue, gain, measured
+from .grammar import LawValue, gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,6 +76,7 @@ class APD(LawValue):
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
         state = _joint_state(model, q, qd, q_a, qd_a, desired)
+        qd = np.asarray(qd, dtype=float)
         if self.independent is None:
             xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
@@ -134,7 +135,7 @@ class SwitchedCTC(LawValue):
         super().__post_init__()
 
     def step(self, memory, sample):
-        q, qd = sample.pose(self.pose)
+        q, qd = seen(sample).pose(self.pose)
         pair = self.choose(sample.model, q, memory)
         law = self.fixed(pair)
         return law.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair
@@ -160,9 +161,8 @@ class SwitchedCTC(LawValue):
         pairs, chosen = drive_pairs(model), []
         now = pairs.index((min(current), max(current))) if current else None
         for measure in np.abs(distal_cross_products(model, q)).tolist():
-            most = max(measure)
-            if now is None or most > self.hysteresis * measure[now]:
-                now = measure.index(most)
+            if now is None or max(measure) > self.hysteresis * measure[now]:
+                now = measure.index(max(measure))
             chosen.append(pairs[now])
         return chosen
 
@@ -173,15 +173,15 @@ class SwitchedCTC(LawValue):
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""
-        q_a, qd_a = _joint_state(model, q, qd, q_a, qd_a, desired)
-        q_a, qd_a = q_a[..., : model.n_arms], qd_a[..., : model.n_arms]
-        if np.ndim(q) == 1:
+        q_a, qd_a = (s[..., : model.n_arms] for s in _joint_state(model, q, qd, q_a, qd_a, desired))
+        if not (lead := q_a.shape[:-1]):
             return self.fixed(self.choose(model, q)).torque(model, q, qd, q_a, qd_a, desired)
-        chosen = self.pairs(model, q)
-        c = np.empty_like(q_a)
+        wanted = desired.x, desired.xd, desired.xdd, desired.q, desired.qd, desired.qdd
+        q, qd, *wanted = (np.broadcast_to(v, (*lead, np.shape(v)[-1])) for v in (q, qd, *wanted))
+        chosen, c = self.pairs(model, q), np.empty_like(q_a)
         for pair in {tuple(p) for p in chosen.tolist()}:
             k = np.all(chosen == pair, axis=-1)
-            part = Desired(desired.n_arms, *(getattr(desired, v)[k] for v in ("x", "xd", "xdd", "q", "qd", "qdd")))
+            part = Desired(desired.n_arms, *(v[k] for v in wanted))
             c[k] = self.fixed(pair).torque(model, q[k], qd[k], q_a[k], qd_a[k], part)
         return c
 
@@ -212,9 +212,9 @@ class RedundantAPD(LawValue):
 
     def __post_init__(self):
         self._check_pose()
-        switch("projected", self.projected)
         one_of("rule", self.rule, PARTITION_RULES)
-        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
+        projected = switch("projected", self.projected)
+        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), projected=projected)
         super().__post_init__()
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
@@ -258,7 +258,7 @@ class RedundantCTC(RedundantAPD):
     def torque(self, model, q, qd, q_a, qd_a, desired):
         feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
         G, C, Q = self._terms(model, q, qd)
-        return matvec(pinv, matvec(G, desired.qdd - feedback) + matvec(C, qd) + Q)
+        return matvec(pinv, matvec(G, desired.qdd - feedback) + matvec(C, np.asarray(qd, dtype=float)) + Q)
 
 
 def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:

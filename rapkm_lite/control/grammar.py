@@ -23,6 +23,8 @@ from ..machine.arguments import (
     bounded,
     callable_with,
     check_leading,
+    having,
+    joint_indices,
     joint_vectors,
     of_kind,
     one_of,
@@ -60,7 +62,7 @@ class Law:
 
     def step(self, memory, sample) -> tuple[np.ndarray, object]:
         """Drive torques c (N,) in N m at a `Sample`, and the memory for the next one."""
-        q, qd = sample.pose(self.pose)
+        q, qd = seen(sample).pose(self.pose)
         return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
 
     def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
@@ -126,8 +128,19 @@ _METHODS = {
 
 
 def coordinates(law, memory) -> tuple[int, int] | None:
-    """`Law.coordinates` of any law or callable."""
-    return law.coordinates(memory) if hasattr(law, "coordinates") else None
+    """`Law.coordinates` of any law or callable.
+
+    Raises ValueError where a user's law answers what are no two joints.
+    """
+    found = law.coordinates(memory) if hasattr(law, "coordinates") else None
+    if found is not None and not isinstance(law, LawValue):
+        joint_indices("law.coordinates(memory)", found, None)
+    return found
+
+
+def seen(sample):
+    """Return what a law is asked at, when it is a `Sample` or tells the same."""
+    return having("sample", sample, "a Sample, such as a Controller makes", "errors", "pose")
 
 
 class BadAnswer(ValueError):

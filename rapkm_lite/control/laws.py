@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, matvec, positive_definite, real_array, short, whole_number
+from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, short, whole_number
 from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
-from .grammar import LawLike, LawValue, as_law, ask, begin, coordinates, gain, measured
+from .grammar import LawLike, LawValue, as_law, ask, begin, coordinates, gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,15 +35,15 @@ class PD(LawValue):
         super().__post_init__()
 
     def start(self, model, dt):
-        self.gains(model.n_arms)
+        self.gains(manipulator(model, "model").n_arms)
 
     def step(self, memory, sample):
-        e, ed = sample.errors()
+        e, ed = seen(sample).errors()
         return -_times(self.K_P, e) - _times(self.K_D, ed), memory
 
     def gains(self, m: int) -> tuple[np.ndarray, np.ndarray]:
         """K_P and K_D as (m, m) matrices."""
-        m = whole_number("m", m, 1)
+        m = whole_number("m", m, 1, 1000)
         return positive_definite("K_P", self.K_P, m), positive_definite("K_D", self.K_D, m)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
@@ -81,6 +81,7 @@ class PID(LawValue):
         super().__post_init__()
 
     def start(self, model, dt):
+        manipulator(model, "model")
         for name in ("K_P", "K_I", "K_D", "limit"):
             value = getattr(self, name)
             if value.shape not in ((), (model.n_arms,), (model.n_arms, model.n_arms)):
@@ -88,7 +89,8 @@ class PID(LawValue):
         return np.zeros(model.n_arms)
 
     def step(self, memory, sample):
-        e, ed = sample.errors()
+        e, ed = seen(sample).errors()
+        memory = exact_array("memory", memory, len(e))
         integral = memory + _times(self.K_I, sample.dt * e)
         c = -(_times(self.K_P, e) + _times(self.K_D, ed) + integral)
         held = np.clip(c, -self.limit, self.limit)
@@ -111,7 +113,8 @@ def torque_limit(limit) -> np.ndarray:
 
 def _is_infinite(value) -> np.ndarray:
     try:
-        return np.asarray(value, dtype=float) == math.inf
+        with np.errstate(over="ignore"):  # numbers of more digits
+            return np.asarray(value, dtype=float) == math.inf
     except Exception:  # whatever an object answers that is asked for a number; `real_array` refuses it
         return np.zeros((), bool)
 
@@ -141,10 +144,10 @@ class AntagonismFilter(LawValue):
         super().__post_init__()
 
     def start(self, model, dt):
-        return begin(self.law, model, dt)
+        return begin(self.law, manipulator(model, "model"), dt)
 
     def step(self, memory, sample):
-        c, memory = ask(self.law, memory, sample)
+        c, memory = ask(self.law, memory, seen(sample))
         q, _ = sample.pose(self.pose)
         return self.matrix(sample.model, q) @ c, memory
 
@@ -186,12 +189,13 @@ class CommandFilter(LawValue):
 
     def commands(self, model, q, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
         """The filtered commands (18) for angles and rates, each (..., N), formed with the *measured* angles."""
-        A = control_matrix(model, q)
         q_a, qd_a = measured(model, q_a, qd_a, desired)
+        A = control_matrix(model, q)
         e, ed = q_a - desired.q_a, qd_a - desired.qd_a
         return q_a - matvec(command_filter(A, self.law.K_P), e), qd_a - matvec(command_filter(A, self.law.K_D), ed)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
+        q_a, qd_a = measured(model, q_a, qd_a, desired)
         K_P, K_D = self.law.gains(model.n_arms)
         q_c, qd_c = self.commands(model, q, q_a, qd_a, desired)
         return -matvec(K_P, q_a - q_c) - matvec(K_D, qd_a - qd_c)

@@ -20,6 +20,13 @@ class NoPose(ConvergenceError):
     """The measured base angles fit no pose of the controller's model."""
 
 
+def one_instant(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
+    """`measured`, without leading axes."""
+    q_a, qd_a = measured(model, q_a, qd_a, desired)
+    exact_array("desired.q", desired.q, model.n_joints)
+    return exact_array("q_a", q_a, model.n_arms), exact_array("qd_a", qd_a, model.n_arms)
+
+
 class Sample:
     """What a controller knows at one instant.
 
@@ -38,7 +45,7 @@ class Sample:
 
     def __init__(self, keeper: Controller, t: float, q_a, qd_a, desired: Desired, truth=None):
         of_kind("keeper", keeper, Controller, "the Controller that makes the samples")
-        q_a, qd_a = measured(keeper.model, q_a, qd_a, desired)
+        q_a, qd_a = one_instant(keeper.model, q_a, qd_a, desired)
         if truth is not None:
             truth = exact_array("truth", truth, 2, 2)
         self._fill(keeper, float(exact_array("t", t)), q_a, qd_a, desired, truth)
@@ -67,8 +74,8 @@ class Sample:
         """
         if source is None:
             return None, None
-        if source not in self._found:
-            one_of("pose", source, ("measured", "true"))
+        if not isinstance(source, str) or source not in self._found:
+            one_of("source", source, ("measured", "true"))
             here, xd = self._true() if source == "true" else self._measured()
             q, qd = here.q.copy(), matvec(here.F, xd)
             q.setflags(write=False)
@@ -127,7 +134,7 @@ class Controller:
         return coordinates(self.law, self.memory)
 
     def __call__(self, t, q_a, qd_a, desired: Desired, truth=None) -> np.ndarray:
-        q_a, qd_a = measured(self.model, q_a, qd_a, desired)
+        q_a, qd_a = one_instant(self.model, q_a, qd_a, desired)
         t = float(exact_array("t", t))
         if truth is not None:
             truth = exact_array("truth", truth, 2, 2)

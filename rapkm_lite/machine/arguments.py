@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 import sys
 from collections.abc import Sequence
@@ -12,7 +13,6 @@ import numpy as np
 
 _FLOAT = np.dtype(float)
 _LEAST = 1e-100
-_NO_NUMBERS = str, bytes, bool, np.bool_
 
 
 class ConvergenceError(RuntimeError, ValueError):
@@ -44,8 +44,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
         fine = np.abs(array) < 1e100
         if not np.all(fine):
             bad = np.argwhere(~fine)[0]
-            number = array[tuple(bad)]
-            raise ValueError(f"{name}{_at(bad)} = {number}; allowed: finite numbers, below 1e100 in magnitude")
+            raise ValueError(f"{name}{_at(bad)} = {array[*bad]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
 
@@ -61,9 +60,8 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value)
         # NumPy would read "1.0", True and bytes as numbers, and drop the imaginary part of a complex array.
-        if value is None or isinstance(value, bytearray | memoryview) or array.dtype.kind not in "iufO":
-            raise TypeError
-        if array.dtype.hasobject and any(isinstance(entry, _NO_NUMBERS) for entry in array.flat):
+        wrong = value is None or isinstance(value, bytearray | memoryview) or array.dtype.kind not in "iufO"
+        if wrong or (array.dtype.hasobject and any(isinstance(v, str | bytes | bool | np.bool_) for v in array.flat)):
             raise TypeError
         array = array.astype(float, copy=False)
     except OverflowError:
@@ -116,7 +114,7 @@ def tall_matrix(name: str, value) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim < 2 or not 1 <= array.shape[-1] <= array.shape[-2]:
         raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, delta) with m >= delta")
-    return array
+    return _of_size(name, array)
 
 
 def wide_matrix(name: str, value) -> np.ndarray:
@@ -124,6 +122,17 @@ def wide_matrix(name: str, value) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim < 2 or not 2 <= array.shape[-2] <= array.shape[-1]:
         raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, n) with n >= m >= 2")
+    return _of_size(name, array)
+
+
+def _of_size(name: str, array: np.ndarray) -> np.ndarray:
+    """Return matrices whose products neither overflow nor vanish; a matrix of zeros is one of them."""
+    if array.ndim == 2 and 1e-100 < np.vdot(array, array) < 1e100:
+        return array
+    largest = np.abs(array).max(axis=(-2, -1))
+    wrong = largest[(largest != 0.0) & ((largest < 1e-50) | (largest > 1e50))]
+    if wrong.size:
+        raise ValueError(f"{name} has {wrong[0]:.3g} as largest entry; allowed: 1e-50 to 1e50 in magnitude")
     return array
 
 
@@ -186,18 +195,14 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
 def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: str = "joint") -> tuple[int, ...]:
     """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
     numbers = value.tolist() if isinstance(value, np.ndarray) else value
-    exact = (
-        isinstance(numbers, Sequence)
-        and not isinstance(numbers, bytes | bytearray)
-        and all(
-            isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < (math.inf if n is None else n)
-            for i in numbers
-        )
-    )
+    listed = isinstance(numbers, Sequence) and not isinstance(numbers, bytes | bytearray)
+    numbers = list(itertools.islice(numbers, 1001)) if listed else ()  # a range may be endless
+    most = math.inf if n is None else n
+    exact = all(isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < most for i in numbers)
     fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
     if not fits:
-        top = "from 0 on" if n is None else f"from 0 to {n - 1}"
-        raise ValueError(f"{name} = {short(value)}; allowed: {count or 'two or more'} different {what} indices {top}")
+        some = f"{count or 'two or more'} different {what} indices from 0 {'on' if n is None else f'to {n - 1}'}"
+        raise ValueError(f"{name} = {short(value)}; allowed: {some}")
     return tuple(map(int, numbers))
 
 

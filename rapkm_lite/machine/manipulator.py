@@ -64,8 +64,8 @@ class Manipulator(Value):
         if base.ndim != 2 or len(base) < 2:
             raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
         N = len(base)
-        if min(np.hypot(*(base[i] - base[j])) for i in range(N) for j in range(i)) == 0.0:
-            raise ValueError(f"base = {base.tolist()} holds one point twice; allowed: N different points")
+        if min(np.hypot(*(base[i] - base[j])) for i in range(N) for j in range(i)) < 1e-50:
+            raise ValueError(f"base = {base.tolist()} holds one point twice, to 1e-50 m; allowed: N different points")
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
         if lengths.max() > 1e6:
             raise ValueError(f"lengths = {lengths.tolist()} m; allowed: up to 1e6 m")

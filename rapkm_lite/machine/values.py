@@ -120,6 +120,8 @@ def _frozen(value):
         return frozen(value)
     if type(value) in (list, tuple):
         return tuple(map(_frozen, value))
+    if isinstance(value, np.str_):
+        return str(value)  # prints as one types it
     return value
 
 
@@ -136,20 +138,22 @@ class Value:
 
     def __post_init__(self):
         for name, value in self._fields().items():
-            self._check_kind(name, value)
-            kept = _frozen(value)
+            kept = _frozen(self._checked(name, value))
             if kept is not value:
                 object.__setattr__(self, name, kept)
 
-    def _check_kind(self, name: str, value) -> None:
-        """Refuse what is not of the kind that the field is declared with, for the kinds below."""
+    def _checked(self, name: str, value):
+        """The value of a field in full precision; refuses what is not of the declared kind, for the kinds below."""
         kind = self.__dataclass_fields__[name].type
         if kind == "np.ndarray":
             array = np.ma.filled(value, 0) if masked(value) else value
-            if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf" or not np.all(np.isfinite(array)):
+            fine = isinstance(array, np.ndarray) and array.dtype.kind in "biuf"
+            if not fine or not np.all(np.isfinite(array)):
                 raise ValueError(f"{name} = {short(value)}; allowed: an array of finite numbers")
+            return value.astype(float, copy=False) if array.dtype.kind == "f" else value
         elif kind in _KINDS and kind not in (c.__name__ for c in type(value).__mro__):
             raise ValueError(f"{name} = {short(value)}; allowed: a {kind}")
+        return value
 
     def _set(self, **fields) -> None:
         """Set fields while the value is made, as ``__post_init__`` needs it."""

@@ -23,6 +23,8 @@ PART = 16384
 def sample_times(duration: float, dt: float) -> np.ndarray:
     """Times from 0 to `duration` in steps of dt, s."""
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
+    if dt < 1e-9:
+        raise ValueError(f"dt = {dt:g} s; allowed: 1e-9 s or more")
     steps = round(min(duration / dt, 1e9))
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
         raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
@@ -41,8 +43,11 @@ def equidistant(t) -> np.ndarray:
     return t
 
 
-def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray) -> None:
+def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:
     """Refuse rates that are no derivative of the positions; a few jumps are set-points, and allowed."""
+    for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
+        if (fastest := np.abs(v).max()) > 1e30:
+            raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")
     moved, meant = np.diff(x, axis=0), t[1] * (xd[1:] + xd[:-1]) / 2
     off = np.linalg.norm(moved - meant, axis=-1)
     size = max(np.abs(moved).max(), np.abs(meant).max())
@@ -98,9 +103,27 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
     return q, qd.T, qdd.T
 
 
-def refuse(robot: Manipulator, x, given: dict) -> None:
-    """Raise the error of a path that leaves the workspace, with what the caller was asked for."""
+def refusal(robot: Manipulator, x, given: dict, error: ValueError) -> ValueError:
+    """The error of a path that leaves the workspace or touches its edge, with what the caller was asked for."""
+    words = ", ".join(f"{name} = {short(value)}" for name, value in given.items())
     try:
-        inverse_kinematics(robot, x)
-    except ValueError as error:
-        raise ValueError(f"{error} (a path with {', '.join(f'{k} = {short(v)}' for k, v in given.items())})") from None
+        elbows = inverse_kinematics(robot, x)[:, robot.n_arms :]
+    except ValueError as outside:
+        return ValueError(f"{outside} (a path with {words})")
+    k, arm = np.unravel_index(np.argmin(np.abs(np.sin(elbows))), elbows.shape)
+    return ValueError(
+        f"x[{k}] = {x[k].round(9).tolist()} m puts arm {arm + 1} on the boundary of the workspace, stretched or folded "
+        f"(a path with {words}); allowed: points inside"
+    )
+
+
+def chosen(samples: int, k):
+    """The samples that an index stands for: an int, or an array of them."""
+    if isinstance(k, int | np.integer) and not isinstance(k, bool) and -samples <= k < samples:
+        return int(k)
+    if isinstance(k, slice | list | np.ndarray):
+        try:
+            return np.arange(samples)[k]
+        except (IndexError, TypeError, ValueError):
+            pass
+    raise IndexError(f"k = {short(k)}; allowed: a sample from 0 to {samples - 1}, a slice, or an array of samples")

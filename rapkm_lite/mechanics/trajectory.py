@@ -10,7 +10,7 @@ import numpy as np
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, all_frozen, frozen
-from .sampling import PART, Motion, check_rates, equidistant, joint_motion, refuse, sample_times, slow_turns
+from .sampling import PART, Motion, check_rates, chosen, equidistant, joint_motion, refusal, sample_times, slow_turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,8 +33,8 @@ class Desired(Value):
     qdd: np.ndarray
 
     def __post_init__(self):
-        sizes = [2, 2, 2, *[2 * whole_number("n_arms", self.n_arms, 2)] * 3]
-        self._set(**{k: real_array(k, getattr(self, k), size) for k, size in zip(_MOTION, sizes, strict=True)})
+        N = whole_number("n_arms", self.n_arms, 2)
+        self._set(n_arms=N, **{k: real_array(k, getattr(self, k), 2 * N if k[0] == "q" else 2) for k in _MOTION})
         check_leading(**{name: getattr(self, name).shape[:-1] for name in _MOTION})
         super().__post_init__()
 
@@ -89,9 +89,10 @@ class Trajectory(Desired):
         return len(self.t)
 
     def __getitem__(self, k) -> Desired:
-        if isinstance(k, int | np.integer):
-            return self._samples.get(int(k)) or self._sample(k)
-        return Desired(self.n_arms, *(getattr(self, name)[k] for name in _MOTION))
+        rows = chosen(len(self), k)
+        if isinstance(rows, int | np.integer):  # also of an array without axes
+            return self._samples.get(int(rows)) or self._sample(rows)
+        return Desired(self.n_arms, *(getattr(self, name)[rows] for name in _MOTION))
 
     def __iter__(self):
         return map(self.__getitem__, range(len(self)))
@@ -155,7 +156,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
             raise ValueError(
                 f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
             )
-    check_rates(t, x, xd)
+    check_rates(t, x, xd, xdd)
     return _follow(robot, t, lambda rows: (x[rows], xd[rows], xdd[rows]), {"samples": len(t)})
 
 
@@ -167,9 +168,8 @@ def _follow(robot: Manipulator, t, motion: Motion, given: dict) -> Trajectory:
         path = motion(rows)
         try:
             parts = *path, *joint_motion(robot, *path, before)
-        except ValueError:
-            refuse(robot, motion(slice(None))[0], given)
-            raise
+        except ValueError as error:
+            raise refusal(robot, motion(slice(None))[0], given, error) from None
         for column, part in zip(columns, parts, strict=True):
             column[rows] = part
     del column

@@ -41,7 +41,7 @@ class Fault(Value):
 
     def mark(self, table: FaultTable, t: np.ndarray) -> None:
         """Write this fault into the table of a run with the times t (k,)."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no mark; needed: mark(table, t), see the other faults")
 
     def felt(self, c: np.ndarray) -> bool:
         """Can it have cost a run in which the torques c (k, N) acted?"""
@@ -189,11 +189,12 @@ def check_faults(faults) -> tuple[Fault, ...]:
     """The faults as a tuple; raises ValueError for what is no fault."""
     if isinstance(faults, str | bytes | dict | set):
         raise ValueError(f"faults = {short(faults)}; allowed: a list of {', '.join(kinds())}")
-    faults = () if faults is None else tuple(faults) if np.iterable(faults) else (faults,)
-    for fault in faults:
+    checked = []
+    for fault in () if faults is None else faults if np.iterable(faults) else (faults,):
         if not isinstance(fault, Fault):
             raise ValueError(f"faults holds {short(fault)}; allowed: {', '.join(kinds())}")
-    return faults
+        checked.append(fault)
+    return tuple(checked)
 
 
 def read_fault(table) -> Fault:

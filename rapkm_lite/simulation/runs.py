@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import masked, matvec, real_array, short
+from ..machine.arguments import matvec, real_array, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -94,8 +94,7 @@ class Run(Value):
         super().__post_init__()
         for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
             shape = self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
-            if masked(getattr(self, name)):
-                real_array(name, getattr(self, name))
+            real_array(name, getattr(self, name))
             if getattr(self, name).shape != shape:
                 raise ValueError(
                     f"{name} has shape {getattr(self, name).shape}; allowed: {shape}, t has {self.t.shape}"
@@ -228,7 +227,7 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
     rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
     if status != DONE:
         table = np.concatenate(columns, axis=-1)[rows]
-        rows = slice(int(np.append(np.all(np.isfinite(table), axis=-1), False).argmin()))
+        rows = slice(int(np.append(np.all(np.abs(table) < 1e100, axis=-1), False).argmin()))
     columns = [column[rows] for column in (setup.trajectory.t, *columns)]
     # What a kernel has finished is finite and frozen.
     make = Run if status != DONE or columns[1].flags.writeable else Run.trusted
