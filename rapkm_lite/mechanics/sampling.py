@@ -23,8 +23,8 @@ PART = 16384
 def sample_times(duration: float, dt: float) -> np.ndarray:
     """Times from 0 to `duration` in steps of dt, s."""
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
-    if dt < 1e-9:
-        raise ValueError(f"dt = {dt:g} s; allowed: 1e-9 s or more")
+    if dt < 1e-12:
+        raise ValueError(f"dt = {dt:g} s; allowed: 1e-12 s or more")
     steps = round(min(duration / dt, 1e9))
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
         raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
