@@ -9,8 +9,8 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import closure, poses
-from rapkm_lite.mechanics.rests import Rests, fitted_gain
+from rapkm_lite.mechanics.encoders import cautions, closure, poses
+from rapkm_lite.mechanics.rests import Gain, Rests, fitted_gain, one_sided, rests
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
 NAMES = ("testbed", "four_arms")
@@ -369,6 +369,61 @@ def test_a_gain_of_rests_has_the_error_of_a_weighted_mean():
         assert gain is not None
         assert_allclose(gain.K_P, np.average(-c[:k] / e[:k], axis=0, weights=weight), rtol=1e-12)
         assert_allclose(gain.error, weight.sum(axis=0) ** -0.5, rtol=1e-12)
+
+
+def test_a_drive_without_an_error_shows_no_gain():
+    e, one = np.array([[1e-3, 0.0], [2e-3, 0.0]]), np.ones((2, 2))
+    assert fitted_gain(Rests(0 * e, e, one, one, np.full(2, 10))) is None
+
+
+def test_rests_are_the_later_halves_of_stretches_of_equal_desired_angles():
+    """Of at least ten records, the means of their numbers and the standard error of the mean torque."""
+    rng, lengths = np.random.default_rng(4), (20, 18, 41)
+    desired = np.repeat([[0.1, 0.2], [0.1, 0.2005], [0.1003, 0.2005]], lengths, axis=0)
+    q_a, c = desired + rng.normal(0, 1e-3, desired.shape), rng.normal(0, 1e-2, desired.shape)
+    t = 1e-3 * np.arange(len(desired))
+    stand = rests([rk.Log("one", t, q_a, desired, c), rk.Log("two", t[:18], q_a[:18], desired[:18], c[:18])])
+    assert stand is not None and stand.records.tolist() == [10, 21]
+    for k, half in enumerate((slice(10, 20), slice(58, 79))):
+        assert_allclose(stand.desired[k], desired[half][0], rtol=0, atol=0)
+        assert_allclose(stand.q_a[k], q_a[half].mean(axis=0), rtol=1e-12)
+        assert_allclose(stand.c[k], c[half].mean(axis=0), rtol=1e-12)
+        spread = np.sqrt(((c[half] - c[half].mean(axis=0)) ** 2).sum(axis=0) / (stand.records[k] - 1))
+        assert_allclose(stand.c_error[k], spread / np.sqrt(stand.records[k]), rtol=1e-12)
+    assert rests([rk.Log("three", t[:18], q_a[:18], desired[:18], c[:18])]) is None
+
+
+@pytest.mark.parametrize(("aside", "sigma", "said"), [(7.0, 1.0, 1), (4.0, 1.0, 0), (1.5, 1e-9, 1), (0.7, 1e-9, 0)])
+def test_torques_lie_aside_from_five_errors_and_a_ten_thousandth_of_the_gain_on(aside, sigma, said):
+    """Errors that add up to zero: slope and intercept of the line are independent, and the intercept has the error
+    sigma / sqrt(k), here 1 and K_P / 10^4 the unit of what lies aside; of equal errors no line is known."""
+    e = np.array([[-2e-3], [-1e-3], [1e-3], [2e-3]])
+    unit, K_P = 1e-3, np.array([10.0])
+    still, error = np.zeros((4, 1)), np.full((4, 1), sigma * unit * np.sqrt(4))
+    shifted = -K_P * e + aside * unit
+    assert len(one_sided(Rests(still, e, shifted, error, np.full(4, 10)), K_P)) == said
+    assert one_sided(Rests(still, 0 * e + 1e-3, shifted, error, np.full(4, 10)), K_P) == []
+
+
+def test_a_gain_is_another_one_from_five_errors_and_two_hundredths_on():
+    nominal = np.array([10.0, 10.0, 10.0, 10.0])
+    sure = Gain(nominal + [0.25, -0.25, 0.15, -0.15], np.full(4, 1e-6)).objections(nominal)
+    assert len(sure) == 2 and "drive 1" in sure[0] and "drive 2" in sure[1]
+    vague = Gain(nominal + [0.7, -0.7, 0.4, -0.4], np.full(4, 0.1)).objections(nominal)
+    assert len(vague) == 2 and "drive 1" in vague[0] and "drive 2" in vague[1]
+
+
+def test_cautions_from_their_bounds_on():
+    """Three times the noise, a quarter of the longest link, a condition of fifty; half the width of two places."""
+    far = 0.3 * TESTBED.lengths.max() * np.array([[1.0, 0.0], [-1.0, 0.0]])
+    assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5) == []
+    for given, words in (
+        ((far, TESTBED, 49.0, 3.1e-5, 1e-5), "exceeds the noise"),
+        ((0.8 * far, TESTBED, 49.0, 2.9e-5, 1e-5), "close together"),
+        ((far, TESTBED, 51.0, 2.9e-5, 1e-5), "condition"),
+    ):
+        (sentence,) = cautions(*given)
+        assert words in sentence
 
 
 def test_a_small_singular_value_counts_down_to_ten_times_the_noise():

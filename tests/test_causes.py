@@ -295,10 +295,19 @@ def test_a_right_model_and_right_encoders_are_not_blamed():
     assert "controller's model" not in said and "offset =" not in said
 
 
-@pytest.mark.parametrize(("samples", "named"), [(15, True), (7, False)])
-def test_a_filter_is_named_from_ten_samples_of_delay_on(samples, named):
-    """A law of a user, lost for its sign, is not run again: what is seen is the time constant."""
-    said = lost(
-        law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET, velocity_filter=samples * HOLD.dt
-    )
-    assert ("delays the rates by many samples" in said) == named
+@pytest.mark.parametrize(
+    ("options", "words", "named"),
+    [
+        ({"velocity_filter": 15 * HOLD.dt}, "delays the rates by many samples", True),
+        ({"velocity_filter": 7 * HOLD.dt}, "delays the rates by many samples", False),
+        ({"encoder": 50}, "counts per turn are 0.13 rad each", True),
+        ({"encoder": 70}, "counts per turn", False),
+        ({"offset": [0.0, -0.15, 0.0]}, "150 mrad, is large", True),
+        ({"offset": [0.0, -0.07, 0.0]}, "is large", False),
+    ],
+    ids=["filter", "short filter", "counts", "fine counts", "offset", "small offset"],
+)
+def test_what_is_seen_of_sensors_is_named_from_a_bound_on(options, words, named):
+    """Ten samples of delay, a tenth of a radian: a law of a user, lost for its sign, is not run again."""
+    said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, **({"offset": OFFSET} | options))
+    assert (words in said) == named

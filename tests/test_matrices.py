@@ -155,6 +155,16 @@ def test_shares_of_a_prestress_are_the_rows_of_the_null_basis_in_any_unit():
         assert np.all(np.isinf(prestress_shares(size * parallel)))
 
 
+def test_each_matrix_of_a_stack_has_its_own_rows():
+    """In any order, along any axes; a row twice is refused where it stands."""
+    rng = np.random.default_rng(8)
+    A = rng.normal(size=(1, 2, 4, 2)) @ rng.normal(size=(1, 2, 2, 6))
+    rows = np.array([[[0, 1], [1, 0]]])
+    assert_allclose(rk.explicit_pseudoinverse(A, rows), np.linalg.pinv(A.mT, rcond=1e-9), rtol=0, atol=1e-11)
+    with pytest.raises(ValueError, match=r"rows holds \[3, 3\]; allowed: different indices"):
+        rk.explicit_pseudoinverse(A, np.array([[[0, 3], [3, 3]]]))
+
+
 def test_one_force_serves_many_motions():
     """A Q, C or G of one pose beside many rates is broadcast; a number that fits neither is refused."""
     robot = FRICTIONLESS

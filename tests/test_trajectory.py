@@ -116,3 +116,11 @@ def test_rates_of_another_motion_are_refused(factor):
     path = rk.circle(TESTBED, 0.05, 1.0)
     with pytest.raises(ValueError, match="does not fit x"):
         rk.follow(TESTBED, path.t, path.x, factor * path.xd, path.xdd)
+
+
+@pytest.mark.parametrize("duration", [0.01, 1.0, 100.0])
+def test_a_step_fits_a_duration_to_a_part_in_a_milliard(duration):
+    """Decimal fractions do so in numbers of the computer, however long or short the path."""
+    assert len(rk.hold(TESTBED, [0.0, 0.0], duration, duration / 10 * (1 + 5e-10))) == 11
+    with pytest.raises(ValueError, match="allowed: a whole fraction of duration"):
+        rk.hold(TESTBED, [0.0, 0.0], duration, duration / 10 * (1 + 2e-9))
