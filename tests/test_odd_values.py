@@ -220,3 +220,45 @@ def test_the_formula_of_a_switched_law_repeats_what_is_given_once():
     law, many = rk.SwitchedCTC(400.0, 40.0), HOLD[:4]
     once = law.torque(TESTBED, HOLD.q[0], HOLD.qd[0], many.q_a + 1e-3, many.qd_a, many)
     assert_allclose(once, law.torque(TESTBED, many.q, many.qd, many.q_a + 1e-3, many.qd_a, many), atol=1e-12)
+
+
+PALETTE = explore.Palette((0.0, 1.0), ("#888888",), ("#777777",))
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (lambda p: p.line("a", "x", [0, 1]), r"x = 'x' is not numeric; allowed: real numbers"),
+        (lambda p: p.line("a", [0, 1], [0, 1, 2]), r"y has shape \(3,\), x has \(2,\); allowed: a number for each x"),
+        (lambda p: p.line("a", [0, 1], [0, 1], alpha="x"), r"alpha = 'x' is not numeric; allowed: "),
+        (lambda p: p.line("a", [0, 1], [0, 1], linestyle=["-"]), r"linestyle = \['-'\]; allowed: '-'"),
+        (lambda p: p.trace("a", [0, 1], [0]), r"y has shape \(1,\), t has \(2,\); allowed: a number for each time"),
+        (lambda p: p.trace("a", [0, 1], [0, 1], points=0), r"points = 0; allowed: >= 1"),
+        (lambda p: p.text("a", [0, 1], 0, "b"), r"x has shape \(2,\); allowed: one number"),
+        (lambda p: p.text("a", 0, 0, 3), r"words = 3; allowed: text"),
+        (lambda p: p.bar("a", 1, None), r"height = None is not numeric; allowed: "),
+        (lambda p: p.polygon("a", [0, 1]), r"points has shape \(2,\); allowed: \(k, 2\)"),
+        (lambda p: p.arrow("a", [0, 0], [1, 0, 0]), r"vector has shape \(3,\); allowed: \(2,\)"),
+        (lambda p: p.image("a", [0, 1], (0, 1, 0, 1), PALETTE), r"values has shape \(2,\); allowed: \(k, k\)"),
+        (lambda p: p.image("a", np.ones((2, 2)), (0, 1, 0), PALETTE), r"extent has shape \(3,\); allowed: \(4,\)"),
+        (lambda p: p.image("a", np.ones((2, 2)), (0, 1, 0, 1), "hot"), r"palette = 'hot'; allowed: a Palette"),
+        (lambda p: p.legend("a", ["b"]), r"entries = \['b'\]; allowed: a list of \(words, keywords of a line\)"),
+        (lambda p: p.limits("a", y=(1, 1)), r"y = \(1, 1\); allowed: two different numbers"),
+        (lambda p: p.fit("a", [1.0], least=0), r"least = 0; allowed: > 0"),
+        (lambda p: p.handle("a", 0, 0, gain=3), r"gain has shape \(\); allowed: \(k,\)"),
+        (lambda p: p.xlim(["a"]), r"there is no panel \['a'\]; allowed: a"),
+        (lambda p: explore.Picture({"a": {"xlim": 3}}), r"xlim has shape \(\); allowed: \(2,\)"),
+        (lambda p: explore.Picture({"a": {"title": 3}}), r"title = 3; allowed: text"),
+    ],
+)
+def test_marks_of_a_picture(draw, words):
+    with pytest.raises((ValueError, KeyError), match=words):
+        draw(explore.Picture({"a": {}}))
+
+
+def test_what_is_masked_or_missing_is_a_gap():
+    picture = explore.Picture({"a": {}})
+    picture.line("a", [0, 1, 2], np.ma.array([0.0, 5.0, 1.0], mask=[0, 1, 0]))
+    assert_array_equal(picture.marks[0].data, [[0.0, 0.0], [1.0, np.nan], [2.0, 1.0]])
+    picture.fit("a", [0.5, np.nan, -1.0, np.inf])
+    assert picture.ylim("a") == (-1.5, 1.5)

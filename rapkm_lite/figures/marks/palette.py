@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap, is_color_like, to_hex
 
-from ...machine.arguments import real_array, short
+from ...machine.arguments import bounded, exact_array, real_array, short
 
 LINE = {
     "color",
@@ -26,6 +26,7 @@ PATCH = {"facecolor", "edgecolor", "linewidth", "linestyle", "alpha", "zorder", 
 WORDS = {"color", "fontsize", "fontweight", "ha", "va", "alpha", "zorder"}
 STYLES = {"line": LINE, "bar": PATCH, "polygon": PATCH, "label": WORDS, "words": WORDS, "title": WORDS - {"ha", "va"}}
 STYLES |= {"image": {"zorder"}}
+_SIZES = {"linewidth", "alpha", "zorder", "markersize", "markeredgewidth", "fontsize"}
 MARKERS = ("o", "s", "D", "x", "+")
 _DASHES = {"-": (), "solid": (), "--": (3.7, 1.6), ":": (1.0, 1.65), "-.": (6.4, 1.6, 1.0, 1.6), "none": None, "": None}
 _PLACES = {"ha": ("left", "center", "right"), "va": ("baseline", "bottom", "center", "top")}
@@ -73,17 +74,19 @@ def checked(kind: str, style: dict) -> dict:
     unknown = sorted(set(style) - allowed)
     if unknown:
         raise ValueError(f"{kind} has no style {unknown[0]!r}; allowed: {', '.join(sorted(allowed))}")
-    if style.get("marker", "o") not in MARKERS:
-        raise ValueError(f"marker = {style['marker']!r}; allowed: {', '.join(MARKERS)}")
+    for name in _SIZES & set(style):
+        bounded(name, exact_array(name, style[name]), -np.inf if name == "zorder" else 0.0, strict=False)
+    if not isinstance(style.get("marker", "o"), str) or style.get("marker", "o") not in MARKERS:
+        raise ValueError(f"marker = {short(style['marker'])}; allowed: {', '.join(MARKERS)}")
     line = style.get("linestyle", "-")
-    if line not in _DASHES and not isinstance(line, tuple):
-        raise ValueError(f"linestyle = {line!r}; allowed: {', '.join(map(repr, _DASHES))} or (0, (on, off, ...))")
+    if not isinstance(line, str | tuple) or (isinstance(line, str) and line not in _DASHES):
+        raise ValueError(f"linestyle = {short(line)}; allowed: {', '.join(map(repr, _DASHES))} or (0, (on, off, ...))")
     for name, places in _PLACES.items():
         if style.get(name, places[0]) not in places:
             raise ValueError(f"{name} = {style[name]!r}; allowed: {', '.join(places)}")
     try:
         canvas_style(kind, tuple(style.items()))
-    except (TypeError, ValueError) as error:
+    except (IndexError, TypeError, ValueError) as error:
         raise ValueError(f"{kind} cannot be drawn with {short(style)} ({error}); allowed: words and numbers") from None
     return style
 

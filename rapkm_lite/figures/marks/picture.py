@@ -6,7 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...machine.arguments import bounded, callable_with, exact_array, function, of_kind, short
+from ...machine.arguments import (
+    bounded,
+    callable_with,
+    exact_array,
+    function,
+    of_kind,
+    positive_number,
+    short,
+    switch,
+    whole_number,
+)
+from .given import check_panel, legend_entries, numbers, two_limits
 from .palette import Palette, checked
 
 # Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
@@ -47,6 +58,7 @@ class Picture:
             unknown = sorted(set(settings) - PANEL)
             if unknown:
                 raise ValueError(f"panel {name!r} has no {unknown[0]!r}; allowed: {', '.join(sorted(PANEL))}")
+            check_panel(settings)
         self.panels = {name: {k: v for k, v in panel.items() if k != "legend"} for name, panel in panels.items()}
         self.layout = [list(panels)] if layout is None else _rows(layout, list(panels))
         columns = len(self.layout[0])
@@ -69,13 +81,18 @@ class Picture:
 
     def line(self, panel: str, x, y, **style) -> None:
         """A curve, or markers with ``linestyle="none"``; a gap where a number is not finite."""
+        x, y = numbers("x", x, most=1), numbers("y", y, most=1)
+        if x.size != y.size and 1 not in (x.size, y.size):
+            raise ValueError(f"y has shape {y.shape}, x has {x.shape}; allowed: a number for each x")
         data = np.stack(np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y)), -1)
         self._add("line", panel, data, checked("line", style))
 
     def trace(self, panel: str, t, y, points: int = 300, **style) -> None:
         """A curve over time, thinned to the least and largest value in each of `points` spans."""
-        t, y = np.asarray(t), np.asarray(y)
-        span = len(t) // points
+        t, y = numbers("t", t, -1), numbers("y", y, -1)
+        if len(t) != len(y):
+            raise ValueError(f"y has shape {y.shape}, t has {t.shape}; allowed: a number for each time")
+        span = len(t) // whole_number("points", points, 1)
         if span > 2:
             count = len(t) // span * span
             blocks = y[:count].reshape(-1, span)
@@ -88,29 +105,36 @@ class Picture:
 
     def text(self, panel: str, x: float, y: float, words: str, inside: bool = False, **style) -> None:
         """Words at (x, y) in data coordinates, or in fractions of the panel when `inside`."""
-        kind = "words" if inside else "label"
-        self._add(kind, panel, np.array([[x, y]], dtype=float), checked(kind, style), words)
+        kind = "words" if switch("inside", inside) else "label"
+        data = np.array([[numbers("x", x), numbers("y", y)]], dtype=float)
+        self._add(kind, panel, data, checked(kind, style), of_kind("words", words, str, "text"))
 
     def title(self, panel: str, words: str, **style) -> None:
         """Words above the panel, in place of its title."""
-        self._add("title", panel, np.empty((0, 2)), checked("title", style), words)
+        self._add("title", panel, np.empty((0, 2)), checked("title", style), of_kind("words", words, str, "text"))
 
     def bar(self, panel: str, at: float, height: float, width: float = 0.8, **style) -> None:
         """A bar from zero, centred at `at`."""
-        left, right = at - width / 2, at + width / 2
-        corners = np.array([[left, 0.0], [right, 0.0], [right, height], [left, height]])
+        middle, half, top = numbers("at", at), numbers("width", width) / 2, numbers("height", height)
+        left, right = middle - half, middle + half
+        corners = np.array([[left, 0.0], [right, 0.0], [right, top], [left, top]])
         self._add("bar", panel, corners, checked("bar", style))
 
     def polygon(self, panel: str, points, **style) -> None:
         """A closed polygon through points (k, 2); rows that are not finite begin another ring."""
-        self._add("polygon", panel, np.asarray(points, dtype=float), checked("polygon", style))
+        self._add("polygon", panel, numbers("points", points, -1, 2), checked("polygon", style))
 
     def arrow(self, panel: str, start, vector, width: float = 0.006, **style) -> None:
         """An arrow from `start` (2,) along `vector` (2,), in data coordinates; nothing when shorter than `width`."""
-        start, vector = np.asarray(start, dtype=float), np.asarray(vector, dtype=float)
+        self._check(panel)
+        start, vector, width = (
+            numbers("start", start, 2),
+            numbers("vector", vector, 2),
+            positive_number("width", width),
+        )
         length = float(np.hypot(*vector))
         checked("polygon", style)
-        if length > width:
+        if width < length < np.inf:
             along = vector / length
             side = np.array([-along[1], along[0]])
             neck = length - min(4 * width, 0.6 * length)
@@ -123,17 +147,24 @@ class Picture:
         clip : a polygon (k, 2) outside of which nothing is painted.  Keep the array: a map is sent once as long as the
         same array is given.
         """
-        outline = np.empty((0, 2)) if clip is None else np.asarray(clip, dtype=float)
-        self._add("image", panel, outline, checked("image", style), (values, tuple(map(float, extent)), palette))
+        outline = np.empty((0, 2)) if clip is None else numbers("clip", clip, -1, 2)
+        numbers("values", values, -1, -1)
+        x0, x1, y0, y1 = edges = tuple(exact_array("extent", extent, 4).tolist())
+        if x0 == x1 or y0 == y1:
+            raise ValueError(f"extent = {short(extent)}; allowed: (x0, x1, y0, y1) with x0 < x1 and y0 < y1")
+        of_kind("palette", palette, Palette, "a Palette")
+        self._add("image", panel, outline, checked("image", style), (values, edges, palette))
 
     def legend(self, panel: str, entries) -> None:
         """A legend above the panel; entries are (words, keywords of a line)."""
+        entries = legend_entries("entries", entries)
         words = [(words, checked("line", {"linewidth": 2, **style})) for words, style in entries]
         self._add("legend", panel, np.empty((0, 2)), {}, words)
 
     def scale(self, panel: str, palette: Palette, label: str) -> None:
         """The colours of a map with their levels, beside the panel."""
-        self._add("scale", panel, np.empty((0, 2)), {}, (palette, label))
+        words = of_kind("palette", palette, Palette, "a Palette"), of_kind("label", label, str, "text")
+        self._add("scale", panel, np.empty((0, 2)), {}, words)
 
     def handle(self, panel: str, x, y, /, along=None, grip=None, **controls) -> None:
         """A point of the picture that can be taken by hand and moves controls.
@@ -144,7 +175,11 @@ class Picture:
         grip : two points (2, 2); the line between them takes hold of the handle too.
         """
         self._check(panel)
+        for name, value, shape in (("x", x, ()), ("y", y, ()), ("along", along, (-1, 2)), ("grip", grip, (2, 2))):
+            if value is not None or name == "x":
+                numbers(name, value, *shape)
         for name, values in controls.items():
+            numbers(name, values, -1)
             if along is None and len(values) not in (2, 3):
                 raise ValueError(f"{name} = {values!r}; allowed: (a, b) or (a, b, c), with value = a x + b y + c")
             if along is not None and len(values) != len(along):
@@ -157,8 +192,8 @@ class Picture:
         """Set the limits of a panel."""
         self._check(panel)
         frame = self.frames[panel]
-        frame[:2] = x if x is not None else frame[:2]
-        frame[2:] = y if y is not None else frame[2:]
+        frame[:2] = two_limits("x", x) if x is not None else frame[:2]
+        frame[2:] = two_limits("y", y) if y is not None else frame[2:]
 
     def xlim(self, panel: str) -> tuple[float, float]:
         """The horizontal limits of a panel."""
@@ -175,9 +210,12 @@ class Picture:
 
         The limits shrink only when the values fill less than half of them; they do not grow beyond `most`.
         """
-        largest = max(least, *(float(np.max(np.abs(v))) for v in values if np.size(v)))
         low, now = self.ylim(panel)
-        largest = min(largest, most / 1.05)
+        sizes = (np.abs(numbers("values", v, most=9)) for v in values)
+        largest = max(positive_number("least", least), *(float(v[np.isfinite(v)].max(initial=0.0)) for v in sizes))
+        endless = isinstance(most, float) and most == np.inf
+        largest = min(largest, (most if endless else positive_number("most", most)) / 1.05)
+        switch("symmetric", symmetric)
         if not 0.45 * now <= 1.05 * largest <= now or (symmetric and low != -now):
             decade = 10.0 ** np.floor(np.log10(1.05 * largest))
             steps = (1, 1.5, 2, 3, 5, 7, 10)
@@ -185,7 +223,7 @@ class Picture:
         self.limits(panel, y=(-now if symmetric else 0.0, now))
 
     def _check(self, panel: str) -> None:
-        if panel not in self.panels:
+        if not isinstance(panel, str | int) or panel not in self.panels:
             raise KeyError(f"there is no panel {short(panel)}; allowed: {', '.join(self.panels)}")
 
     def _add(self, kind: str, panel: str, data: np.ndarray, style: dict, words: Any = "") -> None:
