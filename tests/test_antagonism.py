@@ -30,7 +30,8 @@ def test_rest_always_exists_below_the_threshold():
     robot = rk.load()
     for x, offset in random_rests(1, 40):
         q = rk.inverse_kinematics(robot, x)
-        assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, offset, QUANTUM, 4.2e-3)
+        for times in (1.0, 30.0):  # offsets of many counts move the place of rest by as many
+            assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, times * offset, QUANTUM, 4.2e-3)
         assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
 
 

@@ -378,13 +378,13 @@ def test_a_drive_without_an_error_shows_no_gain():
 
 def test_rests_are_the_later_halves_of_stretches_of_equal_desired_angles():
     """Of at least ten records, the means of their numbers and the standard error of the mean torque."""
-    rng, lengths = np.random.default_rng(4), (20, 18, 41)
+    rng, lengths = np.random.default_rng(4), (21, 18, 41)
     desired = np.repeat([[0.1, 0.2], [0.1, 0.2005], [0.1003, 0.2005]], lengths, axis=0)
     q_a, c = desired + rng.normal(0, 1e-3, desired.shape), rng.normal(0, 1e-2, desired.shape)
     t = 1e-3 * np.arange(len(desired))
     stand = rests([rk.Log("one", t, q_a, desired, c), rk.Log("two", t[:18], q_a[:18], desired[:18], c[:18])])
-    assert stand is not None and stand.records.tolist() == [10, 21]
-    for k, half in enumerate((slice(10, 20), slice(58, 79))):
+    assert stand is not None and stand.records.tolist() == [11, 21]
+    for k, half in enumerate((slice(10, 21), slice(59, 80))):
         assert_allclose(stand.desired[k], desired[half][0], rtol=0, atol=0)
         assert_allclose(stand.q_a[k], q_a[half].mean(axis=0), rtol=1e-12)
         assert_allclose(stand.c[k], c[half].mean(axis=0), rtol=1e-12)

@@ -1,5 +1,7 @@
 """Torques within limits against a general solver and by symmetry; stiffness against the energy it comes from."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -59,6 +61,20 @@ def test_a_wrench_on_the_edge_has_one_answer_and_one_beyond_is_refused_with_the_
     assert_allclose(CENTRE.T @ c, corner, atol=1e-12)
     with pytest.raises(ValueError, match=r"needs 1\.25 times limit"):
         rk.allocate_torques(CENTRE, 1.25 * corner, 0.1)
+
+
+def test_corners_of_the_force_polygon_go_round_once_from_the_lowest_one_on():
+    """Every corner is a sum of the rows with signs, of all of which none lies lower; the edges turn by 2 pi in all."""
+    for A in np.random.default_rng(2).normal(size=(5, 4, 2)):
+        corners = rk.force_polygon(A, 0.5)
+        sums = 0.5 * np.array(list(itertools.product((-1, 1), repeat=4))) @ A
+        assert np.linalg.norm(corners[:, None] - sums, axis=-1).min(axis=1).max() < 1e-12
+        assert_allclose(corners[0, 1], sums[:, 1].min(), atol=1e-12)
+        way = np.roll(corners, -1, axis=0) - corners
+        angle = np.arctan2(way[:, 1], way[:, 0])
+        turns = np.mod(np.roll(angle, -1) - angle, 2 * np.pi)
+        assert turns.max() < np.pi
+        assert_allclose(turns.sum(), 2 * np.pi, rtol=1e-12)
 
 
 def test_minimax_reaches_the_edge_of_the_force_polygon():

@@ -214,7 +214,8 @@ def _driven(robot: Manipulator, q, qd, qdd):
 
 
 def force_polygon(A, torque: float) -> np.ndarray:
-    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), counter-clockwise.
+    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), from the lowest one on
+    counter-clockwise.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.force_polygon(rk.control_matrix(robot, q), torque=0.1).shape
