@@ -65,7 +65,9 @@ def test_a_wrench_on_the_edge_has_one_answer_and_one_beyond_is_refused_with_the_
 
 def test_corners_of_the_force_polygon_go_round_once_from_the_lowest_one_on():
     """Every corner is a sum of the rows with signs, of all of which none lies lower; the edges turn by 2 pi in all."""
-    for A in np.random.default_rng(2).normal(size=(5, 4, 2)):
+    many = np.random.default_rng(2).normal(size=(6, 4, 2))
+    many[4, 1], many[5, 2] = [1.5, 0.0], [-1.5, 0.0]  # edges along x lie at the bottom and on top
+    for A in many:
         corners = rk.force_polygon(A, 0.5)
         sums = 0.5 * np.array(list(itertools.product((-1, 1), repeat=4))) @ A
         assert np.linalg.norm(corners[:, None] - sums, axis=-1).min(axis=1).max() < 1e-12
