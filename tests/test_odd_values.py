@@ -151,6 +151,14 @@ SAMPLE = rk.Sample(rk.Controller(PD, TESTBED), 0.0, HOLD.q_a[0], HOLD.qd_a[0], H
         (lambda: rk.effective_gain(1e-160 * A, 7.0), r"F has .*e-160 as largest entry; allowed: 1e-50 to 1e50"),
         (lambda: rk.select_independent(np.full((3, 6), 1e80)), r"A_tilde has 1e\+80 as largest entry; allowed: "),
         (lambda: rk.steady_state_torque(1e-160 * A, 7.0, [1e-3, 0, 0]), r"A has .*e-160 as largest entry; allowed: "),
+        (
+            lambda: rk.complement([[1e-200, 0.0, 1e-200]], (0, 1)),
+            r"J has 1e-200 as largest entry; allowed: 1e-50 to 1e50",
+        ),
+        (
+            lambda: rk.close_loops(TESTBED, Q, 1e-13, 10**9),
+            r"iterations = 1e\+09; allowed: whole numbers >= 1, to 10000",
+        ),
         (lambda: rk.CTC(400.0, 40.0, range(10**12)), r"independent = range.*; allowed: 2 different joint indices"),
         (lambda: rk.simulate(TESTBED, PD, HOLD, faults=range(10**12)), r"faults holds 0; allowed: TorqueLimit"),
         (lambda: PD.gains(10**7), r"m = 1e\+07; allowed: whole numbers >= 1, to 1000"),

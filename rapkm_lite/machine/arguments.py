@@ -114,7 +114,7 @@ def tall_matrix(name: str, value) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim < 2 or not 1 <= array.shape[-1] <= array.shape[-2]:
         raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, delta) with m >= delta")
-    return _of_size(name, array)
+    return sized(name, array)
 
 
 def wide_matrix(name: str, value) -> np.ndarray:
@@ -122,10 +122,10 @@ def wide_matrix(name: str, value) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim < 2 or not 2 <= array.shape[-2] <= array.shape[-1]:
         raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, n) with n >= m >= 2")
-    return _of_size(name, array)
+    return sized(name, array)
 
 
-def _of_size(name: str, array: np.ndarray) -> np.ndarray:
+def sized(name: str, array: np.ndarray) -> np.ndarray:
     """Return matrices whose products neither overflow nor vanish; a matrix of zeros is one of them."""
     if array.ndim == 2 and 1e-100 < np.vdot(array, array) < 1e100:
         return array

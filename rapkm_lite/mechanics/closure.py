@@ -37,7 +37,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     q0 = real_array("q", q, manipulator(robot).n_joints)
     q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
     scale, tolerance = robot.lengths.max(), small_number("tolerance", tolerance)
-    for _ in range(whole_number("iterations", iterations, 1)):
+    for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
         Q, R = np.linalg.qr(J.mT, mode="complete")
         if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
@@ -97,7 +97,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     step, limit = np.full(x.shape, np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
-    for _ in range(whole_number("iterations", iterations, 1)):
+    for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         q, cosine = cores.joint_angles(robot, x, robot.mode)
         if np.abs(cosine).max(initial=0.0) > 1.0:
             break

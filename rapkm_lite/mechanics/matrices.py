@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import check_leading, joint_indices, real_array
+from ..machine.arguments import check_leading, joint_indices, real_array, sized
 from . import cores
 
 
@@ -99,7 +99,7 @@ def _jacobian(J) -> np.ndarray:
     J = real_array("J", J)
     if J.ndim < 2 or not 1 <= J.shape[-2] < J.shape[-1]:
         raise ValueError(f"J has shape {J.shape}; allowed: (..., r, n) with 1 <= r < n")
-    return J
+    return sized("J", J)
 
 
 def _jacobians(J, J_dot) -> tuple[np.ndarray, np.ndarray]:
