@@ -9,7 +9,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import cautions, closure, poses
+from rapkm_lite.mechanics.encoders import cautions, closure, poses, rounding
 from rapkm_lite.mechanics.rests import Gain, Rests, fitted_gain, one_sided, rests
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
@@ -424,6 +424,14 @@ def test_cautions_from_their_bounds_on():
     ):
         (sentence,) = cautions(*given)
         assert words in sentence
+
+
+def test_readings_that_are_counts_are_known_by_their_steps():
+    """Even steps of one size, whatever that is: its square is twelve times the variance; others show no counts."""
+    whole = np.array([[0, 2], [1, 5], [3, 4], [7, -3]])
+    for count in (1e-4, 3e-3, 0.1):
+        assert_allclose(rounding(count * whole), count / np.sqrt(12), rtol=1e-9)
+        assert rounding(count * (whole + [[0.0, 0.0], [0.0, 0.0], [0.3, 0.0], [0.0, 0.0]])) == 0.0
 
 
 def test_a_small_singular_value_counts_down_to_ten_times_the_noise():
