@@ -12,6 +12,7 @@ from ...figures.film import film
 from ...figures.machine import plot_machine
 from ...figures.maps import mode_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, arm_text_colour, axes_or_new
+from ...machine.arguments import positive_number
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
 
@@ -224,12 +225,13 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> ax = plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])
     """
+    scale = positive_number("newton_per_metre", newton_per_metre)
     ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
     for i, force in enumerate(np.asarray(forces)):
         ax.annotate(
             "",
-            tuple(x + force / newton_per_metre),
+            tuple(x + force / scale),
             tuple(x),
             zorder=7,
             arrowprops={"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0},
