@@ -32,7 +32,8 @@ def test_rest_always_exists_below_the_threshold():
         q = rk.inverse_kinematics(robot, x)
         for times in (1.0, 30.0):  # offsets of many counts move the place of rest by as many
             assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, times * offset, QUANTUM, 4.2e-3)
-        assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
+        for friction in (0.0, 1e-6):
+            assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, friction)
 
 
 def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction, reach=2):
@@ -82,7 +83,8 @@ def test_rest_exists_below_the_threshold_for_other_numbers_of_arms(name):
         q = rk.inverse_kinematics(robot, x)
         offset = np.resize(offset, robot.n_arms)
         assert rk.rest_exists(robot, q, 2 * 4.2e-3 / QUANTUM, offset, QUANTUM, 4.2e-3)
-        assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, 1e-6)
+        for friction in (0.0, 1e-6):
+            assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, friction)
 
 
 def test_runs_without_a_place_of_rest_keep_moving():

@@ -331,6 +331,19 @@ def test_rates_that_open_the_loops_are_refused_where_a_motion_is_asked_for(name)
     assert np.all(np.isfinite(rk.at(robot, q, qd).redundant[1]))  # a law takes what it measures
 
 
+def test_the_rates_that_open_the_loops_most_for_their_size_are_named():
+    """A slow motion that is no motion, and a fast one that errs by more metres, but by a smaller share."""
+    robot = rk.load().replace(friction=0.0)
+    q = np.stack(2 * [rk.inverse_kinematics(robot, [0.02, 0.05])])
+    wrong, J = np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), rk.constraint_jacobian(robot, q[0])
+    fast = 40.0 * rk.orthogonal_complement(robot, q[0]) @ [1.0, 0.0] + 2.0 * wrong
+    speed = [np.abs(J @ qd).max() for qd in (wrong, fast)]
+    assert speed[0] < speed[1] and speed[0] > speed[1] / np.abs(fast).max()
+    for order in ([0, 1], [1, 0]):
+        with pytest.raises(ValueError, match=f"at {speed[0]:.3g} m/s"):
+            rk.forward_dynamics(robot, q, np.stack([wrong, fast])[order], np.zeros((2, 3)))
+
+
 OUTSIDE = [[0.3, 0.3], [-0.25, -0.2], [1e3, 0.0]]
 
 

@@ -290,6 +290,13 @@ def test_a_model_is_blamed_for_what_differs_and_nothing_else():
     assert "lengths" not in lost(path=CIRCLE, **mode(-1, -1, -1))
 
 
+def test_a_wrong_model_is_not_blamed_where_the_right_one_would_not_help():
+    """A payload that the model does not know of, and gains that no model makes stable."""
+    options = {"model": ROBOT.replace(load=0.01), "path": CIRCLE, "offset": OFFSET}
+    for law in (rk.CTC(9e6, 60.0), rk.AntagonismFilter(rk.PD(1e4, 0.225))):
+        assert "(unstable gain: near the desired state" in lost(law=law, **options)
+
+
 def test_a_right_model_and_right_encoders_are_not_blamed():
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET)
     assert "controller's model" not in said and "offset =" not in said

@@ -116,7 +116,7 @@ def test_rates_fit_the_positions(factor):
     assert len(rk.follow(path.robot, path.t, path.x, slopes, path.xdd)) == len(path)
 
 
-def test_a_jump_of_the_set_point_is_no_mistake():
+def test_a_jump_of_the_set_point_and_standing_still_are_no_mistakes():
     t = np.linspace(0.0, 1.0, 101)
-    x = np.where(t[:, None] < 0.5, [0.0, 0.0], [0.02, 0.0])
-    rk.follow(hostile.ROBOT, t, x, 0 * x, 0 * x)
+    for x in (np.where(t[:, None] < 0.5, [0.0, 0.0], [0.02, 0.0]), np.tile([0.01, 0.02], (101, 1))):
+        assert np.all(rk.follow(hostile.ROBOT, t, x, 0 * x, 0 * x).x == x)

@@ -7,7 +7,7 @@ from samples import MODES, TESTBED, along, machines, modes, norm, random_motion,
 from scipy.optimize import least_squares, minimize
 
 import rapkm_lite as rk
-from rapkm_lite.mechanics.kinematics import tip_jacobians, wrap
+from rapkm_lite.mechanics.kinematics import tip_jacobians, turn, wrap
 
 
 # Identities on V.
@@ -248,3 +248,10 @@ def test_one_pose_and_a_trajectory_are_the_same_call():
         assert f(TESTBED, *(a[:0] for a in args)).shape == (0, *whole.shape[1:])
     assert rk.inverse_kinematics(TESTBED, x[0], MODES).shape == (8, 6)
     assert rk.arm_vectors(TESTBED, q)[0].shape == (12, 3, 2)
+
+
+@pytest.mark.parametrize("lead", [(), (3,), (3, 2)])
+def test_a_quarter_turn_is_the_product_with_i(lead):
+    v = np.random.default_rng(3).normal(size=(*lead, 2))
+    turned = (v[..., 0] + 1j * v[..., 1]) * 1j
+    assert_allclose(turn(v), np.stack([turned.real, turned.imag], axis=-1), rtol=0, atol=0)

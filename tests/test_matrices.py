@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, machines, random_motion
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.antagonism import _references
 from rapkm_lite.mechanics.cores import prestress_shares
 from rapkm_lite.mechanics.linalg import many_inverses, pivots
 
@@ -160,9 +161,23 @@ def test_each_matrix_of_a_stack_has_its_own_rows():
     rng = np.random.default_rng(8)
     A = rng.normal(size=(1, 2, 4, 2)) @ rng.normal(size=(1, 2, 2, 6))
     rows = np.array([[[0, 1], [1, 0]]])
-    assert_allclose(rk.explicit_pseudoinverse(A, rows), np.linalg.pinv(A.mT, rcond=1e-9), rtol=0, atol=1e-11)
+    for stack, chosen in ((A, rows), (A[0], rows[0])):
+        found = rk.explicit_pseudoinverse(stack, chosen)
+        assert_allclose(found, np.linalg.pinv(stack.mT, rcond=1e-9), rtol=0, atol=1e-11)
     with pytest.raises(ValueError, match=r"rows holds \[3, 3\]; allowed: different indices"):
         rk.explicit_pseudoinverse(A, np.array([[[0, 3], [3, 3]]]))
+    with pytest.raises(ValueError, match=r"rows holds \[0, 4\]; allowed: different indices from 0 to 3"):
+        rk.explicit_pseudoinverse(A[0], np.array([[0, 4], [0, 1]]))
+
+
+@pytest.mark.parametrize("m", [3, 4, 5, 6, 7])
+def test_directions_of_reference_are_no_forces_of_a_symmetric_machine(m):
+    """Drives at equal angles: the columns of A are the first harmonic, to which all other ones are orthogonal."""
+    turn = 2 * np.pi * np.arange(m) / m
+    for number in range(m):
+        A = np.stack([np.cos(turn + number), np.sin(turn + number)], axis=-1)
+        assert_allclose(_references(m).T @ A, 0.0, atol=1e-12)
+    assert np.linalg.matrix_rank(_references(m)) == m - 2
 
 
 def test_one_force_serves_many_motions():
