@@ -13,10 +13,30 @@ from . import compiled
 COMPILED = compiled()
 if COMPILED:
     from numba import njit, types
+    from numba.core.compiler import Compiler
+
+    class Wide(Compiler):
+        """Numba's compiler, free to use vector registers of 512 bits: on processors of Intel it stops at 256, with
+        which runs side by side take a third longer."""
+
+        def __init__(self, typing, target, *rest):
+            super().__init__(typing, target, *rest)
+            context = self.state.targetctx
+            declare = context.declare_function
+
+            def wide(module, description):
+                function = declare(module, description)
+                # As text: llvmlite has no word for it.
+                set.add(function.attributes, '"prefer-vector-width"="512"')
+                return function
+
+            context.declare_function = wide
 
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
 # Kernels write into arrays that they are given: without counts of who refers to them a sample takes up to a third less.
-_OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+if COMPILED:
+    _OPTIONS["pipeline_class"] = Wide
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
 _VIEW: dict[str, Any] = {**_INNER, "_nrt": True}
 
