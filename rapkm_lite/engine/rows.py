@@ -116,6 +116,15 @@ ENVIRONMENT, SINGLES = 4, 60
 
 
 @index
+def counted(k):
+    """The whole number k, of which the compiler then knows that it is not negative.
+
+    A negative index counts from the end of an array: asking that of each number keeps them from moving as vectors.
+    """
+    return k & 0xFFFFFFFFFF
+
+
+@index
 def at(block, i, j, W, L):
     """Index of arm i and run j in a pair row."""
     return (block * W + i) * L + j
