@@ -32,6 +32,7 @@ if COMPILED:
 
             context.declare_function = wide
 
+
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
 # Kernels write into arrays that they are given: without counts of who refers to them a sample takes up to a third less.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}

@@ -60,12 +60,8 @@ class Manipulator(Value):
     name: str = field(default="manipulator")
 
     def __post_init__(self):
-        base = real_array("base", self.base, 2)
-        if base.ndim != 2 or len(base) < 2:
-            raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
+        base = _base_points(self.base)
         N = len(base)
-        if min(np.hypot(*(base[i] - base[j])) for i in range(N) for j in range(i)) < 1e-50:
-            raise ValueError(f"base = {base.tolist()} holds one point twice, to 1e-50 m; allowed: N different points")
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
         if lengths.max() > 1e6:
             raise ValueError(f"lengths = {lengths.tolist()} m; allowed: up to 1e6 m")
@@ -196,6 +192,16 @@ class Manipulator(Value):
         lo, hi = self.lengths.min(), self.lengths.max()
         links = f"{lo:g} m" if lo == hi else f"{lo:g} to {hi:g} m"
         return f"Manipulator({self.name!r}: {self.n_arms} arms, links {links}, working mode {self.signs})"
+
+
+def _base_points(value) -> np.ndarray:
+    """Base points (N, 2) of at least two arms, no two the same."""
+    base = real_array("base", value, 2)
+    if base.ndim != 2 or len(base) < 2:
+        raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
+    if min(np.hypot(*(base[i] - base[j])) for i in range(len(base)) for j in range(i)) < 1e-50:
+        raise ValueError(f"base = {base.tolist()} holds one point twice, to 1e-50 m; allowed: N different points")
+    return base
 
 
 def _per_link(name: str, value, N: int) -> np.ndarray:
