@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+from .arms import moving, placed, surroundings
 from .jit import leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2, stiffness, turned
+from .leaves import small_angle, solve2, stiffness, turned
 from .rows import *
 from .tables import *
 
@@ -26,31 +27,10 @@ def sense(lanes, arms, extra, table, o, w, dt):
         wanted, wanted_rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            chord, links, area2 = geometry(
-                w[at(BX, i, j, W, L)],
-                w[at(BY, i, j, W, L)],
-                w[at(L1SQ, i, j, W, L)],
-                w[at(HALF, i, j, W, L)],
-                w[at(MEAN, i, j, W, L)],
-                w[at(MODE, i, j, W, L)],
-                w[of(X, j, W, L)],
-                w[of(Y, j, W, L)],
+            chord, links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
+            m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(
+                extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             )
-            m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
-                w[at(S1, i, j, W, L)],
-                w[at(S2, i, j, W, L)],
-                w[at(L1SQ, i, j, W, L)],
-                w[at(L2SQ, i, j, W, L)],
-                links,
-                w[of(VX, j, W, L)],
-                w[of(VY, j, W, L)],
-            )
-            if extra is not None:
-                env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
-                gx, gy = drag(
-                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, links, rate
-                )
-                fx, fy = fx + gx, fy + gy
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
             s, t = turned(chord, scale * ux, scale * uy)
@@ -90,31 +70,10 @@ def pull(lanes, arms, extra, w):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            _, links, area2 = geometry(
-                w[at(BX, i, j, W, L)],
-                w[at(BY, i, j, W, L)],
-                w[at(L1SQ, i, j, W, L)],
-                w[at(HALF, i, j, W, L)],
-                w[at(MEAN, i, j, W, L)],
-                w[at(MODE, i, j, W, L)],
-                w[of(SX, j, W, L)],
-                w[of(SY, j, W, L)],
+            _, links, area2 = placed(0, w, i, j, W, L, w[of(SX, j, W, L)], w[of(SY, j, W, L)])
+            m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(
+                extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
             )
-            m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
-                w[at(S1, i, j, W, L)],
-                w[at(S2, i, j, W, L)],
-                w[at(L1SQ, i, j, W, L)],
-                w[at(L2SQ, i, j, W, L)],
-                links,
-                w[of(SVX, j, W, L)],
-                w[of(SVY, j, W, L)],
-            )
-            if extra is not None:
-                env = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
-                gx, gy = drag(
-                    w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, links, rate
-                )
-                fx, fy = fx + gx, fy + gy
             c = w[at(C, i, j, W, L)]
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c

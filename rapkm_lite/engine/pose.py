@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from .arms import placed
 from .jit import kernel, leaf, outlined
-from .leaves import geometry, pose_terms, solve2, turned
+from .leaves import pose_terms, solve2, turned
 from .rows import *
 from .tables import *
 
@@ -42,16 +43,7 @@ def link_rows(lanes, drives, arms, modelled, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            _, links, _ = geometry(
-                w[at(MODEL + BX, i, j, W, L)],
-                w[at(MODEL + BY, i, j, W, L)],
-                w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)],
-                w[at(MODEL + MEAN, i, j, W, L)],
-                w[at(MODEL + MODE, i, j, W, L)],
-                w[of(PX, j, W, L)],
-                w[of(PY, j, W, L)],
-            )
+            _, links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
             keep(modelled, w, i * L + j, W * L, links)
 
 
@@ -62,16 +54,7 @@ def newton_step(lanes, drives, arms, modelled, table, o, w, tolerance):
     for i in range(N):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            place = geometry(
-                w[at(MODEL + BX, i, j, W, L)],
-                w[at(MODEL + BY, i, j, W, L)],
-                w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)],
-                w[at(MODEL + MEAN, i, j, W, L)],
-                w[at(MODEL + MODE, i, j, W, L)],
-                w[of(PX, j, W, L)],
-                w[of(PY, j, W, L)],
-            )
+            place = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
             p11, p12, p22, gx, gy, near = pose_terms(
                 w[at(MODEL + L2SQ, i, j, W, L)], w[at(MODEL + SCALE, i, j, W, L)], place, ux, uy, w[at(E, i, j, W, L)]
             )
@@ -104,16 +87,7 @@ def single_step(arms, modelled, w, x, y):
     W = len(arms)
     m = MODEL * W
     for i in range(W):
-        place = geometry(
-            w[m + BX * W + i],
-            w[m + BY * W + i],
-            w[m + L1SQ * W + i],
-            w[m + HALF * W + i],
-            w[m + MEAN * W + i],
-            w[m + MODE * W + i],
-            x,
-            y,
-        )
+        place = placed(MODEL, w, i, 0, W, 1, x, y)
         p11, p12, p22, gx, gy, near = pose_terms(
             w[m + L2SQ * W + i],
             w[m + SCALE * W + i],
@@ -171,16 +145,7 @@ def gauss_newton(drives, arms, modelled, table, o, w, j, L, x, y, tolerance):
     for _ in range(50):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            chord, links, area2 = geometry(
-                w[at(MODEL + BX, i, j, W, L)],
-                w[at(MODEL + BY, i, j, W, L)],
-                w[at(MODEL + L1SQ, i, j, W, L)],
-                w[at(MODEL + HALF, i, j, W, L)],
-                w[at(MODEL + MEAN, i, j, W, L)],
-                w[at(MODEL + MODE, i, j, W, L)],
-                x,
-                y,
-            )
+            chord, links, area2 = placed(MODEL, w, i, j, W, L, x, y)
             if not area2 > 0.0:
                 return x, y, False
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)

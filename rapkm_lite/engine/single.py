@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from .arms import moving, placed, surroundings
 from .jit import index, kernel, leaf, outlined
-from .leaves import drag, geometry, share, small_angle, solve2, stiffness, turned
+from .leaves import small_angle, solve2, stiffness, turned
 from .plant import MOST_STEPS, STIFF, judge, mend
 from .rows import *
 from .tables import *
@@ -26,17 +27,10 @@ def sense(arms, extra, table, o, w, dt):
     fetch(COS, W, table, o, w)
     fetch(SIN, W, table, o, w)
     fetch(RATE, W, table, o, w)
-    env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
+    env = surroundings(w, 0, W, 1)
     for i in range(W):
-        chord, links, area2 = geometry(
-            w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
-        )
-        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], links, vx, vy
-        )
-        if extra is not None:
-            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, links, rate)
-            fx, fy = fx + gx, fy + gy
+        chord, links, area2 = placed(0, w, i, 0, W, 1, x, y)
+        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         scale = w[SCALE * W + i]
         s, t = turned(chord, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
         w[SINE * W + i], w[COSINE * W + i] = s, t
@@ -66,17 +60,10 @@ def join(arms, w):
 def acceleration(arms, extra, acting, w, x, y, vx, vy):
     """End-effector acceleration under the torques in the row `acting`."""
     W = len(arms)
-    env = w[of(GRAVITY_X, 0, W, 1)], w[of(GRAVITY_Y, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
+    env = surroundings(w, 0, W, 1)
     for i in range(W):
-        _, links, area2 = geometry(
-            w[BX * W + i], w[BY * W + i], w[L1SQ * W + i], w[HALF * W + i], w[MEAN * W + i], w[MODE * W + i], x, y
-        )
-        m11, m12, m22, fx, fy, bx, by, rate, _, _ = share(
-            w[S1 * W + i], w[S2 * W + i], w[L1SQ * W + i], w[L2SQ * W + i], links, vx, vy
-        )
-        if extra is not None:
-            gx, gy = drag(w[W1 * W + i], w[W2 * W + i], w[FRICTION * W + i], env, links, rate)
-            fx, fy = fx + gx, fy + gy
+        _, links, area2 = placed(0, w, i, 0, W, 1, x, y)
+        m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         c = w[acting * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c

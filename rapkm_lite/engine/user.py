@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+from .arms import placed
 from .jit import leaf, outlined, view
-from .leaves import geometry, smooth_sign, solve2
+from .leaves import smooth_sign, solve2
 from .rows import *
 from .tables import *
 
@@ -118,16 +119,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             link = base + want(table, o, ELBOW_RATE, i, W)
             den = ax * dy - ay * dx
         else:
-            _, (bx, by, lx, ly, _, _, den), _ = geometry(
-                w[m + BX * W],
-                w[m + BY * W],
-                l1sq,
-                w[m + HALF * W],
-                w[m + MEAN * W],
-                w[m + MODE * W],
-                w[of(PX, 0, W, 1)],
-                w[of(PY, 0, W, 1)],
-            )
+            _, (bx, by, lx, ly, _, _, den), _ = placed(MODEL, w, i, 0, W, 1, w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
             ax, ay, dx, dy = den * lx, den * ly, den * bx, den * by
             vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
             base, link = bx * vx + by * vy, -(lx * vx + ly * vy)
