@@ -10,9 +10,9 @@ from ..control.laws import PD, AntagonismFilter, CommandFilter
 from ..figures import marks
 from ..figures.machine import plane_limits
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
+from ..lessons.lesson07.tasks import set_points
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
-from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import polygon, triangle
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
@@ -161,21 +161,15 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     '0.0 mN m'
     """
     robot = frictionless(robot)
-    N, middle = robot.n_arms, robot.base.mean(axis=0)
+    middle = robot.base.mean(axis=0)
     ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     share = np.linalg.norm(path.x - ends[0], axis=-1) / np.linalg.norm(ends[1] - ends[0])
-
-    @lru_cache(maxsize=32)
-    def set_points(legs: int) -> np.ndarray:
-        """Base angles (k, N) in rad of drives that interpolate between the via points."""
-        at = np.linspace(0, 1, legs + 1)
-        via = np.unwrap(inverse_kinematics(robot, ends[0] + at[:, None] * (ends[1] - ends[0]))[:, :N], axis=0)
-        return np.stack([np.interp(share, at, via[:, i]) for i in range(N)], axis=-1)
+    between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, *ends, np.linspace(0, 1, legs + 1)))
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
-        q_a, samples, law = set_points(legs).copy(), late // 2, PD(7.05, 0.225)
+        q_a, samples, law = between(legs).copy(), late // 2, PD(7.05, 0.225)
         q_a[samples:, 0], q_a[:samples, 0] = q_a[: len(q_a) - samples, 0].copy(), q_a[0, 0]
         done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
         return done, antagonistic_torque(done)

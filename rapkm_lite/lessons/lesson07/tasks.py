@@ -82,7 +82,7 @@ def edge():
 def set_points(robot, path, start, end, shares) -> np.ndarray:
     """Base angles (k, N) of drives that move straight from via point to via point at `shares` of the edge, 0 and 1."""
     s = np.linalg.norm(path.x - start, axis=-1) / np.linalg.norm(np.subtract(end, start))
-    via = inverse_kinematics(robot, start + np.asarray(shares)[:, None] * np.subtract(end, start))
+    via = np.unwrap(inverse_kinematics(robot, start + np.asarray(shares)[:, None] * np.subtract(end, start)), axis=0)
     return np.stack([np.interp(s, shares, via[:, i]) for i in range(robot.n_arms)], axis=-1)
 
 
