@@ -1,6 +1,7 @@
 """Every law three times: alone in the compiled loop, in lanes, and through the textbook layer; and stiff friction."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -261,3 +262,21 @@ def test_friction_beyond_all_measure():
             rk.simulate(robot, law, still, OFFSET[:3])
         with pytest.raises(rk.SimulationError, match="run 0: .*" + words):
             rk.sweep(robot, law, still, [OFFSET[:3], -OFFSET[:3]])
+
+
+@pytest.mark.skipif(not COMPILED, reason="without a compiler")
+def test_a_loop_over_runs_fills_the_widest_registers_of_the_processor():
+    from llvmlite import binding
+    from numba import types
+
+    from rapkm_lite.engine.jit import outlined
+
+    def double(w):
+        for j in range(len(w)):
+            w[j] *= 2.0
+
+    loop: Any = outlined(double)
+    loop.compile((types.float64[::1],))
+    features = dict(binding.get_host_cpu_features())
+    lanes = 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+    assert f"<{lanes} x double>" in "".join(loop.inspect_llvm().values())
