@@ -18,7 +18,6 @@ def placed(first, w, i, j, W, L, x, y):
         w[at(first + BY, i, j, W, L)],
         w[at(first + L1SQ, i, j, W, L)],
         w[at(first + HALF, i, j, W, L)],
-        w[at(first + MEAN, i, j, W, L)],
         w[at(first + MODE, i, j, W, L)],
         x,
         y,

@@ -65,7 +65,7 @@ tanh = smooth_sign if COMPILED else math.tanh
 
 
 @leaf
-def geometry(base_x, base_y, l1sq, half, mean, mode, x, y):
+def geometry(base_x, base_y, l1sq, half, mode, x, y):
     """An arm with its tip at (x, y): chord r, k, h; links b, l, a.d, 1 / (a x d), a x d; and (a x d)^2, which is
     not positive outside the reach.
 
@@ -74,17 +74,20 @@ def geometry(base_x, base_y, l1sq, half, mean, mode, x, y):
     """
     X, Y = x - base_x, y - base_y
     rho2 = X * X + Y * Y
+    # a.r, of which a.a leaves a.d.
     kappa = 0.5 * rho2 + half
     area2 = l1sq * rho2 - kappa * kappa
     inside = max(area2, 1e-300)
     root, quotient = math.sqrt(inside), mode / (rho2 * inside)
     # Arms that only fill up a row have mode 0: all of theirs is zero.
     across = mode * inside * quotient
-    near, far, inv = root * (kappa * quotient), root * ((rho2 - kappa) * quotient), root * (rho2 * quotient)
+    scale = root * quotient
+    near, inv = kappa * scale, rho2 * scale
+    far = inv - near
     bx, by = far * X - across * Y, far * Y + across * X
     lx, ly = near * X + across * Y, near * Y - across * X
     chord = X, Y, kappa * across, root * (mode * across)
-    return chord, (bx, by, lx, ly, 0.5 * rho2 - mean, inv, mode * root), area2
+    return chord, (bx, by, lx, ly, kappa - l1sq, inv, mode * root), area2
 
 
 @leaf

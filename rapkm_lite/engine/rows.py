@@ -10,8 +10,8 @@ from __future__ import annotations
 from .jit import index
 
 # The arms of the machine as in `tables.arm_table`; those of the controller's model follow from MODEL on.
-BX, BY, L1SQ, L2SQ, HALF, MEAN, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCALE = range(15)
-MODEL = 15
+BX, BY, L1SQ, L2SQ, HALF, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCALE = range(14)
+MODEL = 14
 # What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
 OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
 # The machine at the sample: angle and rate, sine and cosine of the angle error, rows b, shares of the arms; what

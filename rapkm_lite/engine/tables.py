@@ -35,7 +35,7 @@ ANGLE, RATE, COS, SIN, ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, 
 
 
 def arm_table(robot, width: int) -> np.ndarray:
-    """The constants of each arm that the kernels need, (15, width), in the order of `rows`.
+    """The constants of each arm that the kernels need, (14, width), in the order of `rows`.
 
     Arms beyond the machine's are copies of its first one that reach as far, but have no mass, no friction, and elbows
     of no sign: their rows of A and all that they add to a sum are zero.
@@ -44,7 +44,7 @@ def arm_table(robot, width: int) -> np.ndarray:
     proximal, distal, _ = robot.arm_inertias.T
     w1, w2 = robot.arm_moments.T
     mass, none = _tip_masses(robot), np.arange(width) >= robot.n_arms
-    geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2, (l1**2 + l2**2) / 2]
+    geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2]
     masses = [proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction]
     table = np.stack([*geometry, robot.mode, *masses, 1 / l1, 1 / (l1 * l2)])[:, np.where(none, 0, np.arange(width))]
     table[len(geometry) : -2, none] = 0.0

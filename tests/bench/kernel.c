@@ -27,7 +27,7 @@ static inline int any_above(real v, double limit) {
 #define N 3
 #define EACH for (int i = 0; i < N; i++)
 
-typedef struct { double bx, by, l1sq, l2sq, half, mean, mode, s1, s2, tip, w1, w2, friction, scale, elbow_scale; } arm;
+typedef struct { double bx, by, l1sq, l2sq, half, mode, s1, s2, tip, w1, w2, friction, scale, elbow_scale; } arm;
 typedef struct { real ax, ay, ad, bx, by, lx, ly, inv, area2; } geo;
 
 static inline geo geometry(const arm *m, real x, real y) {
@@ -36,7 +36,7 @@ static inline geo geometry(const arm *m, real x, real y) {
     g.area2 = m->l1sq * rho2 - kappa * kappa;
     real den = m->mode * root(g.area2);
     real inverse = 1.0 / rho2, k = kappa * inverse, h = den * inverse;
-    g.ax = k * X + h * Y, g.ay = k * Y - h * X, g.ad = 0.5 * rho2 - m->mean, g.inv = 1.0 / den;
+    g.ax = k * X + h * Y, g.ay = k * Y - h * X, g.ad = kappa - m->l1sq, g.inv = 1.0 / den;
     g.bx = (X - g.ax) * g.inv, g.by = (Y - g.ay) * g.inv, g.lx = g.ax * g.inv, g.ly = g.ay * g.inv;
     return g;
 }
