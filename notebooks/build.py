@@ -5,7 +5,8 @@
     python notebooks/build.py figures        # nothing but the list of all figures
     python notebooks/build.py nbgrader FOLDER 04   # lessons for nbgrader: FOLDER/source/..., from the solutions
     python notebooks/build.py teaching       # nothing but the teachers' pages that follow from the lessons
-    python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises
+    python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises, answers
+    python notebooks/build.py 13 teaching    # that lesson, and the teachers' pages
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
@@ -51,6 +52,13 @@ def main(wanted: list[str]) -> None:
     def chosen(path: Path) -> bool:
         return not wanted or any(path.name.startswith(w) for w in wanted)
 
+    for word in wanted:
+        if word not in ("figures", "teaching") and not any(
+            path.name.startswith(word) for path in HERE.rglob("*.ipynb")
+        ):
+            sys.exit(
+                f"no notebook begins with {word!r}; allowed: the beginning of a notebook's name, figures, teaching"
+            )
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
     solved = {path.name for path in SOLUTIONS.glob("*.ipynb")}
     for path in sorted(filter(chosen, SOLUTIONS.glob("*.ipynb"))):
@@ -66,7 +74,10 @@ def main(wanted: list[str]) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["new"]:
-        new(*sys.argv[2:])
+        try:
+            new(*sys.argv[2:3] or [""])
+        except ValueError as error:
+            sys.exit(str(error))
     elif sys.argv[1:2] == ["nbgrader"]:
         nbgrader.export(Path(sys.argv[2]), sys.argv[3:])
     else:

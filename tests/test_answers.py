@@ -42,7 +42,8 @@ def test_four_of_five_wrong_answers_are_called_by_their_name():
 @pytest.mark.parametrize("name", sorted(exercises()))
 def test_every_exercise_has_answers_of_its_own(name):
     kinds = [row[1] for row in ROWS_OF if row[0] == name]
-    assert kinds.count("right") >= 1 and kinds.count("wrong") >= 4
+    words = f"tests/answers/answers{name[:2]}.py needs one right and four wrong answers to {name}"
+    assert kinds.count("right") >= 1 and kinds.count("wrong") >= 4, words
 
 
 class Odd:

@@ -25,7 +25,7 @@ def test_a_lesson_made_from_the_skeleton_is_green(tmp_path):
         shutil.copy(ROOT / name, tmp_path / name)
     run(tmp_path, "notebooks/build.py", "new", "97_turning_drives")
     run(tmp_path, "notebooks/build.py", "97")
-    tests = ("tests/test_lessons.py", "tests/test_figures.py", "notebooks")
+    tests = ("tests/test_lessons.py", "tests/test_figures.py", "tests/test_answers.py", "notebooks")
     options = ("-q", "-n0", "-p", "no:cacheprovider", "-k", "97 or figures_is_generated")
     said = run(tmp_path, "-m", "pytest", *options, *tests)
     assert "passed" in said and "failed" not in said

@@ -147,4 +147,4 @@ explore.machine()
 # - The rates of the drives are $A\dot x$; each row of $A$ is a worst direction and its length a worst rate.
 # - The drive that turns farthest per metre decides how fast the end-effector may move.
 #
-# **Applied:** limits of a pick-and-place path. **Where next:** back to the [overview](00_start_here.ipynb).
+# **Applied:** limits of a pick-and-place path. **Where next:** back to the [overview](../00_start_here.ipynb).

@@ -73,14 +73,17 @@ def cells(text: str) -> list[nbformat.NotebookNode]:
 
 
 def new(name: str) -> None:
-    """Lay out a lesson: its source in ``solutions/``, its room in ``rapkm_lite/lessons/``, its line in the README.
+    """Lay out a lesson: its source in ``solutions/``, its room in ``rapkm_lite/lessons/``, answers to its exercises in
+    ``tests/answers/``, its line in the README.
 
     Raises ValueError when the name is not like 13_title or its number is taken.
     """
     number, _, words = name.partition("_")
     room = PACKAGE / "lessons" / f"lesson{number}"
-    if not re.fullmatch(r"\d\d_[a-z0-9_]+", name) or room.exists():
-        raise ValueError(f"name = {name!r}; allowed: a number that no lesson has, and words, like 13_title")
+    if not re.fullmatch(r"\d\d_[a-z0-9_]+", name):
+        raise ValueError(f"name = {name!r}; allowed: a number of two digits and words, like 13_title")
+    if room.exists():
+        raise ValueError(f"name = {name!r}, but there is a lesson {number}; allowed: a number that no lesson has")
 
     def filled(path: Path) -> str:
         return path.read_text(encoding="utf-8").replace("NN", number).replace("TITLE", words.replace("_", " "))
@@ -90,6 +93,8 @@ def new(name: str) -> None:
     (room / "__init__.py").write_text(f'"""Lesson {number}: {words.replace("_", " ")}."""\n', encoding="utf-8")
     for part in ("figures.py", "exercises.py"):
         (room / part).write_text(filled(skeleton / part), encoding="utf-8")
+    answers = NOTEBOOKS.parent / "tests/answers" / f"answers{number}.py"
+    answers.write_text(filled(skeleton / "answers.py"), encoding="utf-8")
     notebook = nbformat.v4.new_notebook(cells=cells(filled(skeleton / "lesson.py")))
     tidy(notebook)
     nbformat.write(notebook, SOLUTIONS / f"{name}.ipynb")
@@ -100,4 +105,4 @@ def new(name: str) -> None:
     lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 46 | – | – |\n")
     readme.write_text("".join(lines), encoding="utf-8")
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
-    print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number}")
+    print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number} teaching")

@@ -103,7 +103,8 @@ def as_law(law) -> Law:
             return law
         if callable(law):
             return Function(law)
-    raise ValueError(f"law = {short(law)}; allowed: a law of this package or a function (t, q_a, qd_a, desired) -> c")
+    words = f"law = {short(law)}" + ", which is a class" * isinstance(law, type)
+    raise ValueError(f"{words}; allowed: a law, such as PD(7.0, 0.2), or a function (t, q_a, qd_a, desired) -> c")
 
 
 def begin(law, model: Manipulator, dt: float):

@@ -179,9 +179,12 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     table = blank_table(t, N)
     for fault in faults:
         drive = getattr(fault, "drive", 0)
-        if drive >= N:
-            raise ValueError(f"drive = {drive} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
-        fault.mark(table, t)
+        if not isinstance(drive, int | np.integer) or not 0 <= drive < N:
+            raise ValueError(f"drive = {drive!r} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
+        if fault.mark(table, t) is not None:
+            raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
+        if not np.isfinite(table.jump).all():
+            raise ValueError(f"{fault!r} writes what is not finite into table.jump; allowed: rad")
     return table
 
 
