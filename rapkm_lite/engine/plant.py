@@ -208,46 +208,21 @@ def hold(lanes, arms, extra, w, dt):
         step(lanes, arms, extra, w)
 
 
-@leaf
-def lowest(arms, w, j, L):
-    """The least (a x d)^2 of a run in a hold, or what its arms would have left of it."""
-    W = len(arms)
-    low = w[at(LOW, 0, j, W, L)]
-    for i in range(1, W):
-        low = min(low, w[at(LOW, i, j, W, L)])
-    return low
-
-
-@leaf
-def size_of(w, j, W, L):
-    """A number that is not below 1e300 where the state of a run is beyond all measure."""
-    return (abs(w[of(X, j, W, L)]) + abs(w[of(Y, j, W, L)])) + (abs(w[of(VX, j, W, L)]) + abs(w[of(VY, j, W, L)]))
-
-
 @outlined
 def judge(lanes, arms, w, k):
     """Mark the runs lost in the hold after sample k, or before it by their law; returns how many have ended."""
     L, W = len(lanes), len(arms)
     ended = 0
     for j in range(L):
-        sound = lowest(arms, w, j, L) > 0.0 and size_of(w, j, W, L) < 1e300 and w[of(STEPS, j, W, L)] <= MOST_STEPS
-        ended += 0 if sound and w[of(STATUS, j, W, L)] == DONE else 1
-    if ended > 0:
-        mark(lanes, arms, w, k)
-    return ended
-
-
-@outlined
-def mark(lanes, arms, w, k):
-    """Why runs that are not sound have ended, the first time that they are not."""
-    L, W = len(lanes), len(arms)
-    for j in range(L):
-        torque = 0.0
-        for i in range(W):
-            torque += abs(w[at(C, i, j, W, L)])
-        status = DONE if lowest(arms, w, j, L) > 0.0 and size_of(w, j, W, L) < 1e300 else LEFT_WORKSPACE
+        low, torque = w[at(LOW, 0, j, W, L)], abs(w[at(C, 0, j, W, L)])
+        for i in range(1, W):
+            low, torque = min(low, w[at(LOW, i, j, W, L)]), torque + abs(w[at(C, i, j, W, L)])
+        size = (abs(w[of(X, j, W, L)]) + abs(w[of(Y, j, W, L)])) + (abs(w[of(VX, j, W, L)]) + abs(w[of(VY, j, W, L)]))
+        status = DONE if low > 0.0 and size < 1e300 else LEFT_WORKSPACE
         status = status if torque < 1e300 else SINGULAR
         status = status if w[of(STEPS, j, W, L)] <= MOST_STEPS else TOO_STIFF
         running = w[of(STATUS, j, W, L)] == DONE
         w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
         w[of(STATUS, j, W, L)] = status if running else w[of(STATUS, j, W, L)]
+        ended += 1 if w[of(STATUS, j, W, L)] != DONE else 0
+    return ended
