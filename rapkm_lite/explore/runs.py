@@ -165,7 +165,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     share = np.linalg.norm(path.x - ends[0], axis=-1) / np.linalg.norm(ends[1] - ends[0])
-    between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, *ends, np.linspace(0, 1, legs + 1)))
+    between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1)))
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
