@@ -149,7 +149,7 @@ def test_result_is_an_array_of_energies():
         ({"offsets": np.zeros((0, 3))}, "allowed: at least one run"),
         ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
         ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
-        ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law of this package"),
+        ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law, such as PD"),
         ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise', 'mask'"),
         ({"chunk": 0}, "chunk = 0; allowed: >= 1"),
         ({"executor": 3}, "executor = 3; allowed: an executor"),
