@@ -1,5 +1,6 @@
 """Faults of drives and encoders, against their definitions in a few NumPy lines on what a run recorded."""
 
+import copy
 import pickle
 
 import numpy as np
@@ -200,6 +201,47 @@ def test_a_new_fault_is_one_class():
             np.minimum(table.limit, 0.05, out=table.limit)
 
     assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weak()]).c).max() == 0.05
+
+
+class Weaker(Fault):
+    """No dataclass: it is told apart by what it has set."""
+
+    def __init__(self, limit):
+        self.limit = limit
+
+    def mark(self, table, t):
+        np.minimum(table.limit, self.limit, out=table.limit)
+
+
+def test_a_new_fault_needs_to_be_no_dataclass():
+    fault = Weaker(0.05)
+    assert repr(fault) == "Weaker(limit=0.05)" and fault == Weaker(0.05) != Weaker(0.04)
+    assert hash(fault) == hash(Weaker(0.05)) and pickle.loads(pickle.dumps(fault)) == fault == copy.deepcopy(fault)
+    run = rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[fault])
+    assert np.abs(run.c).max() == 0.05 and pickle.loads(pickle.dumps(run)) == run
+    assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weaker(0.04)]).c).max() == 0.04
+
+
+@pytest.mark.parametrize(
+    ("drive", "write", "words"),
+    [
+        (-1, lambda table: None, r"drive = -1 in .*; allowed: 0 to 2"),
+        ("0", lambda table: None, r"drive = '0' in .*; allowed: 0 to 2"),
+        (0, lambda table: table, r"mark returns something; allowed: to write into the table"),
+        (0, lambda table: table.jump.fill(np.nan), r"no finite number into table\.jump"),
+        (0, lambda table: table.jump.fill(np.inf), r"no finite number into table\.jump"),
+        (0, lambda table: table.limit.fill(np.nan), r"no finite number into table\.jump or table\.limit"),
+    ],
+)
+def test_a_new_fault_that_marks_wrongly_is_named(drive, write, words):
+    class Wrong(Fault):
+        def mark(self, table, t):
+            return write(table)
+
+    Wrong.drive = drive
+    for call in (rk.simulate, rk.sweep):
+        with pytest.raises(ValueError, match=words):
+            call(ROBOT, PD, PATH, OFFSET, faults=[Wrong()])
 
 
 TOML = """

@@ -360,3 +360,31 @@ def test_a_step_must_answer_with_the_torques_and_the_memory():
         rk.simulate(ROBOT, Half(), PATH)
     with pytest.raises(NotImplementedError, match="no torque without its memory"):
         rk.PID(7.0, 1.0, 0.2).torque(ROBOT, None, None, None, None, None)
+
+
+class Kicking(rk.PD):
+    """A law of the package with more to say: a constant torque, and how often it was asked."""
+
+    def __init__(self, K_P, K_D, kick):
+        super().__init__(K_P, K_D)
+        self.kick, self._asked = kick, np.zeros(1)
+
+    def step(self, memory, sample):
+        self._asked += 1
+        c, memory = super().step(memory, sample)
+        return c + self.kick, memory
+
+
+def test_what_a_law_on_one_of_the_package_sets_besides_its_fields_belongs_to_it():
+    law, other = Kicking(7.0, 0.2, 1e-3), Kicking(7.0, 0.2, 2e-3)
+    assert law == Kicking(7.0, 0.2, 1e-3) != other and hash(law) == hash(Kicking(7.0, 0.2, 1e-3))
+    assert "kick=0.001" in repr(law) and copy.deepcopy(law) == law == pickle.loads(pickle.dumps(law))
+    first, second = (rk.simulate(ROBOT, law, PATH) for _ in range(2))
+    assert first == second and first.law._asked == len(PATH) and law._asked == 0
+    assert_allclose(first.c[0], 1e-3, rtol=0, atol=1e-12)
+    study = rk.sweep(ROBOT, [law, other, law], PATH, np.zeros((3, 3)))
+    assert_array_equal(study.energies[0], study.energies[2])
+    assert_array_equal(study.energies[0], first.energy)
+    assert_array_equal(study.energies[1], rk.simulate(ROBOT, other, PATH).energy)
+    around = rk.AntagonismFilter(law), rk.AntagonismFilter(other)
+    assert around[0] != around[1] and rk.simulate(ROBOT, around[0], PATH) != rk.simulate(ROBOT, around[1], PATH)

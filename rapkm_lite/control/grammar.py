@@ -176,7 +176,7 @@ class LawValue(Law, Value):
 
     def __repr__(self):
         parts = []
-        for name, value in self._fields().items():
+        for name, value in (self._fields() | self._own()).items():
             if name == "law":
                 parts.append(repr(value))
             elif not (name == "W" if value is None else np.ndim(value) == 0 and value == math.inf):

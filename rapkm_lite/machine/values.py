@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -131,7 +132,8 @@ class Value:
     `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
     pickling, ``copy.copy`` and ``copy.deepcopy``.  Two values are equal when they have the same type and equal fields
     (equal shapes and numbers; NaN equals NaN; functions and objects of a user as `likeness.equal` says); equal values
-    have equal hashes, computed once.
+    have equal hashes, computed once.  What a class of a user's sets besides its fields is compared, copied and printed
+    with them, and stays as it is.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -170,19 +172,31 @@ class Value:
     def _fields(self) -> dict[str, Any]:
         return {name: self.__dict__[name] for name in _names(type(self))}
 
+    def _own(self) -> dict[str, Any]:
+        """What a class of a user's has set besides its fields, without what is computed on demand and kept."""
+        kind, names = type(self), _names(type(self))
+        if kind.__module__.startswith("rapkm_lite."):
+            return {}
+        return {
+            name: value
+            for name, value in self.__dict__.items()
+            if name not in (*names, *_CACHES) and not isinstance(getattr(kind, name, None), cached_property)
+        }
+
     def __getstate__(self) -> dict:
-        return self._fields()
+        return self._fields() | self._own()
 
     def __setstate__(self, state: dict) -> None:
         # Unpickled and copied arrays come back writable.
-        self.__dict__.update({name: _frozen(value) for name, value in state.items()})
+        names = _names(type(self))
+        self.__dict__.update({name: _frozen(value) if name in names else value for name, value in state.items()})
 
     def __eq__(self, other) -> bool:
         if self is other:
             return True
         if type(self) is not type(other):
             return NotImplemented
-        return all(equal(self.__dict__[name], other.__dict__[name]) for name in _names(type(self)))
+        return equal((self._fields(), self._own()), (other._fields(), other._own()))
 
     def __hash__(self) -> int:
         if "_hash" not in self.__dict__:
@@ -192,24 +206,29 @@ class Value:
     def __repr__(self) -> str:
         """The call that makes the value: required fields by position, others by name where they differ from theirs."""
         parts = []
-        for field in dataclasses.fields(self):
+        for field in dataclasses.fields(self) if _names(type(self)) else ():
             value = self.__dict__[field.name]
             if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
                 parts.append(_typed(value))
             elif not equal(value, _frozen(field.default)):
                 parts.append(f"{field.name}={_typed(value)}")
+        parts += [f"{name}={_typed(value)}" for name, value in self._own().items()]
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
 _KINDS = ("Manipulator", "Trajectory", "Sensors", "PD", "str")
 """Kinds of fields that every value is held to, by the name of the class: some stand in rooms above."""
 
+_CACHES = ("_hash", "_tables")
+"""What is kept beside the fields and belongs to no value."""
+
 _known_names: dict[type, tuple[str, ...]] = {}
 
 
 def _names(cls: type) -> tuple[str, ...]:
     if cls not in _known_names:
-        _known_names[cls] = tuple(field.name for field in dataclasses.fields(cls))
+        fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
+        _known_names[cls] = tuple(field.name for field in fields)
     return _known_names[cls]
 
 

@@ -183,8 +183,8 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
             raise ValueError(f"drive = {drive!r} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
         if fault.mark(table, t) is not None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
-        if not np.isfinite(table.jump).all():
-            raise ValueError(f"{fault!r} writes what is not finite into table.jump; allowed: rad")
+        if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
+            raise ValueError(f"{fault!r} writes what is no finite number into table.jump or table.limit")
     return table
 
 
