@@ -222,6 +222,24 @@ def test_a_new_fault_needs_to_be_no_dataclass():
     assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weaker(0.04)]).c).max() == 0.04
 
 
+class Noise(Fault):
+    """It remembers what it has drawn."""
+
+    def __init__(self, seed):
+        self.random = np.random.default_rng(seed)
+
+    def mark(self, table, t):
+        table.jump[:] += 1e-3 * self.random.normal(size=table.jump.shape)
+
+
+def test_a_new_fault_with_memory_begins_anew_in_every_run():
+    fault = Noise(1)
+    first, second = (rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[fault]) for _ in range(2))
+    assert first == second and fault == Noise(1) and np.ptp(np.diff(first.c, axis=0)) > 1e-3
+    rows = rk.sweep(ROBOT, PD, PATH, OFFSET, faults=[fault]).energies
+    np.testing.assert_allclose(rows[0], first.energy, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("drive", "write", "words"),
     [

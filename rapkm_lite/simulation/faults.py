@@ -5,6 +5,7 @@ Drives count from 0, times are in s from the start of the run.  To add a fault, 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -181,7 +182,7 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
         drive = getattr(fault, "drive", 0)
         if not isinstance(drive, int | np.integer) or not 0 <= drive < N:
             raise ValueError(f"drive = {drive!r} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
-        if fault.mark(table, t) is not None:
+        if copy.deepcopy(fault).mark(table, t) is not None:  # what one remembers begins anew
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
         if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
             raise ValueError(f"{fault!r} writes what is no finite number into table.jump or table.limit")
