@@ -388,3 +388,94 @@ def test_what_a_law_on_one_of_the_package_sets_besides_its_fields_belongs_to_it(
     assert_array_equal(study.energies[1], rk.simulate(ROBOT, other, PATH).energy)
     around = rk.AntagonismFilter(law), rk.AntagonismFilter(other)
     assert around[0] != around[1] and rk.simulate(ROBOT, around[0], PATH) != rk.simulate(ROBOT, around[1], PATH)
+
+
+def test_a_formula_of_a_users_is_asked_or_refused():
+    """A run asks for `step`; a class that overrides `torque` alone must not run as if it had not."""
+
+    def kicked(base):
+        class Kicked(base):
+            def torque(self, *given):
+                return super().torque(*given) + 1e-3
+
+        return Kicked
+
+    plain, law = rk.PD(7.0, 0.2), kicked(rk.PD)(7.0, 0.2)
+    expected = rk.simulate(ROBOT, lambda t, q, qd, d: -7.0 * (q - d.q_a) - 0.2 * (qd - d.qd_a) + 1e-3, PATH, OFFSET)
+    assert_allclose(rk.simulate(ROBOT, law, PATH, OFFSET).c, expected.c, rtol=0, atol=1e-9)
+    assert_allclose(rk.sweep(ROBOT, law, PATH, OFFSET).energies[0], expected.energy, rtol=1e-9)
+    filtered = rk.simulate(ROBOT, rk.AntagonismFilter(law), PATH).c[0]
+    assert_allclose(filtered, rk.antagonism_filter(rk.control_matrix(ROBOT, PATH.q[0])) @ np.full(3, 1e-3), atol=1e-12)
+    assert np.abs(rk.simulate(ROBOT, kicked(rk.CTC)(400.0, 40.0), PATH).c[0] - 1e-3).max() < 1e-3
+    for refused in (
+        kicked(rk.PID)(7.0, 1.0, 0.2),
+        kicked(rk.AntagonismFilter)(plain),
+        kicked(rk.SwitchedCTC)(400.0, 40.0),
+        kicked(rk.CompiledLaw)(lambda t, q_a, qd_a, d: np.zeros(3)),
+        rk.AntagonismFilter(kicked(rk.PID)(7.0, 1.0, 0.2)),
+    ):
+        for call in (rk.simulate, rk.sweep):
+            with pytest.raises(ValueError, match=r"Kicked\.torque is of your own, but \w+\.step does not use it"):
+                call(ROBOT, refused, PATH, OFFSET)
+
+    class Doubled(rk.PD):
+        def gains(self, m):
+            return 2.0 * self.K_P * np.eye(m), self.K_D * np.eye(m)
+
+    doubled, gained = rk.simulate(ROBOT, rk.PD(14.0, 0.2), PATH, OFFSET), Doubled(7.0, 0.2)
+    assert_allclose(rk.simulate(ROBOT, gained, PATH, OFFSET).c, doubled.c, rtol=0, atol=1e-9)
+
+    class Pairs(rk.SwitchedCTC):
+        def pairs(self, model, q):
+            return np.tile([0, 1], (len(q), 1))
+
+    with pytest.raises(ValueError, match=r"Pairs\.pairs is of your own"):
+        rk.simulate(ROBOT, Pairs(400.0, 40.0), PATH)
+    Pairs.choose = lambda self, model, q, current=None: (0, 1)
+    assert set(map(tuple, rk.simulate(ROBOT, Pairs(400.0, 40.0), PATH).pairs.tolist())) == {(0, 1)}
+    for more in (law, gained, Kicking(7.0, 0.2, 1e-3)):
+        with pytest.raises(ValueError, match="is more than its gains; allowed: PD, whose commands are filtered"):
+            rk.CommandFilter(more)
+
+
+class Slotted(rk.PD):
+    __slots__ = ("kick",)
+
+    def __init__(self, kick):
+        super().__init__(7.0, 0.2)
+        self.kick = kick
+
+    def step(self, memory, sample):
+        return super().step(memory, sample)[0] + self.kick, memory
+
+
+class Looped(Slotted):
+    """What it has set leads back to itself."""
+
+    def __init__(self, kick):
+        super().__init__(kick)
+        self.double, self.kicked = lambda c: c + 2 * self.kick, self._kicked
+
+    def _kicked(self, c):
+        return c + self.kick
+
+
+class Louder(rk.CompiledLaw):
+    def step(self, memory, sample):
+        return super().step(memory, sample)[0] + 1e-3, memory
+
+
+def still(t, q_a, qd_a, d):
+    return np.zeros(3)
+
+
+def test_what_a_class_sets_is_copied_in_slots_and_in_circles():
+    assert Slotted(1e-3) == Slotted(1e-3) != Slotted(2e-3) and "kick=0.001" in repr(Slotted(1e-3))
+    for law in (Slotted(1e-3), pickle.loads(pickle.dumps(Slotted(1e-3))), Looped(1e-3), Louder(still)):
+        run = rk.simulate(ROBOT, law, PATH)
+        assert_allclose(run.c[0], 1e-3, rtol=0, atol=1e-12)
+        assert type(run.law) is type(law) and run == rk.simulate(ROBOT, law, PATH)
+    law = Looped(1e-3)
+    twin = copy.deepcopy(law)
+    assert law == Looped(1e-3) == twin != Looped(2e-3) and twin.kicked.__self__ is twin
+    assert "kick=0.001" in repr(law) and pickle.loads(pickle.dumps(Louder(still))) == Louder(still)

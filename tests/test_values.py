@@ -3,7 +3,7 @@
 import copy
 import functools
 import pickle
-from dataclasses import dataclass
+from dataclasses import FrozenInstanceError, dataclass, field
 
 import numpy as np
 import pytest
@@ -241,3 +241,73 @@ def test_what_cannot_be_looked_into_equals_only_itself():
     assert Sample(np.ones(1), (np.sin,)) == Sample(np.ones(1), (np.sin,)) != Sample(np.ones(1), (np.cos,))
     assert Sample(np.ones(1), (Spring,)) != Sample(np.ones(1), (Table,))
     assert Sample(np.ones(1), (Spring(1.0),)) != Sample(np.ones(1), (Table(np.ones(3)),))
+
+
+class Worn(rk.Sensors):
+    """Encoders of a user's, with an ``__init__`` of its own."""
+
+    def __init__(self, wear):
+        super().__init__()
+        self.wear = wear
+
+    @property
+    def count(self):
+        return self.wear
+
+
+class Tagged(rk.Manipulator):
+    def __init__(self, robot, tag):
+        super().__init__(**robot._fields())
+        self.tag = tag
+
+
+class Round(rk.Trajectory):
+    def __init__(self, robot, radius):
+        path = rk.circle(robot, radius, 0.1)
+        super().__init__(**path._fields())
+        self.radius = radius
+
+
+def test_changed_values_of_a_users_class_stay_of_that_class():
+    robot, path, pd = rk.load().replace(friction=0.0), rk.circle(rk.load(), 0.05, 0.1), rk.PD(7.0, 0.2)
+    worn, full = Worn(1e-2), Worn(1e-2).with_offset(np.zeros(3))
+    assert type(full) is Worn and full.wear == 1e-2 and full == full.with_offset([0.0, 0.0, 0.0]) != worn
+    run = rk.simulate(robot, pd, path, sensors=worn)
+    assert run == rk.simulate(robot, pd, path, sensors=full) and np.ptp(run.c) > 1e-3
+    other = Tagged(robot, "new").replace(masses=0.2, load=0.1)
+    assert type(other) is Tagged and other.tag == "new"
+    assert rk.Manipulator(**other._fields()) == robot.replace(masses=0.2, load=0.1)
+    with pytest.raises(ValueError, match="masses"):
+        Tagged(robot, "new").replace(masses=-1.0)
+    own = Round(robot, 0.05)
+    late = own.with_set_points(np.concatenate([own.q_a[:1], own.q_a[:-1]]))
+    assert type(late) is Round and late.radius == 0.05 and late.x is own.x and late.q_a[1, 0] == own.q_a[0, 0]
+    with pytest.raises(rk.SimulationError, match=r"at t = .* finite numbers"):
+        rk.simulate(robot, rk.compiled(lambda t, q_a, qd_a, d: np.full(3, np.nan if t > 0.05 else 0.0)), own)
+    with pytest.raises(rk.SimulationError, match="K_I = 9000"):
+        rk.simulate(robot, rk.PID(7.0, 9000.0, 0.2), Round(robot, 0.05).for_robot(robot), 4e-3)
+
+
+def test_fields_of_a_users_dataclass_may_come_later_or_stand_in_slots():
+    @dataclass(frozen=True, eq=False, repr=False)
+    class Later(rk.PD):
+        order: int = field(init=False, default=2)
+        size: int = field(init=False)
+
+        def __post_init__(self):
+            super().__post_init__()
+            self._set(size=self.K_P.size)
+
+    @dataclass(frozen=True, eq=False, repr=False, slots=True)
+    class Slots(rk.PD):
+        order: int = 2
+
+    for law in (Later([7.0, 7.0, 7.0], 0.2), Slots([7.0, 7.0, 7.0], 0.2)):
+        twin = copy.deepcopy(law)
+        assert twin == law and hash(twin) == hash(law) and law.order == 2 and "order=2" in repr(law)
+
+
+def test_no_law_of_the_package_takes_an_attribute():
+    for law in (rk.APD(7.0, 0.2), rk.CTC(400.0, 40.0), rk.RedundantCTC(400.0, 40.0)):
+        with pytest.raises(FrozenInstanceError):
+            law.label = "mine"

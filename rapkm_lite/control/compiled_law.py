@@ -13,7 +13,7 @@ import numpy as np
 
 from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
-from .grammar import LawValue
+from .grammar import UNASKED, LawValue
 
 SOURCES = ("desired", "measured", "true")
 
@@ -31,6 +31,7 @@ class CompiledLaw(LawValue):
     function: Callable
     at: str | None = None
     memory: int = 0
+    _unasked = UNASKED
 
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type):
@@ -51,6 +52,8 @@ class CompiledLaw(LawValue):
         return np.zeros(self.memory)
 
     def __reduce__(self):
+        if type(self) is not CompiledLaw:  # a class of a user's
+            return object.__new__, (type(self),), self.__getstate__()
         # The name of a decorated function stands for the law, which plain pickle would not take for the function.
         place = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "")
         try:

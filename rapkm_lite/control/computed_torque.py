@@ -37,7 +37,7 @@ from ..mechanics.dynamics import (
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .grammar import LawValue, gain, measured, seen
+from .grammar import UNASKED, LawValue, gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,6 +93,7 @@ class APD(LawValue):
         return matvec(weighted_pseudoinverse(A, self.W), force)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class CTC(APD):
     """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
 
@@ -127,6 +128,7 @@ class SwitchedCTC(LawValue):
     K_D: Array
     hysteresis: float = 1.2
     pose: str = "measured"
+    _unasked = UNASKED | {"pairs": "choose"}
 
     def __post_init__(self):
         self._check_pose()
@@ -137,8 +139,7 @@ class SwitchedCTC(LawValue):
     def step(self, memory, sample):
         q, qd = seen(sample).pose(self.pose)
         pair = self.choose(sample.model, q, memory)
-        law = self.fixed(pair)
-        return law.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair
+        return self.fixed(pair).torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair
 
     def coordinates(self, memory):
         return memory
@@ -168,8 +169,7 @@ class SwitchedCTC(LawValue):
 
     def fixed(self, pair) -> CTC:
         """The CTC law in force while `pair` is used."""
-        pair = joint_indices("pair", pair, None, 2, "drive")
-        return CTC(self.K_P, self.K_D, pair, pose=self.pose)
+        return CTC(self.K_P, self.K_D, joint_indices("pair", pair, None, 2, "drive"), pose=self.pose)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from reprlib import recursive_repr
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +37,9 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Desired
 
+UNASKED = {"torque": "step"}
+"""Formulas that the step of a law with more than a formula does not use, and what is asked instead."""
+
 
 class Law:
     """Base of all laws, also of those that users write.
@@ -55,6 +59,7 @@ class Law:
     """
 
     pose: str | None = "measured"
+    _unasked: ClassVar[dict[str, str]] = {}
 
     def start(self, model: Manipulator, dt: float):
         """The memory at the beginning of a run sampled every dt in s."""
@@ -110,13 +115,25 @@ def as_law(law) -> Law:
 def begin(law, model: Manipulator, dt: float):
     """`start` of a law or callable, after a check that a run can call it.
 
-    Raises ValueError where a method of a user's law takes other arguments.
+    Raises ValueError where a method of a user's law takes other arguments, or where no run would ask it.
     """
     law = as_law(law)
+    _check_asked(type(law))
     for name, given in _METHODS.items():
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
             callable_with(f"law.{name}", getattr(law, name), *given)
     return law.start(model, dt)
+
+
+def _check_asked(kind: type) -> None:
+    """Raise ValueError where a user's class has a formula of its own, and the step of a law of the package."""
+    base = next((c for c in kind.__mro__ if "step" in vars(c)), kind)
+    for name, instead in vars(base).get("_unasked", {}).items():
+        if getattr(kind, name) is not getattr(base, name) and getattr(kind, instead) is getattr(base, instead):
+            raise ValueError(
+                f"{kind.__name__}.{name} is of your own, but {base.__name__}.step does not use it; "
+                f"allowed: also a {instead} of your own, which is what a run asks for"
+            )
 
 
 _METHODS = {
@@ -174,6 +191,7 @@ def ask(law, memory, sample) -> tuple[np.ndarray, object]:
 class LawValue(Law, Value):
     """Base of the laws of this package: frozen dataclasses, compared by value, printed as typed."""
 
+    @recursive_repr()
     def __repr__(self):
         parts = []
         for name, value in (self._fields() | self._own()).items():

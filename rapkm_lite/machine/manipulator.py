@@ -149,17 +149,16 @@ class Manipulator(Value):
     def replace(self, **changes) -> Manipulator:
         """A copy with some values changed, e.g. ``robot.replace(friction=0.0)``.
 
-        Inertias and centres of mass that were not given follow changed masses and lengths.
+        Inertias and centres of mass that were not given follow changed masses and lengths.  A machine of a class of
+        yours stays one, and keeps what the class has set besides.
         Raises ValueError for an unknown name.
         """
         for key in changes:
             known("argument", key, [f.name for f in dataclasses.fields(self)])
         rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
         middles = np.array_equal(self.centers, self.lengths / 2)
-        values = self._fields()
-        values |= {"inertias": None} if rods else {}
-        values |= {"centers": None} if middles else {}
-        return Manipulator(**(values | changes))
+        changes = ({"inertias": None} if rods else {}) | ({"centers": None} if middles else {}) | changes
+        return self._changed(**changes)
 
     def with_arms(self, arms) -> Manipulator:
         """The machine that keeps only some arms (0-based); with two, an equivalent non-redundant five-bar (fig. 3).

@@ -20,9 +20,11 @@ A value is a frozen dataclass on the base `Value`:
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import dataclasses
 from functools import cached_property
+from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -169,17 +171,27 @@ class Value:
         made.__dict__.update(zip(_names(cls), fields, strict=True))
         return made
 
+    def _changed(self, **fields):
+        """A copy with other fields, checked; of the same class, whatever the ``__init__`` of a user's class takes."""
+        made = copy.copy(self)
+        made._set(**fields)
+        made.__post_init__()
+        return made
+
     def _fields(self) -> dict[str, Any]:
-        return {name: self.__dict__[name] for name in _names(type(self))}
+        """The fields by name, but for those that a class of a user's sets later."""
+        return {name: getattr(self, name) for name in _names(type(self)) if hasattr(self, name)}
 
     def _own(self) -> dict[str, Any]:
         """What a class of a user's has set besides its fields, without what is computed on demand and kept."""
         kind, names = type(self), _names(type(self))
         if kind.__module__.startswith("rapkm_lite."):
             return {}
+        state: Any = object.__getstate__(self)  # None when empty, a pair with `__slots__` of the class
         return {
             name: value
-            for name, value in self.__dict__.items()
+            for part in (state if isinstance(state, tuple) else (state,))
+            for name, value in (part or {}).items()
             if name not in (*names, *_CACHES) and not isinstance(getattr(kind, name, None), cached_property)
         }
 
@@ -189,25 +201,28 @@ class Value:
     def __setstate__(self, state: dict) -> None:
         # Unpickled and copied arrays come back writable.
         names = _names(type(self))
-        self.__dict__.update({name: _frozen(value) if name in names else value for name, value in state.items()})
+        self._set(**{name: _frozen(value) if name in names else value for name, value in state.items()})
 
     def __eq__(self, other) -> bool:
         if self is other:
             return True
         if type(self) is not type(other):
             return NotImplemented
-        return equal((self._fields(), self._own()), (other._fields(), other._own()))
+        # What is its own may lead back to the value, as a bound method does.
+        begun = frozenset({(id(self), id(other))})
+        return equal((self._fields(), self._own()), (other._fields(), other._own()), begun)
 
     def __hash__(self) -> int:
         if "_hash" not in self.__dict__:
             self.__dict__["_hash"] = hash((type(self), *map(key, self._fields().values())))
         return self.__dict__["_hash"]
 
+    @recursive_repr()
     def __repr__(self) -> str:
         """The call that makes the value: required fields by position, others by name where they differ from theirs."""
         parts = []
         for field in dataclasses.fields(self) if _names(type(self)) else ():
-            value = self.__dict__[field.name]
+            value = getattr(self, field.name, None)
             if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
                 parts.append(_typed(value))
             elif not equal(value, _frozen(field.default)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -132,7 +132,7 @@ class Trajectory(Desired):
         q_a = exact_array("q_a", q_a, k, N)
         qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, k, N)
         q, qd = (np.hstack([new, old[:, N:]]) for new, old in ((q_a, self.q), (qd_a, self.qd)))
-        return replace(self, q=q, qd=qd)
+        return self._changed(q=q, qd=qd)
 
     def __repr__(self):
         return f"Trajectory({len(self)} samples, {self.t[-1]:g} s, {self.robot.name!r})"

@@ -5,6 +5,7 @@ A run is repeated only with laws of this package; a user's law is never asked ab
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import linecache
 import math
@@ -234,7 +235,7 @@ def _with(setup: Setup, faults: list[Fault]) -> Setup:
     """The run with other faults; the table stays one, so that nothing is compiled anew."""
     table = blank_table(setup.trajectory.t, setup.robot.n_arms)
     for fault in faults:
-        fault.mark(table, setup.trajectory.t)
+        copy.deepcopy(fault).mark(table, setup.trajectory.t)
     return setup._replace(faults=table)
 
 
@@ -246,7 +247,7 @@ def _steadies(setup: Setup, law, k: int, factor: float | None) -> bool:
 
 def _runs(setup: Setup, law, k: int) -> bool:
     """Does this run go on well beyond sample k?"""
-    trajectory = dataclasses.replace(setup.trajectory.for_robot(setup.model), robot=setup.model)
+    trajectory = setup.trajectory.for_robot(setup.model)._changed(robot=setup.model)
     setup = setup._replace(trajectory=trajectory).begin(k + k // 2 + 100)
     try:
         code = encode(law, setup.model)

@@ -56,7 +56,7 @@ class Sensors(Value):
 
     def with_offset(self, offset) -> Sensors:
         """The same with other offsets."""
-        return Sensors(offset, self.encoder, self.velocity_filter)
+        return self._changed(offset=offset)
 
 
 class Encoders:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from typing import NamedTuple
@@ -37,7 +36,7 @@ class Setup(NamedTuple):
         motion = {name: getattr(path, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
         if faults is not None:
             faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
-        return self._replace(trajectory=dataclasses.replace(path, **motion), faults=faults)
+        return self._replace(trajectory=path._changed(**motion), faults=faults)
 
 
 class Outcome(NamedTuple):
