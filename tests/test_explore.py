@@ -363,12 +363,12 @@ def test_stored_picture_is_painted(name):
     assert explorer.about and explorer.about in explorer.sentence
 
 
+@pytest.mark.parametrize("end", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
-def test_code_brings_the_setting_back(name):
+def test_code_brings_the_setting_back(name, end):
     explorer = made(name)
     for control, widget in explorer.controls.items():
-        low, high = ends(widget)
-        explorer.set(**{control: high if explorer.values[control] == low else low})
+        explorer.set(**{control: ends(widget)[end]})
     values, code = explorer.values, explorer.code
     explorer.reset()
     again = eval(code, {"explore": explore})

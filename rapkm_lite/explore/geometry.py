@@ -69,7 +69,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
                 picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
         A = act.control_matrix(robot, q)
         numbers = {
-            "end-effector": f"({1e3 * point[0]:.0f}, {1e3 * point[1]:.0f}) mm",
+            "end-effector": f"({1e3 * point[0]:z.0f}, {1e3 * point[1]:z.0f}) mm",
             "degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
             "σ_min of all drives": f"{act.singular_values(A)[1]:.2f} rad/m",
         }
@@ -146,7 +146,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         picture.limits("force", x=picture.ylim("force"))
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
-            "point": f"({1e3 * t.x[k, 0]:.0f}, {1e3 * t.x[k, 1]:.0f}) mm",
+            "point": f"({1e3 * t.x[k, 0]:z.0f}, {1e3 * t.x[k, 1]:z.0f}) mm",
             "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
             "σ_min of the pairs": marks.per_drive(sigma[k], 2) + " rad/m",
             "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",

@@ -155,8 +155,8 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     wide = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (left, right), "ylim": (low, high)}
     panels = {
         "machine": wide,
-        "moving": over_time("torque in mN m", robot=robot, title="moves"),
-        "pressing": over_time("torque in mN m", title="only presses"),
+        "moving": over_time("torque in mN m", robot=robot, title="Moves"),
+        "pressing": over_time("torque in mN m", title="Only presses"),
     }
     controls = {
         "radius": slider("base joints from the middle in mm", 200, 320, 5, 230),

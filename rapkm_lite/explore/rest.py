@@ -102,9 +102,12 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             target = rest + (level[i] - normal[i] @ rest) * normal[i]
             picture.line("opinions", *ends.T, **arm_line(i) | {"linewidth": 2.4})
             picture.line("opinions", *np.stack([rest, target]).T, color=arm_colour(i), linewidth=6, alpha=0.55)
-            knob = level[i] * normal[i] + 0.72 * half * along
+            # The knob slides along its line until it is in the panel; its number is on the side of the middle.
+            places = level[i] * normal[i] + half * np.outer(np.linspace(0.72, -0.72, 145), along)
+            knob = places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))]
+            side = -0.21 * half * np.sign(level[i] or 1.0)
             words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
-            picture.text("opinions", *(knob + 0.21 * half * normal[i]), f"{i + 1}", **words, zorder=6)
+            picture.text("opinions", *(knob + side * normal[i]), f"{i + 1}", **words, zorder=6)
             picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
         corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
         if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
@@ -116,7 +119,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         picture.fit("torque", 1.25 * torque, least=10.0)
         apart = np.abs(normal @ rest - level)
         return {
-            "rest": f"({rest[0] + 0.0:.2f}, {rest[1] + 0.0:.2f}) mm beside the desired point",
+            "rest": f"({rest[0]:z.2f}, {rest[1]:z.2f}) mm beside the desired point",
             "distances from the lines": marks.per_drive(apart, 2) + " mm",
             "torque at rest": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
@@ -166,16 +169,20 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         S11, S12 = S[:2, :2], S[:2, 2:]
         centre = -np.linalg.solve(S11, S12 @ dq[2:])
         rest = dq[2:] @ S[2:, 2:] @ dq[2:] - centre @ S11 @ centre
-        root = np.linalg.inv(np.linalg.cholesky(S11)).T
+        root, taken = np.linalg.inv(np.linalg.cholesky(S11)).T, [dq[:2]]
         for k, level in enumerate(LEVELS):
             if level > rest:
                 ring = centre[:, None] + np.sqrt(level - rest) * root @ wheel
                 shade = str(0.62 - 0.55 * k / (len(LEVELS) - 1))
                 picture.line("map", *ring, color=shade, linewidth=1.6)
-                # The number stands where the lines are far apart.
+                # The number stands where the lines are far apart, and on no other.
                 away = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1]
-                k = np.argmax(np.where(np.abs(ring).max(axis=0) < 10.5, away, -1.0))
-                if np.abs(ring[:, k]).max() < 10.5:
+                away[np.abs(ring).max(axis=0) > 10.5] = -1.0
+                for other in taken:
+                    away[np.all(np.abs(ring.T - other) < [4.0, 1.8], axis=1)] = -1.0
+                k = np.argmax(away)
+                if away[k] > 0:
+                    taken.append(ring[:, k])
                     picture.text("map", *ring[:, k], f"{level:g} J", fontsize=9, color=shade, ha="center", va="center")
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))

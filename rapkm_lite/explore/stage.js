@@ -34,8 +34,6 @@ export function ticks(low, high, most = 6, log = false) {
   return out;
 }
 
-const remade = (object, change) => Object.fromEntries(Object.entries(object).map(([name, v]) => [name, change(v)]));
-
 /** The marks of a message; `known` = {styles, images} keeps what is sent only once. */
 export function decode(message, buffers, known) {
   Object.assign(known.styles, message.styles);
@@ -52,13 +50,12 @@ export function decode(message, buffers, known) {
   });
 }
 
-/** The box of a panel in its canvas and what lies around it: {box, at, texts, strokes, bar}; width(words) measures. */
+/** The box of a panel in its canvas, what lies around it, how many pixels a point has, how far the box is aside. */
 export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width) {
   const fixed = (values) => Array.from(values ?? [], (v) => ({ at: v, words: minus(v) }));
   const widest = (list) => Math.max(0, ...list.map((t) => width(t.words)));
   const top = 0.7 * font, bottom = spec.xticks?.length === 0 ? top : 1.6 * font;
-  const tall = Math.max(high - top - bottom, 10);
-  const most = Math.min(Math.max(Math.floor(tall / (2.2 * font)), 2), 7);
+  const tall = Math.max(high - top - bottom, 10), most = Math.min(Math.max(Math.floor(tall / (2.2 * font)), 2), 7);
   const y = spec.yticks ? fixed(spec.yticks) : ticks(y0, y1, most, spec.yscale === "log");
   // At least four digits have room, so that the box seldom moves while a control does.
   const left = y.length ? Math.max(widest(y), width("−100")) + 0.6 * font : top;
@@ -71,7 +68,7 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
   const fits = (list) => list.length * (widest(list) + 0.6 * font) < box.width;
   const tried = [8, 6, 5, 4, 3, 2, 1].map((count) => ticks(x0, x1, count));
   const x = spec.xticks ? fixed(spec.xticks) : (tried.find(fits) ?? []);
-  const right = box.left + box.width, foot = box.top + box.height;
+  const right = box.left + box.width, foot = box.top + box.height, thin = spec.small ? Math.min(box.width / 120, 1) : 1;
   const up = spec.yscale === "log" ? (y) => Math.log(y / y0) / Math.log(y1 / y0) : (y) => (y - y0) / (y1 - y0);
   const at = (x, y) => [box.left + (box.width * (x - x0)) / (x1 - x0), box.top + box.height * (1 - up(y))];
   const texts = [], strokes = [];
@@ -88,11 +85,12 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
     put(t.words, box.left - 0.4 * font, py, "right", "center");
   }
   if (x.length) rule("axis", box.left, box.top, box.left, foot, right, foot);
-  const step = box.height / Math.max(levels.length - 1, 1), bar = right + 0.6 * font;
-  levels.forEach((level, k) => put(level.words, bar + 1.2 * font, foot - k * step, "left", "center"));
-  return { box, at, texts, strokes, bar: [bar, foot, 0.9 * font, step] };
+  const step = box.height / Math.max(levels.length - 1, 1), bar = [right + 0.6 * font, foot, 0.9 * font, step];
+  levels.forEach((level, k) => put(level.words, bar[0] + 1.2 * font, foot - k * step, "left", "center"));
+  return { box, at, texts, strokes, bar, point: POINT * thin, aside: [box.left - left, (box.top - top) / 2] };
 }
 
+const remade = (object, change) => Object.fromEntries(Object.entries(object).map(([name, v]) => [name, change(v)]));
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
 const css = (c) => `rgb(${c.join()})`, mix = (a, b, share) => a.map((v, k) => Math.round(v + share * (b[k] - v)));
 const shine = (c) => [0.2126, 0.7152, 0.0722].reduce((sum, w, k) => sum + w * ((c[k] / 255 + 0.055) / 1.055) ** 2.4, 0);
@@ -108,7 +106,8 @@ export function themeOf(el) {
     let c = rgb(hex);
     if (shine(c) > 0.95 || shine(c) < 0.02) return shine(c) > 0.95 ? tones.paper : tones.ink;
     if (fill && shine(c) > 0.6) return css(mix(paper, c, 0.16));
-    while (contrast(c, paper) < (fill ? 3 : 4.5)) c = mix(c, [255, 255, 255], 0.15);
+    if (new Set(c).size === 1) c = mix(ink, paper, c[0] / 255); // darker grey is brighter
+    while (contrast(c, paper) < (fill ? 3 : 4.5)) c = mix(c, [255, 255, 255], 0.05);
     return css(c);
   };
   return { dark, colour };
@@ -134,13 +133,13 @@ class Panel {
     if (heading.words !== words) rich(heading, (heading.words = words));
     Object.assign(heading.style, { color: theme.colour(color) ?? "", fontWeight: bold ? 700 : 400 });
     if (told === this.told) return;
-    const entries = legend.map(([words, { color, width, dash, alpha }]) => {
+    this.head.replaceChildren(heading, make("div"));
+    this.head.lastChild.append(...legend.map(([words, { color, width, dash, alpha }]) => {
       const entry = rich(make("span"), words), dashes = dash.map((d) => d * width * POINT).join(" ");
       const look = `stroke="${theme.colour(color)}" stroke-width="${width * POINT}" stroke-dasharray="${dashes}"`;
       entry.insertAdjacentHTML("afterbegin", `<svg><line x2="26" y1="5" y2="5" ${look} opacity="${alpha}"/></svg>`);
       return entry;
-    });
-    this.head.replaceChildren(heading, ...entries);
+    }));
     this.told = told;
   }
 
@@ -179,7 +178,8 @@ class Panel {
     this.size = (points) => Math.max((points / 10.5) * look.base, look.floor);
     const font = 0.92 * this.size(10.5);
     const plan = layout(this.spec, palette, frame, [wide, high], font, (words) => this.pieces(words, font));
-    const { box, bar: [x, y, w, h] } = Object.assign(this, plan);
+    const { box, bar: [x, y, w, h], aside } = Object.assign(this, plan);
+    this.ylabel.style.translate = `${aside[0]}px ${aside[1]}px`;
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     ctx.clearRect(0, 0, wide, high);
     for (const [style, points] of plan.strokes) stroke(this, points, style);
@@ -214,8 +214,8 @@ function trace(ctx, points, closed = false) {
   if (closed && down) ctx.closePath();
 }
 
-function stroke({ ctx, theme }, points, { width, color, cap = "butt", dash = [] }, closed = false) {
-  const lineWidth = width * POINT;
+function stroke({ ctx, theme, point }, points, { width, color, cap = "butt", dash = [] }, closed = false) {
+  const lineWidth = width * point;
   if (!(lineWidth > 0) || !color) return;
   Object.assign(ctx, { lineWidth, strokeStyle: theme.colour(color), lineCap: cap, lineJoin: "round" });
   ctx.setLineDash(dash.map((d) => d * lineWidth));
@@ -233,7 +233,7 @@ const SHAPES = {
 };
 
 function line(panel, { points }, style) {
-  const path = pixels(panel, points), { marker, face, color, edge: width } = style, r = (style.size * POINT) / 2;
+  const path = pixels(panel, points), { marker, face, color, edge: width } = style, r = (style.size * panel.point) / 2;
   stroke(panel, path, style);
   for (let k = 0; marker && k < path.length; k += 2)
     area(panel, SHAPES[marker].map((v, j) => path[k + (j % 2)] + r * v), { face, color, width });
@@ -254,7 +254,7 @@ function words(panel, { kind, points, words }, style) {
   if (x < box.left - 1 || x > right + 1 || y < box.top - 1 || y > foot + 1) return;
   const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold), left = x - wide * SHARE[style.ha];
   // Words that would cover others step aside, away from what they name.
-  const near = ([a, b, c, s], up) => left < c && left + wide > a && Math.abs(y + up - b) < 0.6 * (s + size);
+  const near = ([a, b, c, s], up) => left - 3 < c && left + wide + 3 > a && Math.abs(y + up - b) < 0.6 * (s + size);
   const way = (style.va === "top" ? 0.5 : -0.5) * size;
   let up = 0;
   while (Math.abs(up) < 3 * size && panel.taken.some((t) => near(t, up))) up += way;
@@ -381,7 +381,7 @@ export function mount(el, scene, link) {
     Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
-    knob.style.translate = `${x}px ${y}px`;
+    knob.style.translate = `${x}px ${y - 14 * bare}px`; // above the numbers of the axis
     knob.onkeydown = (event) => {
       const by = steps(handle, event.key, event.shiftKey);
       if (by) event.preventDefault();
@@ -418,13 +418,13 @@ export function mount(el, scene, link) {
     Object.assign(state, { marks, places: message.places ?? {}, code: message.code ?? "" });
     // While there is a problem the last handles stay, as the way back.
     if (message.handles.length || !message.problem) state.handles = message.handles;
-    Object.assign(problem, { textContent: message.problem ?? "", hidden: !message.problem });
+    Object.assign(problem, { textContent: minus(message.problem ?? ""), hidden: !message.problem });
     numbers.replaceChildren(...(message.numbers ?? []).map(([name, text]) => {
       const span = rich(make("span"), `${name}: `);
       rich(make("b", {}, span), minus(text));
       return span;
     }));
-    if (message.note || message.from) say(message.note ?? "");
+    if (message.note || message.from) say(minus(message.note ?? ""));
     root.classList.add("live");
     paint();
     Object.assign(root.dataset, { drawn: ++state.drawn, places: JSON.stringify(state.places) });
@@ -492,7 +492,7 @@ export function mount(el, scene, link) {
   function typed({ target, key = "Enter" }) {
     if (key !== "Enter" || !target.matches?.(".widget-readout") || !around()?.contains(target)) return;
     const number = () => Number(target.textContent.replace("−", "-")), before = number();
-    setTimeout(() => before === number() || say(`${before} was rounded to ${number()}`), 400);
+    setTimeout(() => before === number() || say(minus(`${before} was rounded to ${number()}`)), 400);
   }
 
   // A new style sheet may come late, so the picture is painted again for a while.

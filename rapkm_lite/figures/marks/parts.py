@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from ...machine.arguments import positive_number
@@ -100,7 +102,7 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
         for i, value in enumerate(values):
             at = i + 1 + (k - (len(groups) - 1) / 2) * width
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
-            words = format(value + 0.0, form).replace("-", "−")
+            words = re.sub("^−(?=[0.]+$)", "", format(value, form).replace("-", "−"))
             picture.text(panel, at, value, words, ha="center", fontsize=9, va="bottom" if value >= 0 else "top")
 
 
