@@ -106,8 +106,8 @@ export function themeOf(el) {
     let c = rgb(hex);
     if (shine(c) > 0.95 || shine(c) < 0.02) return shine(c) > 0.95 ? tones.paper : tones.ink;
     if (fill && shine(c) > 0.6) return css(mix(paper, c, 0.16));
-    if (new Set(c).size === 1) c = mix(ink, paper, c[0] / 255); // darker grey is brighter
-    while (contrast(c, paper) < (fill ? 3 : 4.5)) c = mix(c, [255, 255, 255], 0.05);
+    if (new Set(c).size === 1) c = mix(ink, paper, Math.min(c[0] / 255, 0.5)); // a darker grey is brighter
+    while (contrast(c, paper) < (fill ? 3 : 4.5)) c = mix(c, [255, 255, 255], 0.15);
     return css(c);
   };
   return { dark, colour };
