@@ -67,6 +67,8 @@ def assert_sound(explorer):
     words = " ".join([*explorer.numbers.values(), explorer.sentence, explorer.code])
     assert "nan" not in words.lower() and "inf " not in words.lower(), words
     assert bool(explorer.numbers) != bool(explorer.problem)
+    seen = " ".join([*explorer.numbers.values(), *(m.words for m in marks(explorer) if m.kind in ("label", "words"))])
+    assert not re.search(r"[−-]0(\.0*)?(?![.\d])", seen), f"a zero has a sign: {seen}"
     header, buffers = encode(explorer.picture, explorer.picture.fixed + marks(explorer), {})
     assert json.loads(json.dumps(header))["frames"] and len(buffers) == 1 + len(header["images"])
 
@@ -463,6 +465,17 @@ def test_opinions_agree_on_a_triangle_that_is_closed():
     assert explorer.numbers["distances from the lines"] == "0.00 / 0.00 / 0.00 mm"
     explorer.set(offset_3=third + 3.0)
     assert explorer.numbers["torque at rest"] != "0.0 / 0.0 / 0.0 mN m"
+
+
+def test_knobs_stay_in_their_panel_and_numbers_of_level_lines_apart():
+    explorer = made("three_opinions")
+    for corner in itertools.product((-12.0, 12.0), repeat=3):
+        explorer.set(**dict(zip(("offset_1", "offset_2", "offset_3"), corner, strict=True)))
+        assert np.abs([handle["at"] for handle in explorer.picture.handles]).max() < 3
+    explorer = made("landscape").set(offset_1=-10.0, offset_2=10.0, offset_3=-10.0, K_P=29.0, side=20, shift=60)
+    places = [m.data[0] for m in marks(explorer) if (m.kind, m.panel) == ("label", "map")]
+    assert len(places) == 6
+    assert all(np.any(np.abs(p - q) >= [4.0, 1.8]) for p, q in itertools.combinations(places, 2))
 
 
 def test_a_failure_in_the_kernel_blocks_nobody():
