@@ -74,7 +74,7 @@ def geometry(base_x, base_y, l1sq, half, mode, x, y):
     """
     X, Y = x - base_x, y - base_y
     rho2 = X * X + Y * Y
-    # a.r, of which a.a leaves a.d.
+    # kappa = a.r, and a.d = a.r - a.a.
     kappa = 0.5 * rho2 + half
     area2 = l1sq * rho2 - kappa * kappa
     inside = max(area2, 1e-300)

@@ -142,6 +142,7 @@ def check(name: str, widget, value) -> None:
         if isinstance(widget, widgets.IntSlider) and not number.is_integer():
             raise ValueError(f"{name} = {number:g}; allowed: whole numbers")
         low, high = _ends(widget)
+        # `tidied` keeps twelve digits.
         slack = 1e-11 * max(abs(low), abs(high))
         if not low - slack <= number <= high + slack:
             raise ValueError(f"{name} = {number:g}; allowed: {low:g} to {high:g}")
