@@ -186,6 +186,9 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     lanes, drives, arms, faulty, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     rows = len(table) // columns
+    if history is not None:
+        if clock.first == 0:
+            single.begin(arms, w)
     for row in range(rows):
         k, o = counted(clock.first + row), counted(row * columns)
 

@@ -1,4 +1,8 @@
-"""`sense` and `hold` of `plant` for one run, its arms side by side in a vector register and its state in scalars."""
+"""`sense` and `hold` of `plant` for one run, its arms side by side in a vector register and its state in scalars.
+
+Where a stage of the Runge-Kutta step is, the stage before the last one says: its geometry is made one stage ahead, in
+the same loop over the arms, and kept in the rows PLACE and OTHER by turns.  A processor then does both at a time.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,34 @@ def fetch(block, W, table, o, w):
 
 
 @leaf
+def put_place(arms, place, w, i, x, y):
+    """Keep the geometry of arm i, the end-effector at (x, y), in the rows from `place` on."""
+    W = len(arms)
+    (_, _, k, h), (bx, by, lx, ly, ad, inv, den), area2 = placed(0, w, i, 0, W, 1, x, y)
+    w[place * W + i], w[(place + 1) * W + i], w[(place + 2) * W + i], w[(place + 3) * W + i] = bx, by, lx, ly
+    w[(place + 4) * W + i], w[(place + 5) * W + i], w[(place + 6) * W + i] = ad, inv, den
+    w[(place + 7) * W + i], w[(place + 8) * W + i], w[(place + 9) * W + i] = k, h, area2
+
+
+@leaf
+def get_place(arms, place, w, i):
+    """Links, k and h of the chord, and (a x d)^2 of arm i from the rows that `put_place` wrote."""
+    W = len(arms)
+    bx, by, lx, ly = w[place * W + i], w[(place + 1) * W + i], w[(place + 2) * W + i], w[(place + 3) * W + i]
+    ad, inv, den = w[(place + 4) * W + i], w[(place + 5) * W + i], w[(place + 6) * W + i]
+    k, h, area2 = w[(place + 7) * W + i], w[(place + 8) * W + i], w[(place + 9) * W + i]
+    return (bx, by, lx, ly, ad, inv, den), k, h, area2
+
+
+@outlined
+def begin(arms, w):
+    """The first place of a run."""
+    W = len(arms)
+    for i in range(W):
+        put_place(arms, PLACE, w, i, w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)])
+
+
+@leaf
 def sense(arms, extra, table, o, w, dt):
     """As `plant.sense`."""
     W = len(arms)
@@ -29,9 +61,10 @@ def sense(arms, extra, table, o, w, dt):
     fetch(RATE, W, table, o, w)
     env = surroundings(w, 0, W, 1)
     for i in range(W):
-        chord, links, area2 = placed(0, w, i, 0, W, 1, x, y)
+        links, k, h, area2 = get_place(arms, PLACE, w, i)
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         scale = w[SCALE * W + i]
+        chord = x - w[BX * W + i], y - w[BY * W + i], k, h
         s, t = turned(chord, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
         w[SINE * W + i], w[COSINE * W + i] = s, t
         w[NEAR * W + i] = min(0.1 - abs(s), t)
@@ -42,6 +75,7 @@ def sense(arms, extra, table, o, w, dt):
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i], w[ACC * W + i] = fx, fy, acc
         w[LOW * W + i] = min(area2, 1.0 - dt * decay)
+        put_place(arms, OTHER, w, i, x + 0.5 * dt * vx, y + 0.5 * dt * vy)
     near = w[NEAR * W]
     for i in range(1, W):
         near = min(near, w[NEAR * W + i])
@@ -57,37 +91,34 @@ def join(arms, w):
 
 
 @leaf
-def acceleration(arms, extra, acting, w, x, y, vx, vy):
-    """End-effector acceleration under the torques in the row `acting`."""
+def acceleration(arms, extra, acting, place, other, w, vx, vy, x, y):
+    """End-effector acceleration at a place under the torques in the row `acting`; the other one is put at (x, y)."""
     W = len(arms)
     env = surroundings(w, 0, W, 1)
     for i in range(W):
-        _, links, area2 = placed(0, w, i, 0, W, 1, x, y)
+        links, _, _, area2 = get_place(arms, place, w, i)
         m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         c = w[acting * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
         w[LOW * W + i] = min(w[LOW * W + i], area2)
+        put_place(arms, other, w, i, x, y)
     return join(arms, w)
 
 
 @leaf
 def step(arms, extra, acting, w, x, y, vx, vy, k1x, k1y, dt):
-    """A Runge-Kutta step (order 4) after its first stage."""
+    """A Runge-Kutta step (order 4) after its first stage, from PLACE to PLACE; half of it at rate v leads to OTHER."""
     h = 0.5 * dt
     ux, uy = vx + h * k1x, vy + h * k1y
-    k2x, k2y = acceleration(arms, extra, acting, w, x + h * vx, y + h * vy, ux, uy)
+    k2x, k2y = acceleration(arms, extra, acting, OTHER, PLACE, w, ux, uy, x + h * ux, y + h * uy)
     wx, wy = vx + h * k2x, vy + h * k2y
-    k3x, k3y = acceleration(arms, extra, acting, w, x + h * ux, y + h * uy, wx, wy)
+    k3x, k3y = acceleration(arms, extra, acting, PLACE, OTHER, w, wx, wy, x + dt * wx, y + dt * wy)
     zx, zy = vx + dt * k3x, vy + dt * k3y
-    k4x, k4y = acceleration(arms, extra, acting, w, x + dt * wx, y + dt * wy, zx, zy)
     s = dt / 6.0
-    return (
-        x + s * (vx + 2.0 * (ux + wx) + zx),
-        y + s * (vy + 2.0 * (uy + wy) + zy),
-        vx + s * (k1x + 2.0 * (k2x + k3x) + k4x),
-        vy + s * (k1y + 2.0 * (k2y + k3y) + k4y),
-    )
+    x, y = x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy)
+    k4x, k4y = acceleration(arms, extra, acting, OTHER, PLACE, w, zx, zy, x, y)
+    return x, y, vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y)
 
 
 @outlined
@@ -130,9 +161,9 @@ def friction_hold(arms, extra, w, k1x, k1y, dt):
         return step(arms, None, PUSH, w, x, y, vx, vy, k1x, k1y, dt)
     most = int(min(max(1.0, n), MOST_STEPS))
     h = dt / most
-    x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, h)
-    for _ in range(1, most):
-        k1x, k1y = acceleration(arms, extra, C, w, x, y, vx, vy)
+    for _ in range(most):
+        if most > 1:
+            k1x, k1y = acceleration(arms, extra, C, PLACE, OTHER, w, vx, vy, x + 0.5 * h * vx, y + 0.5 * h * vy)
         x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, h)
     return x, y, vx, vy
 
@@ -165,6 +196,7 @@ def put(arms, w, x, y, vx, vy):
 def observe(arms, extra, table, x, y, vx, vy, w, q, qd):
     """True base angles and rates (N,) for a controller in Python; `row` is the desired motion."""
     put(arms, w, x, y, vx, vy)
+    begin(arms, w)
     if sense(arms, extra, table, 0, w, 0.0) > 0:
         mend(((),), arms, table, 0, w)
     for i in range(len(q)):
@@ -176,6 +208,7 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     """`hold` for a controller in Python: the state after the torques c (N,), and its status."""
     W = len(arms)
     put(arms, w, x, y, vx, vy)
+    begin(arms, w)
     sense(arms, extra, table, 0, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]

@@ -107,7 +107,7 @@ def width(N: int, alone: bool) -> int:
 def aligned(size: int) -> np.ndarray:
     """Zeros that start at a multiple of 64 bytes, as vector registers like it."""
     room = np.zeros(size + 8)
-    start = -room.ctypes.data // 8 % 8
+    start = -room.__array_interface__["data"][0] // 8 % 8
     return room[start : start + size]
 
 

@@ -39,8 +39,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
         array = _converted(name, value, last)
     # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
     # for a large one it would wake the threads of the linear algebra library.
-    small = array.size <= 1000
-    if not (np.vdot(array, array) < 1e200 if small else -1e100 < array.min() and array.max() < 1e100):
+    if not (np.vdot(array, array) < 1e200 if array.size <= 1000 else -1e100 < array.min() and array.max() < 1e100):
         fine = np.abs(array) < 1e100
         if not np.all(fine):
             bad = np.argwhere(~fine)[0]
@@ -165,6 +164,8 @@ def small_number(name: str, value) -> float:
 
 def whole_number(name: str, value, low: int, high: float = math.inf) -> int:
     """Return `value` as an int that is not below `low`, nor above `high`."""
+    if type(value) is int and low <= value <= min(high, 2**53):
+        return value
     number = float(bounded(name, exact_array(name, value), low, strict=False))
     if not number.is_integer() or number > high:
         raise ValueError(f"{name} = {number:g}; allowed: whole numbers >= {low}" + f", to {high}" * (high < math.inf))
@@ -237,9 +238,8 @@ def callable_with(name: str, value: Any, *given: str) -> Any:
     try:
         inspect.signature(value).bind(*given)
     except TypeError as error:
-        raise ValueError(
-            f"{name} = {short(value)} cannot be called ({error}); allowed: a function ({', '.join(given)})"
-        ) from None
+        words = f"{name} = {short(value)} cannot be called ({error})"
+        raise ValueError(f"{words}; allowed: a function ({', '.join(given)})") from None
     except ValueError:
         pass  # built-in functions have no signature
     return value

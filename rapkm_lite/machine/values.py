@@ -23,6 +23,7 @@ from __future__ import annotations
 import copy
 import ctypes
 import dataclasses
+import itertools
 from functools import cached_property
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -79,18 +80,28 @@ def frozen(array) -> np.ndarray:
 
 
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Zeros to write into once, before anybody else sees them; and the same arrays as `frozen` hands them on.
+    """Room to write into once, before anybody else sees it; and the same arrays as `frozen` hands them on.
+
+    Nobody cleans it before: what is handed on has to be written.
 
     >>> (write, _), (read, _) = room(2, 3)
     >>> write[:] = 1.0, 2.0
     >>> frozen(read) is read, read.tolist()
     (True, [1.0, 2.0])
     """
-    ends = np.cumsum(sizes).tolist()
-    read = np.frombuffer(bytes(8 * ends[-1]))
-    write = np.ctypeslib.as_array((ctypes.c_double * read.size).from_address(read.ctypes.data))
-    parts = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
+    size = 8 * sum(sizes)
+    place = _unwritten(None, size)
+    read, write = np.frombuffer(place), np.frombuffer(_writable(place, size, _WRITE))
+    parts = [slice(end - part, end) for end, part in zip(itertools.accumulate(sizes), sizes, strict=True)]
     return [write[part] for part in parts], [read[part] for part in parts]
+
+
+# An object of type bytes without contents, and a view of memory to write into.
+_unwritten = ctypes.pythonapi.PyBytes_FromStringAndSize
+_unwritten.restype, _unwritten.argtypes = ctypes.py_object, (ctypes.c_char_p, ctypes.c_ssize_t)
+_writable = ctypes.pythonapi.PyMemoryView_FromMemory
+_writable.restype, _writable.argtypes = ctypes.py_object, (ctypes.c_char_p, ctypes.c_ssize_t, ctypes.c_int)
+_WRITE = 0x200
 
 
 def all_frozen(arrays: list[np.ndarray]) -> list[np.ndarray]:

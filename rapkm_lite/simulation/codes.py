@@ -67,7 +67,6 @@ def code_of(law: Any, model) -> Code | None:
     else:
         return None
     drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
-    run = {"JOINT_J": -1.0, "JOINT_K": -1.0} | run
     return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run, user)
 
 
@@ -88,6 +87,8 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         "PAIR_D1": d1,
         "PAIR_D2": d2,
         "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
+        "JOINT_J": -1.0,
+        "JOINT_K": -1.0,
     }
     independent = getattr(law, "independent", None)
     if independent is not None:
@@ -101,7 +102,7 @@ def _per(name: str, value, size: int) -> np.ndarray:
     value = np.asarray(value, dtype=float)
     if value.shape not in ((), (size,)):
         raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
-    return np.broadcast_to(value, (size,))
+    return np.full(size, value)
 
 
 def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:

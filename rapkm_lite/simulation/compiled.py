@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,9 @@ def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]
         if begun == 0:
             raise
         status, sample, interrupt = LAW_FAILED, begun - 1, stop
-    # Elbows were counted after all arms of a row.
-    history.joints[history.joints >= N + spare] -= spare
+    if "JOINT_J" in code.run:
+        # Elbows were counted after all arms of a row.
+        history.joints[history.joints >= N + spare] -= spare
     kept[-1] = kept[-1].view(np.int32)
     columns = [column[: n * samples].reshape(samples, n) for column, n in zip(kept, (2, 2, N, N, N, 2), strict=True)]
     return Outcome._make([status, sample, *columns]), interrupt
@@ -77,6 +79,14 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
     return columns
 
 
+@functools.cache
+def _engine():
+    """Rows of the work table, and the loop: Numba is not imported before the first run."""
+    from ..engine import loop, rows
+
+    return rows, loop
+
+
 def _sums(setup: Setup, w) -> tuple:
     """The columns of `many` from the work table."""
     robot, t = setup.robot, setup.trajectory.t
@@ -98,29 +108,46 @@ def _sums(setup: Setup, w) -> tuple:
 
 def _work(setup: Setup, codes: list[Code], offsets, width: int):
     """The work table of runs that begin: flat, its pair rows (blocks, width, L) and its run rows (rows, L)."""
-    from ..engine import rows
-
-    robot, L, N = setup.robot, len(codes), setup.robot.n_arms
-    work = tables.aligned((rows.BLOCKS * width + rows.SINGLES) * L)
+    rows, _ = _engine()
+    robot, L, N, path = setup.robot, len(codes), setup.robot.n_arms, setup.trajectory
+    work = _machines(robot, setup.model, width, L)
     blocks, runs = work[: rows.BLOCKS * width * L].reshape(-1, width, L), work[rows.BLOCKS * width * L :].reshape(-1, L)
-    for i, arms in enumerate((robot, setup.model)):
-        table, environment = _made_for(arms, width, _arms)
-        blocks[i * rows.MODEL : (i + 1) * rows.MODEL] = table[..., None]
-        start = rows.GRAVITY_X + i * rows.ENVIRONMENT
-        runs[start : start + rows.ENVIRONMENT] = environment[:, None]
     for name in codes[0].drives:
         blocks[getattr(rows, name), :N] = np.array([code.drives[name] for code in codes]).T
     for name in codes[0].run:
         runs[getattr(rows, name)] = [code.run[name] for code in codes]
-    # Elbows are counted after all arms of a row.
-    joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
-    joints[joints >= N] += width - N
+    if "JOINT_J" in codes[0].run:
+        # Elbows are counted after all arms of a row.
+        joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
+        joints[joints >= N] += width - N
     blocks[rows.OFFSET, :N] = offsets.T
-    blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
-    for place in (rows.X, rows.PX, rows.PX1, rows.PX2):
-        runs[place : place + 2] = setup.trajectory.x[0][:, None]
-    runs[rows.VX : rows.VY + 1] = setup.trajectory.xd[0][:, None]
+    start = path.x[0].tolist()
+    runs[rows.X : rows.VY + 1] = np.array([*start, *path.xd[0].tolist()])[:, None]
+    runs[rows.PX : rows.PY2 + 1] = np.array(3 * start)[:, None]
     return work, blocks, runs
+
+
+def _machines(robot, model, width: int, L: int) -> np.ndarray:
+    """The work table (flat) of L runs of a machine with this model, which are told nothing else."""
+    blank = _blank(robot, model, width, L)
+    work = tables.aligned(len(blank))
+    work[:] = blank
+    return work
+
+
+@functools.lru_cache(maxsize=16)
+def _blank(robot, model, width: int, L: int) -> np.ndarray:
+    """What `_machines` copies, made once: values do not change."""
+    rows, _ = _engine()
+    work = np.zeros((rows.BLOCKS * width + rows.SINGLES) * L)
+    blocks, runs = work[: rows.BLOCKS * width * L].reshape(-1, width, L), work[rows.BLOCKS * width * L :].reshape(-1, L)
+    for i, arms in enumerate((robot, model)):
+        blocks[i * rows.MODEL : (i + 1) * rows.MODEL] = tables.arm_table(arms, width)[..., None]
+        start = rows.GRAVITY_X + i * rows.ENVIRONMENT
+        runs[start : start + rows.ENVIRONMENT] = tables.environment(arms)[:, None]
+    blocks[rows.WEIGHT, : robot.n_arms] = (robot.resistance / robot.torque_constant**2)[:, None]
+    runs[rows.JOINT_J : rows.JOINT_K + 1] = -1.0
+    return work
 
 
 def _run(setup: Setup, codes: list[Code], offsets, history):
@@ -128,9 +155,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 
     history : None for a study; the `History` of a single run.
     """
-    from ..engine import rows
-    from ..engine.loop import closed_loops
-
+    rows, loop = _engine()
     robot, model, trajectory = setup.robot, setup.model, setup.trajectory
     L, N, W = len(codes), robot.n_arms, tables.width(robot.n_arms, history is not None)
     work, blocks, runs = _work(setup, codes, offsets, W)
@@ -147,13 +172,13 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     sensor, faulty = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
     log = None if history is None else tables.History._make([*map(tables.plain, history[:-1]), N])
-    with patience(kind, study, modelled, user is None), np.errstate(all="ignore"):
+    with patience(kind, study, modelled, user is None):
         for first in range(0, samples, PART):
             part = slice(first, min(first + PART, samples))
             table = _motion(trajectory, W, count, part)
             clock = tables.Clock(first, samples, trajectory.dt)
             try:
-                closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
+                loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
@@ -161,7 +186,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
                 if history is not None and log is not None and not compiled():
                     for column, values in zip(history[:-1], log, strict=False):
                         column[:] = values
-            work[:] = w
+            if w is not work:
+                work[:] = w
             if part.stop < samples and not np.any(runs[rows.STATUS] == DONE):
                 break
 
@@ -193,45 +219,27 @@ def _user(law: CompiledLaw | None, N: int):
     return pointer(law.function, N, matrices, law.memory), buffer, asks
 
 
-def _made_for(value, width: int, make, count: int = 0):
-    """The table of a machine or path, made once for a width and a count of blocks: values do not change."""
-    made = value.__dict__.setdefault("_tables", {})
-    if (width, count) not in made:
-        made[width, count] = make(value, width)
-    return made[width, count]
-
-
-def _arms(robot, width: int) -> tuple[np.ndarray, np.ndarray]:
-    return tables.arm_table(robot, width), tables.environment(robot)
-
-
 def _motion(trajectory, width: int, count: int, part: slice):
-    """The desired motion of a part of the run; only that of short runs is kept."""
-
-    def made(path, W):
-        return tables.plain(tables.motion_table(path, W, count, part).ravel())
-
-    return _made_for(trajectory, width, made, count) if len(trajectory) <= PART else made(trajectory, width)
+    """The desired motion of a part of the run; only that of short runs is kept, because values do not change."""
+    if len(trajectory) > PART:
+        return tables.plain(tables.motion_table(trajectory, width, count, part).ravel())
+    made = trajectory.__dict__.setdefault("_tables", {})
+    if (width, count) not in made:
+        made[width, count] = tables.plain(tables.motion_table(trajectory, width, count).ravel())
+    return made[width, count]
 
 
 class Plant:
     """The machine alone, for a controller in Python, and its pose in the model; a state is (x, y, vx, vy)."""
 
     def __init__(self, robot, trajectory, model=None):
-        from ..engine import rows
         from ..engine.pose import nearest
         from ..engine.single import advance, observe
 
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
         self._nearest, self._drives = nearest, tables.sizes(robot.n_arms)
         W = tables.width(robot.n_arms, True)
-        work = tables.aligned(rows.BLOCKS * W + rows.SINGLES)
-        table, environment = _made_for(robot, W, _arms)
-        work[: rows.MODEL * W] = table.ravel()
-        work[rows.MODEL * W : 2 * rows.MODEL * W] = _made_for(model or robot, W, _arms)[0].ravel()
-        start = rows.BLOCKS * W + rows.GRAVITY_X
-        work[start : start + rows.ENVIRONMENT] = environment
-        self._w, self._arms = tables.plain(work), tables.sizes(W)
+        self._w, self._arms = tables.plain(_machines(robot, model or robot, W, 1)), tables.sizes(W)
         self._extra, table = tables.extra(robot), _motion(trajectory, W, tables.FEW, slice(0, len(trajectory)))
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
