@@ -106,9 +106,11 @@ def single_newton(drives, arms, modelled, w, tolerance):
     """The pose of one run by Newton steps; returns how many more it needs, and whether they lead nowhere."""
     N, W = len(drives), len(arms)
     x, y = w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)]
-    w[of(TODO, 0, W, 1)] = 1.0
+    done = False
     for _ in range(12):
         single_step(arms, modelled, w, x, y)
+        if done:
+            break
         m11, m12, m22, fx, fy = w[P11 * W], w[P12 * W], w[P22 * W], w[GX * W], w[GY * W]
         near = w[NEAR * W]
         for i in range(1, N):
@@ -118,10 +120,10 @@ def single_newton(drives, arms, modelled, w, tolerance):
             w[of(FAR, 0, W, 1)] = 1.0
             break
         sx, sy = solve2(m11, m12, m22, fx, fy)
-        if max(abs(sx), abs(sy)) < tolerance:
-            w[of(TODO, 0, W, 1)] = 0.0
-            break
         x, y = x + sx, y + sy
+        # Newton's error is of the order of the square of the step: after such a one only the links are missing.
+        done = max(abs(sx), abs(sy)) < 1e6 * tolerance
+    w[of(TODO, 0, W, 1)] = 0.0 if done else 1.0
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
 
 
