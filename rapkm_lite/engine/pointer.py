@@ -38,28 +38,30 @@ def pointer(function, N: int, matrices: bool, memory: int):
     # What the user writes stays inside its arrays.
     law: Any = njit(error_model="numpy", boundscheck=True)(function) if isfunction(function) else function
     ask: Any = law
+    # All around the law in one piece: an array handed on costs more than a number in it.
+    inner = njit(forceinline=True)
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)
     if matrices and not memory:
-        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, at))
+        ask = inner(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, at))
     elif memory and not matrices:
-        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, own))
+        ask = inner(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d, own))
     elif not matrices:
-        ask = njit(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d))
+        ask = inner(lambda t, q_a, qd_a, d, at, own: law(t, q_a, qd_a, d))
 
-    @njit
+    @inner
     def take(buffer, o, rows, columns):
         size = rows * columns
         return buffer[o : o + size].reshape((rows, columns)), o + size
 
-    @njit
+    @inner
     def wanted(buffer):
         o = 7 + 2 * N
         q, qd, qdd = buffer[o : o + n], buffer[o + n : o + 2 * n], buffer[o + 2 * n : o + 3 * n]
         x = buffer[1 + 2 * N : 7 + 2 * N]
         return Wanted(x[0:2], x[2:4], x[4:6], q, qd, qdd, q[0:N], qd[0:N], qdd[0:N])
 
-    @njit
+    @inner
     def matrices_of(buffer):
         F, o = take(buffer, 7 + 2 * N + 3 * n, n, 2)
         F_dot, o = take(buffer, o, n, 2)
@@ -81,7 +83,7 @@ def pointer(function, N: int, matrices: bool, memory: int):
         pinv, o = take(buffer, o, N, n)
         return Matrices(F, F_dot, A, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv)
 
-    @njit
+    @inner
     def nothing(buffer):
         return None
 
