@@ -115,7 +115,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         if isinstance(result, CalibrationError):
             return {"combinations that are known": f"{result.rank} of {N}", "calibration": "refused"}
         error, spread = 1e3 * np.array([result.offset - offset, np.sqrt(np.diagonal(result.covariance))])
-        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})])
+        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=".3f")
         picture.fit("error", 1.25 * error, 1.25 * spread, least=0.05)
         return {
             "condition": f"{result.condition:.2f}",
