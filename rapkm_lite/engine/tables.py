@@ -72,20 +72,12 @@ def motion_table(trajectory, width: int, count: int = ALL, rows: slice = slice(N
     """Desired motion per sample, (k, 6 + count width); zeros for arms beyond the machine's."""
     N = trajectory.n_arms
     x, xd, xdd, q, qd, qdd = (getattr(trajectory, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd"))
-    blocks = [
-        q[:, :N],
-        qd[:, :N],
-        np.cos(q[:, :N]),
-        np.sin(q[:, :N]),
-        qdd[:, :N],
-        qd[:, N:],
-        qdd[:, N:],
-        np.cos(q[:, N:]),
-        np.sin(q[:, N:]),
-        q[:, N:],
-    ]
+    blocks = [q[:, :N], qd[:, :N], np.cos(q[:, :N]), np.sin(q[:, :N])]
+    if count > FEW:
+        elbow = q[:, N:]
+        blocks += [qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(elbow), np.sin(elbow), elbow]
     rest = np.zeros((len(x), width - N))
-    return np.column_stack([x, xd, xdd, *(part for block in blocks[:count] for part in (block, rest))])
+    return np.column_stack([x, xd, xdd, *(part for block in blocks for part in (block, rest))])
 
 
 def sizes(count: int) -> tuple:

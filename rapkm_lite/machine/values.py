@@ -82,7 +82,7 @@ def frozen(array) -> np.ndarray:
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Room to write into once, before anybody else sees it; and the same arrays as `frozen` hands them on.
 
-    Nobody cleans it before: what is handed on has to be written.
+    Nobody cleans it before: what is handed on has to be written.  The memory lives as long as the second arrays.
 
     >>> (write, _), (read, _) = room(2, 3)
     >>> write[:] = 1.0, 2.0
