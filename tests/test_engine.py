@@ -9,6 +9,7 @@ import pytest
 from reference import reference
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.compiled import Plant
 
 ANGLES = {2: [200.0, -20.0], 3: [210.0, 330.0, 90.0], 4: [225.0, 315.0, 45.0, 135.0]}
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
@@ -108,6 +109,26 @@ def numbers(**environment):
     )
     assert done.stderr == ""
     return np.array([float.fromhex(v) for v in done.stdout.split()])
+
+
+def test_the_pose_of_measured_angles_does_not_depend_on_where_its_search_begins():
+    """The least-squares pose is one point, also where arms are nearly stretched: Newton's search ends at rounding."""
+    robot, rng = machine(3), np.random.default_rng(3)
+    plant, found = Plant(robot, rk.hold(robot, (0.0, 0.0), 0.01)), 0
+    for x in rng.uniform(-0.25, 0.25, (2000, 2)):
+        if not rk.reachable(robot, x):
+            continue
+        q_a = rk.inverse_kinematics(robot, x)[:3] + rng.normal(0.0, 3e-3, 3)
+        guesses = x, x + 10 ** rng.uniform(-9, -6) * rng.normal(size=2)
+        poses = [plant.nearest(q_a, guess) for guess in guesses]
+        if None in poses:
+            continue
+        again = plant.nearest(q_a, poses[0])
+        np.testing.assert_allclose(poses, [again, again], rtol=0, atol=1e-13)
+        near = np.array(again) + 2e-8 * rng.normal(size=2)
+        np.testing.assert_allclose(plant.nearest(q_a, near), again, rtol=0, atol=1e-13)
+        found += 1
+    assert found > 500
 
 
 def test_without_numba_the_same_numbers():

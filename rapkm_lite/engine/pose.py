@@ -103,27 +103,29 @@ def single_step(arms, modelled, w, x, y):
 
 @outlined
 def single_newton(drives, arms, modelled, w, tolerance):
-    """The pose of one run by Newton steps; returns how many more it needs, and whether they lead nowhere."""
+    """The pose of one run by Newton steps; TODO says whether it needs more of them, FAR whether they lead nowhere."""
     N, W = len(drives), len(arms)
     x, y = w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)]
-    done = False
+    w[of(TODO, 0, W, 1)], done = 1.0, False
     for _ in range(12):
         single_step(arms, modelled, w, x, y)
         if done:
+            w[of(TODO, 0, W, 1)] = 0.0
             break
         m11, m12, m22, fx, fy = w[P11 * W], w[P12 * W], w[P22 * W], w[GX * W], w[GY * W]
         near = w[NEAR * W]
         for i in range(1, N):
             m11, m12, m22 = m11 + w[P11 * W + i], m12 + w[P12 * W + i], m22 + w[P22 * W + i]
             fx, fy, near = fx + w[GX * W + i], fy + w[GY * W + i], min(near, w[NEAR * W + i])
-        if not (near >= 0.0 and min(m11, m11 * m22 - m12 * m12) > 0.0):
+        det, trace = m11 * m22 - m12 * m12, m11 + m22
+        if not (near >= 0.0 and min(m11, det) > 0.0):
             w[of(FAR, 0, W, 1)] = 1.0
             break
         sx, sy = solve2(m11, m12, m22, fx, fy)
         x, y = x + sx, y + sy
-        # Newton's error is of the order of the square of the step: after such a one only the links are missing.
-        done = max(abs(sx), abs(sy)) < 1e6 * tolerance
-    w[of(TODO, 0, W, 1)] = 0.0 if done else 1.0
+        # The error that is left goes with the square of the step, and grows towards stretched arms and singular poses
+        # as this factor does; below the tolerance only the links are missing.
+        done = max(sx * sx, sy * sy) * trace**3 * w[(MODEL + L1SQ) * W] < tolerance * det
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
 
 
