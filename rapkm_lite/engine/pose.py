@@ -125,7 +125,7 @@ def single_newton(drives, arms, modelled, w, tolerance):
         x, y = x + sx, y + sy
         # The error that is left goes with the square of the step, and grows towards stretched arms and singular poses
         # as this factor does; below the tolerance only the links are missing.
-        done = max(sx * sx, sy * sy) * trace**3 * w[(MODEL + L1SQ) * W] < tolerance * det
+        done = max(sx * sx, sy * sy) * (trace * trace * trace) * w[(MODEL + L1SQ) * W] < tolerance * det
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
 
 
