@@ -13,24 +13,8 @@ from . import compiled
 COMPILED = compiled()
 if COMPILED:
     from numba import njit, types
-    from numba.core.compiler import Compiler
 
-    class Wide(Compiler):
-        """Numba's compiler, free to use vector registers of 512 bits: on processors of Intel it stops at 256, with
-        which runs side by side take a third longer."""
-
-        def __init__(self, typing, target, *rest):
-            super().__init__(typing, target, *rest)
-            context = self.state.targetctx
-            declare = context.declare_function
-
-            def wide(module, description):
-                function = declare(module, description)
-                # As text: llvmlite has no word for it.
-                set.add(function.attributes, '"prefer-vector-width"="512"')
-                return function
-
-            context.declare_function = wide
+    from .compiler import Wide
 
 
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.

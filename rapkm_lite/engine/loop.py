@@ -89,7 +89,7 @@ def take_answer(drives, arms, w, buffer):
 
 @leaf
 def command(lanes, drives, arms, modelled, user, law, table, o, w, t, dt, buffer):
-    """The torques C of the law and of the filter around it."""
+    """The torques C of the law."""
     if law.form == PD:
         proportional(lanes, arms, w)
     elif law.form == PID:
@@ -100,10 +100,16 @@ def command(lanes, drives, arms, modelled, user, law, table, o, w, t, dt, buffer
         fill(drives, arms, law, t, table, o, w, buffer)
         user(buffer)
         take_answer(drives, arms, w, buffer)
-    if law.filter == FORCE_FILTER:
-        force_filter(lanes, drives, arms, w)
-    elif law.filter == COMMAND_FILTER:
-        command_filter(lanes, drives, arms, w)
+
+
+@leaf
+def filtered(lanes, drives, arms, posed, law, w):
+    """What a filter around the law leaves of its torques C."""
+    if posed is not None:
+        if law.filter == FORCE_FILTER:
+            force_filter(lanes, drives, arms, w)
+        elif law.filter == COMMAND_FILTER:
+            command_filter(lanes, drives, arms, w)
 
 
 @leaf
@@ -183,7 +189,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     clock : a long run is made in parts, whose state is in w; the table holds the samples of one part.
     """
     dt = clock.dt
-    lanes, drives, arms, faulty, extra = kind
+    lanes, drives, arms, faulty, posed, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     rows = len(table) // columns
     if history is not None:
@@ -203,14 +209,14 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
             read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k)
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
-        if law.posed:
-            find_pose(lanes, drives, arms, modelled, history, study, sensor, law, table, o, w, k)
+        find_pose(lanes, drives, arms, posed, modelled, history, study, law, table, o, w, k)
         if study is not None:
             if k + 1 == clock.samples:
                 return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
         command(lanes, drives, arms, modelled, user, law, table, o, w, k * dt, dt, buffer)
+        filtered(lanes, drives, arms, posed, law, w)
         if len(faulty) > 0:
             break_drives(lanes, arms, faults, w, k)
 

@@ -212,10 +212,11 @@ def measured_rate(lanes, drives, arms, table, o, w):
 
 
 @leaf
-def find_pose(lanes, drives, arms, modelled, history, study, sensor, law, table, o, w, k):
+def find_pose(lanes, drives, arms, posed, modelled, history, study, law, table, o, w, k):
     """Pose, its velocity, and A there, from the source that the law asks for."""
-    if law.pose == MEASURED:
-        measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, not sensor.quantized)
-        measured_rate(lanes, drives, arms, table, o, w)
-    else:
-        true_pose(lanes, drives, arms, modelled, law, w)
+    if posed is not None:
+        if law.pose == TRUE:
+            true_pose(lanes, drives, arms, modelled, law, w)
+        else:
+            measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, law.pose == MEASURED)
+            measured_rate(lanes, drives, arms, table, o, w)

@@ -22,7 +22,7 @@ def fetch(block, W, table, o, w):
     move(W, table, o + 6 + block * W, w, (MOTION + block) * W)
 
 
-@leaf
+@index
 def put_place(arms, place, w, i, x, y):
     """Keep the geometry of arm i, the end-effector at (x, y), in the rows from `place` on."""
     W = len(arms)
@@ -32,7 +32,7 @@ def put_place(arms, place, w, i, x, y):
     w[(place + 7) * W + i], w[(place + 8) * W + i], w[(place + 9) * W + i] = k, h, area2
 
 
-@leaf
+@index
 def get_place(arms, place, w, i):
     """Links, k and h of the chord, and (a x d)^2 of arm i from the rows that `put_place` wrote."""
     W = len(arms)
@@ -90,7 +90,7 @@ def join(arms, w):
     return solve2(mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W), total(FX, w, W), total(FY, w, W))
 
 
-@leaf
+@index
 def acceleration(arms, extra, acting, place, other, w, vx, vy, x, y):
     """End-effector acceleration at a place under the torques in the row `acting`; the other one is put at (x, y)."""
     W = len(arms)

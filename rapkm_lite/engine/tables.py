@@ -9,25 +9,26 @@ import numpy as np
 
 from . import compiled
 
-# What a run ended with; laws; filters; pose sources.
+# What a run ended with; laws; filters; pose sources: base angles that move smoothly, or by counts, or the truth.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
 PD, PID, APD, CTC, REDUNDANT_APD, REDUNDANT_APD_LINE2, REDUNDANT_CTC, REDUNDANT_CTC_LINE2, USER = range(9)
 NO_FILTER, FORCE_FILTER, COMMAND_FILTER = range(3)
-MEASURED, TRUE = range(2)
+MEASURED, COUNTED, TRUE = range(3)
 # At which pose a law of a user wants the matrices.
 NOTHING, DESIRED, POSED = range(3)
 
 # Rows per sample of the fault table.
 JUMP, HELD, ALIVE, LIMITED = range(4)
 
-# Sizes as `sizes` makes them: runs, drives, arms of a row; an entry for faults; `extra`.
-Kind = namedtuple("Kind", "lanes drives arms faulty extra")
+# Sizes as `sizes` makes them: runs, drives, arms of a row; an entry for faults; () for a law or filter that asks for a
+# pose, else None; `extra`.
+Kind = namedtuple("Kind", "lanes drives arms faulty posed extra")
 Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 # The sample with which a table begins, the samples of the whole run, and the sampling time.
 Clock = namedtuple("Clock", "first samples dt")
 # Flat columns of a single run, those of the drives with room for the rest of a row behind them; the number of drives.
 History = namedtuple("History", "x xd q qd c joints drives")
-Law = namedtuple("Law", "form filter posed pose same switched asks")
+Law = namedtuple("Law", "form filter pose same switched asks")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
 # What decentralized laws need comes first.

@@ -161,15 +161,17 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     work, blocks, runs = _work(setup, codes, offsets, W)
     code, sizes = codes[0], tables.sizes
     user, buffer, asks = _user(code.user, N)
-    law = _law(code, asks, model.same_kinematics(robot))
+    law = _law(code, asks, model.same_kinematics(robot), setup.sensors)
     has_model = tables.PID < law.form < tables.USER
+    posed = () if has_model or law.filter != tables.NO_FILTER or asks == tables.POSED else None
     # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
     drives = W if user is None else N
-    kind = tables.Kind(sizes(L), sizes(drives), sizes(W), sizes(int(setup.faults is not None)), tables.extra(robot))
+    faulty = sizes(int(setup.faults is not None))
+    kind = tables.Kind(sizes(L), sizes(drives), sizes(W), faulty, posed, tables.extra(robot))
     study = () if history is None else None
     modelled = sizes(int(tables.extra(model) is not None)) if has_model else None
     count = tables.FEW if modelled is None and user is None else tables.ALL
-    sensor, faulty = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
+    sensor, faults = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
     log = None if history is None else tables.History._make([*map(tables.plain, history[:-1]), N])
     with patience(kind, study, modelled, user is None):
@@ -178,7 +180,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             table = _motion(trajectory, W, count, part)
             clock = tables.Clock(first, samples, trajectory.dt)
             try:
-                loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faulty, w, log, buffer)
+                loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, log, buffer)
             except (ArithmeticError, ValueError):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
@@ -198,12 +200,12 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     return row
 
 
-def _law(code: Code, asks: int, same: bool) -> tables.Law:
+def _law(code: Code, asks: int, same: bool, sensors) -> tables.Law:
     """What the kernel has to know of a law; `same` where its model has the kinematics of the machine."""
     form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
-    posed = filtered != tables.NO_FILTER or tables.PID < form < tables.USER or asks == tables.POSED
-    pose = tables.TRUE if code.true_pose else tables.MEASURED
-    return tables.Law(form, filtered, posed, pose, same, code.switched, asks)
+    measured = tables.MEASURED if sensors.count is None else tables.COUNTED
+    pose = tables.TRUE if code.true_pose else measured
+    return tables.Law(form, filtered, pose, same, code.switched, asks)
 
 
 def _user(law: CompiledLaw | None, N: int):
