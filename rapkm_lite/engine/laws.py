@@ -12,6 +12,7 @@ import math
 from .jit import leaf, outlined
 from .leaves import accelerations, drag, inertia, small_angle, solve2
 from .minimal import best_pair, minimal_feedback, reference
+from .pose import kept
 from .rows import *
 from .single import fetch
 from .tables import *
@@ -61,20 +62,6 @@ def pose_of(w, j, W, L):
     )
 
 
-@leaf
-def links_of(w, i, j, W, L):
-    """The links of an arm of the model, as `geometry` gave them to the pose."""
-    return (
-        w[at(A1, i, j, W, L)],
-        w[at(A2, i, j, W, L)],
-        w[at(L1, i, j, W, L)],
-        w[at(L2, i, j, W, L)],
-        w[at(MAD, i, j, W, L)],
-        w[at(MINV, i, j, W, L)],
-        w[at(MDEN, i, j, W, L)],
-    )
-
-
 @outlined
 def look(lanes, drives, arms, extra, table, o, w):
     """The model at the pose: the errors of the elbows, and the shares of the arms at the rate of the pose."""
@@ -86,7 +73,7 @@ def look(lanes, drives, arms, extra, table, o, w):
         rate = desired(table, o, w, ELBOW_RATE, i, W, L)
         for j in range(L):
             vx, vy, env = alone if L == 1 else pose_of(w, j, W, L)
-            links = links_of(w, i, j, W, L)
+            links = kept(w, i * L + j, W * L)
             bx, by, lx, ly, ad, _, den = links
             # a x d and a.d are the sine and cosine of the elbow angle times both lengths.
             s, t = cos * den - sin * ad, cos * ad + sin * den
@@ -117,7 +104,7 @@ def shares(lanes, drives, arms, extra, w):
         for j in range(L):
             vx, vy, env = pose_of(w, j, W, L)
             rates = vx, vy, w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
-            arm_shares(w, i * L + j, W * L, extra, env, rates, links_of(w, i, j, W, L))
+            arm_shares(w, i * L + j, W * L, extra, env, rates, kept(w, i * L + j, W * L))
 
 
 @outlined
@@ -143,7 +130,7 @@ def ask(lanes, drives, arms, law, table, o, w):
     for i in range(N):
         base, elbow = desired(table, o, w, ACCELERATION, i, W, L), desired(table, o, w, ELBOW_ACCELERATION, i, W, L)
         for j in range(L):
-            bx, by, lx, ly, _, _, _ = links_of(w, i, j, W, L)
+            bx, by, lx, ly, _, _, _ = kept(w, i * L + j, W * L)
             s = w[at(GAIN_P, i, j, W, L)] * w[at(E, i, j, W, L)] + w[at(GAIN_D, i, j, W, L)] * w[at(ED, i, j, W, L)]
             t = (
                 w[at(ELBOW_P, i, j, W, L)] * w[at(ELBOW_E, i, j, W, L)]
@@ -178,7 +165,7 @@ def unprojected(lanes, drives, arms, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            bx, by, lx, ly, ad, _, _ = links_of(w, i, j, W, L)
+            bx, by, lx, ly, ad, _, _ = kept(w, i * L + j, W * L)
             r, tip = w[at(ASK_B, i, j, W, L)], w[at(MODEL + TIP, i, j, W, L)]
             link = r + w[at(ASK_E, i, j, W, L)]
             p = (w[at(MODEL + S1, i, j, W, L)] + tip * w[at(MODEL + L1SQ, i, j, W, L)]) * r + tip * ad * link
@@ -196,7 +183,7 @@ def bend(lanes, drives, arms, law, table, o, w):
         tx = ty = 0.0
         vx, vy, ux, uy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
         for i in range(N):
-            bx, by, lx, ly, ad, inv, den = links_of(w, i, j, W, L)
+            bx, by, lx, ly, ad, inv, den = kept(w, i * L + j, W * L)
             base, back = bx * vx + by * vy, lx * vx + ly * vy
             rest = want(table, o, RATE, i, W) - (bx * ux + by * uy)
             both = rest + want(table, o, ELBOW_RATE, i, W) + ((bx + lx) * ux + (by + ly) * uy)

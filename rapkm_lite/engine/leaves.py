@@ -169,6 +169,24 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
 
 
 @leaf
+def moved(links, sx, sy):
+    """Links after a small step (sx, sy) of the tip, to first order: each of them turns, by b.s and by -l.s."""
+    bx, by, lx, ly, ad, inv, den = links
+    base, back = bx * sx + by * sy, lx * sx + ly * sy
+    bent = base + back
+    grown = inv * ad * bent
+    return (
+        bx + grown * bx + back * by,
+        by + grown * by - back * bx,
+        lx + grown * lx - base * ly,
+        ly + grown * ly + base * lx,
+        ad + den * bent,
+        inv + inv * grown,
+        den - ad * bent,
+    )
+
+
+@leaf
 def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
     """What friction of a drive asks of a hold: lambda dt, steps across the bend, and 1 where the drive can pass zero.
 

@@ -13,34 +13,27 @@ from .tables import *
 def best_pair(lanes, drives, arms, w):
     """The pair of drives with the largest |d_j x d_k|, kept while no other is better by the factor HYSTERESIS."""
     L, N, W = len(lanes), len(drives), len(arms)
-    for j in range(L):
-        w[of(BEST, j, W, L)], w[of(NOW, j, W, L)] = -1.0, -1.0
     for i in range(N):
-        for k in range(i + 1, N):
-            for j in range(L):
-                # d / l2 from b = d / (a x d).
-                size = (
-                    w[at(MODEL + ELBOW_SCALE, i, j, W, L)]
-                    * w[at(MODEL + ELBOW_SCALE, k, j, W, L)]
-                    / (w[at(MODEL + SCALE, i, j, W, L)] * w[at(MODEL + SCALE, k, j, W, L)])
-                    * w[at(MDEN, i, j, W, L)]
-                    * w[at(MDEN, k, j, W, L)]
-                )
-                measure = abs(
-                    size
-                    * (w[at(A1, i, j, W, L)] * w[at(A2, k, j, W, L)] - w[at(A2, i, j, W, L)] * w[at(A1, k, j, W, L)])
-                )
-                used = w[of(JOINT_J, j, W, L)] == i and w[of(JOINT_K, j, W, L)] == k
-                w[of(NOW, j, W, L)] = measure if used else w[of(NOW, j, W, L)]
-                better = measure > w[of(BEST, j, W, L)]
-                w[of(BEST_J, j, W, L)] = i if better else w[of(BEST_J, j, W, L)]
-                w[of(BEST_K, j, W, L)] = k if better else w[of(BEST_K, j, W, L)]
-                w[of(BEST, j, W, L)] = measure if better else w[of(BEST, j, W, L)]
+        for j in range(L):
+            # d / l2 from b = d / (a x d).
+            size = w[at(MODEL + ELBOW_SCALE, i, j, W, L)] / w[at(MODEL + SCALE, i, j, W, L)] * w[at(MDEN, i, j, W, L)]
+            w[at(ASK_B, i, j, W, L)] = size * w[at(A1, i, j, W, L)]
+            w[at(ASK_E, i, j, W, L)] = size * w[at(A2, i, j, W, L)]
     for j in range(L):
-        now = w[of(NOW, j, W, L)]
-        change = now < 0.0 or w[of(BEST, j, W, L)] > w[of(HYSTERESIS, j, W, L)] * now
-        w[of(JOINT_J, j, W, L)] = w[of(BEST_J, j, W, L)] if change else w[of(JOINT_J, j, W, L)]
-        w[of(JOINT_K, j, W, L)] = w[of(BEST_K, j, W, L)] if change else w[of(JOINT_K, j, W, L)]
+        used_j, used_k = w[of(JOINT_J, j, W, L)], w[of(JOINT_K, j, W, L)]
+        best, now, best_j, best_k = -1.0, -1.0, 0.0, 0.0
+        for i in range(N):
+            for k in range(i + 1, N):
+                measure = abs(
+                    w[at(ASK_B, i, j, W, L)] * w[at(ASK_E, k, j, W, L)]
+                    - w[at(ASK_E, i, j, W, L)] * w[at(ASK_B, k, j, W, L)]
+                )
+                now = measure if used_j == i and used_k == k else now
+                better = measure > best
+                best_j, best_k, best = i if better else best_j, k if better else best_k, measure if better else best
+        change = now < 0.0 or best > w[of(HYSTERESIS, j, W, L)] * now
+        w[of(JOINT_J, j, W, L)] = best_j if change else used_j
+        w[of(JOINT_K, j, W, L)] = best_k if change else used_k
 
 
 @index

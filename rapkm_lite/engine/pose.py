@@ -6,18 +6,24 @@ import math
 
 from .arms import placed
 from .jit import kernel, leaf, outlined
-from .leaves import pose_terms, solve2, turned
+from .leaves import moved, pose_terms, solve2, turned
 from .rows import *
 from .tables import *
 
 
 @leaf
-def keep(modelled, w, p, P, links):
-    """Write the row of A of an arm, entry p of pair rows of P numbers; for laws with a model all of its links."""
+def keep(w, p, P, links):
+    """Write the links of an arm, above all its row b of A, entry p of pair rows of P numbers."""
     bx, by, lx, ly, ad, inv, den = links
-    w[A1 * P + p], w[A2 * P + p] = bx, by
-    if modelled is not None:
-        w[L1 * P + p], w[L2 * P + p], w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p] = lx, ly, ad, inv, den
+    w[A1 * P + p], w[A2 * P + p], w[L1 * P + p], w[L2 * P + p] = bx, by, lx, ly
+    w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p] = ad, inv, den
+
+
+@leaf
+def kept(w, p, P):
+    """The links that `keep` wrote."""
+    b, l = (w[A1 * P + p], w[A2 * P + p]), (w[L1 * P + p], w[L2 * P + p])
+    return *b, *l, w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p]
 
 
 @outlined
@@ -28,28 +34,41 @@ def true_pose(lanes, drives, arms, modelled, law, w):
         w[of(PX, j, W, L)], w[of(PY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
     if modelled is not None:
-        link_rows(lanes, drives, arms, modelled, w)
+        link_rows(lanes, drives, arms, w)
     elif law.same:
         for i in range(W):
             for j in range(L):
                 w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)]
     else:
-        link_rows(lanes, drives, arms, modelled, w)
+        link_rows(lanes, drives, arms, w)
 
 
 @outlined
-def link_rows(lanes, drives, arms, modelled, w):
+def link_rows(lanes, drives, arms, w):
     """The links of the model at the pose, above all the rows b of A."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
             _, links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
-            keep(modelled, w, i * L + j, W * L, links)
+            keep(w, i * L + j, W * L, links)
+
+
+@leaf
+def small(m11, m12, m22, det, l1sq, sx, sy):
+    """Is a Newton step so small that what it leaves of the error, and what `moved` leaves out, is rounding?
+
+    Both go with the square of the step, and grow towards stretched arms and singular poses.
+    """
+    trace2 = (m11 + m22) * (m11 + m22)
+    return max(sx * sx, sy * sy) * (trace2 * trace2) * l1sq < 2e-13 * det
 
 
 @outlined
-def newton_step(lanes, drives, arms, modelled, table, o, w, tolerance):
-    """One Newton step for the least-squares pose of all runs; returns how many need another one."""
+def newton_step(lanes, drives, arms, table, o, w):
+    """One Newton step SX, SY for the least-squares pose of all runs; returns how many need another one.
+
+    Those take it.  A run that is done stays where it is, and finds the same step again, whatever its neighbours need.
+    """
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
@@ -60,7 +79,7 @@ def newton_step(lanes, drives, arms, modelled, table, o, w, tolerance):
             )
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = p11, p12, p22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)], w[at(NEAR, i, j, W, L)] = gx, gy, near
-            keep(modelled, w, i * L + j, W * L, place[1])
+            keep(w, i * L + j, W * L, place[1])
     count = 0
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
@@ -70,19 +89,33 @@ def newton_step(lanes, drives, arms, modelled, table, o, w, tolerance):
             fx, fy = fx + w[at(GX, i, j, W, L)], fy + w[at(GY, i, j, W, L)]
             near = min(near, w[at(NEAR, i, j, W, L)])
         sx, sy = solve2(m11, m12, m22, fx, fy)
-        least, todo = min(m11, m11 * m22 - m12 * m12), w[of(TODO, j, W, L)]
-        more = todo if near >= 0.0 and least > 0.0 and max(abs(sx), abs(sy)) >= tolerance else 0.0
+        det, todo = m11 * m22 - m12 * m12, w[of(TODO, j, W, L)]
+        least = min(m11, det)
         w[of(FAR, j, W, L)] += 0.0 if near >= 0.0 and least > 0.0 else todo
-        # A run that is done stays where it is and finds the same matrix again, whatever its neighbours still need.
+        enough = small(m11, m12, m22, det, w[at(MODEL + L1SQ, 0, j, W, L)], sx, sy)
+        more = todo if near >= 0.0 and least > 0.0 and not enough else 0.0
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(TODO, j, W, L)] = sx, sy, more
         w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
         w[of(PY, j, W, L)] += sy if more > 0.0 else 0.0
-        w[of(TODO, j, W, L)] = more
         count += 1 if more > 0.0 else 0
     return count
 
 
+@outlined
+def follow(lanes, drives, arms, w):
+    """The small step SX, SY of all runs, and the links after it."""
+    L, N, W = len(lanes), len(drives), len(arms)
+    for i in range(N):
+        for j in range(L):
+            p, P = i * L + j, W * L
+            keep(w, p, P, moved(kept(w, p, P), w[of(SX, j, W, L)], w[of(SY, j, W, L)]))
+    for j in range(L):
+        w[of(PX, j, W, L)] += w[of(SX, j, W, L)]
+        w[of(PY, j, W, L)] += w[of(SY, j, W, L)]
+
+
 @leaf
-def single_step(arms, modelled, w, x, y):
+def single_step(arms, w, x, y):
     """`newton_step` of one run, its arms side by side: the shares of the arms at (x, y)."""
     W = len(arms)
     m = MODEL * W
@@ -98,34 +131,32 @@ def single_step(arms, modelled, w, x, y):
         )
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
         w[NEAR * W + i] = near
-        keep(modelled, w, i, W, place[1])
+        keep(w, i, W, place[1])
 
 
 @outlined
-def single_newton(drives, arms, modelled, w, tolerance):
+def single_newton(drives, arms, w):
     """The pose of one run by Newton steps; TODO says whether it needs more of them, FAR whether they lead nowhere."""
     N, W = len(drives), len(arms)
     x, y = w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)]
-    w[of(TODO, 0, W, 1)], done = 1.0, False
+    w[of(TODO, 0, W, 1)] = 1.0
     for _ in range(12):
-        single_step(arms, modelled, w, x, y)
-        if done:
-            w[of(TODO, 0, W, 1)] = 0.0
-            break
-        m11, m12, m22, fx, fy = w[P11 * W], w[P12 * W], w[P22 * W], w[GX * W], w[GY * W]
-        near = w[NEAR * W]
+        single_step(arms, w, x, y)
+        m11, m12, m22 = total(P11, w, W), total(P12, w, W), total(P22, w, W)
+        fx, fy, near = total(GX, w, W), total(GY, w, W), w[NEAR * W]
         for i in range(1, N):
-            m11, m12, m22 = m11 + w[P11 * W + i], m12 + w[P12 * W + i], m22 + w[P22 * W + i]
-            fx, fy, near = fx + w[GX * W + i], fy + w[GY * W + i], min(near, w[NEAR * W + i])
-        det, trace = m11 * m22 - m12 * m12, m11 + m22
+            near = min(near, w[NEAR * W + i])
+        det = m11 * m22 - m12 * m12
         if not (near >= 0.0 and min(m11, det) > 0.0):
             w[of(FAR, 0, W, 1)] = 1.0
             break
         sx, sy = solve2(m11, m12, m22, fx, fy)
         x, y = x + sx, y + sy
-        # The error that is left goes with the square of the step, and grows towards stretched arms and singular poses
-        # as this factor does; below the tolerance only the links are missing.
-        done = max(sx * sx, sy * sy) * (trace * trace * trace) * w[(MODEL + L1SQ) * W] < tolerance * det
+        if small(m11, m12, m22, det, w[(MODEL + L1SQ) * W], sx, sy):
+            for i in range(W):
+                keep(w, i, W, moved(kept(w, i, W), sx, sy))
+            w[of(TODO, 0, W, 1)] = 0.0
+            break
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)] = x, y
 
 
@@ -138,12 +169,12 @@ def nearest(drives, arms, w, q_a, x, y):
         w[(MOTION + COS) * W + i], w[(MOTION + SIN) * W + i] = math.cos(angle), math.sin(angle)
         w[E * W + i] = 0.0
     w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] = x, y, 0.0
-    single_newton(drives, arms, None, w, 1e-13 / w[(MODEL + SCALE) * W])
+    single_newton(drives, arms, w)
     return w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)], w[of(FAR, 0, W, 1)] + w[of(TODO, 0, W, 1)] == 0.0
 
 
 @outlined
-def gauss_newton(drives, arms, modelled, table, o, w, j, L, x, y, tolerance):
+def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
     """Least-squares pose of one run from a rough start; returns it, and whether it converged."""
     N, W = len(drives), len(arms)
     for _ in range(50):
@@ -155,7 +186,7 @@ def gauss_newton(drives, arms, modelled, table, o, w, j, L, x, y, tolerance):
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
             s, t = turned(chord, ux, uy)
             r, bx, by = w[at(E, i, j, W, L)] - math.atan2(s, t), links[0], links[1]
-            keep(modelled, w, i * L + j, W * L, links)
+            keep(w, i * L + j, W * L, links)
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
         sx, sy = solve2(m11, m12, m22, fx, fy)
         if abs(sx) < tolerance and abs(sy) < tolerance:
@@ -165,7 +196,7 @@ def gauss_newton(drives, arms, modelled, table, o, w, j, L, x, y, tolerance):
 
 
 @outlined
-def measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, smooth):
+def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
     tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
@@ -178,12 +209,13 @@ def measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k,
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
     if history is not None:
-        single_newton(drives, arms, modelled, w, tolerance)
+        single_newton(drives, arms, w)
     if study is not None:
         count = L
         for _ in range(12):
             if count > 0:
-                count = newton_step(lanes, drives, arms, modelled, table, o, w, tolerance)
+                count = newton_step(lanes, drives, arms, table, o, w)
+        follow(lanes, drives, arms, w)
     rough = 0
     for j in range(L):
         rough += 1 if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 else 0
@@ -191,7 +223,7 @@ def measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k,
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
                 px, py, found = gauss_newton(
-                    drives, arms, modelled, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
+                    drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
                 )
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
@@ -218,5 +250,7 @@ def find_pose(lanes, drives, arms, posed, modelled, history, study, law, table, 
         if law.pose == TRUE:
             true_pose(lanes, drives, arms, modelled, law, w)
         else:
-            measured_pose(lanes, drives, arms, modelled, history, study, table, o, w, k, law.pose == MEASURED)
-            measured_rate(lanes, drives, arms, table, o, w)
+            measured_pose(lanes, drives, arms, history, study, table, o, w, k, law.pose == MEASURED)
+            # Filters around PD and PID do not ask for it.
+            if law.form > PID:
+                measured_rate(lanes, drives, arms, table, o, w)

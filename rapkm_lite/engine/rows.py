@@ -98,10 +98,6 @@ BLOCKS = OTHER + 10
     G11,
     G12,
     G22,
-    BEST,
-    BEST_J,
-    BEST_K,
-    NOW,
     TORQUE2,
     ANTAGONISM,
     MISS2,
@@ -112,9 +108,9 @@ BLOCKS = OTHER + 10
     GRAVITY_Y,
     SHARPNESS,
     MASS,
-) = range(56)
+) = range(52)
 # The environment of the machine as in `tables.environment`, and after it that of the model.
-ENVIRONMENT, SINGLES = 4, 60
+ENVIRONMENT, SINGLES = 4, 56
 
 
 @index
