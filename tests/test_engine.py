@@ -111,6 +111,19 @@ def numbers(**environment):
     return np.array([float.fromhex(v) for v in done.stdout.split()])
 
 
+def test_links_after_a_small_step_are_those_of_the_new_place_to_first_order():
+    """Taylor: what `moved` leaves out falls with the square of the step."""
+    from rapkm_lite.engine.leaves import geometry, moved
+
+    make, move = getattr(geometry, "py_func", geometry), getattr(moved, "py_func", moved)
+    arm, step = (0.1, -0.05, 0.04, 0.5 * (0.04 - 0.03), -1.0), np.array([3e-5, -2e-5])
+    for x in ((0.2, 0.15), (0.0, 0.1), (-0.05, -0.2)):
+        links = make(*arm, *x)[1]
+        left = [np.abs(np.subtract(move(links, *s), make(*arm, *(x + s))[1])) for s in (step, step / 2)]
+        np.testing.assert_allclose(left[0], 4 * left[1], rtol=1e-2, atol=1e-13)
+        assert left[0].max() > 1e-10
+
+
 def test_the_pose_of_measured_angles_does_not_depend_on_where_its_search_begins():
     """The least-squares pose is one point, also where arms are nearly stretched: Newton's search ends at rounding."""
     robot, rng = machine(3), np.random.default_rng(3)

@@ -22,8 +22,8 @@ def keep(w, p, P, links):
 @leaf
 def kept(w, p, P):
     """The links that `keep` wrote."""
-    b, l = (w[A1 * P + p], w[A2 * P + p]), (w[L1 * P + p], w[L2 * P + p])
-    return *b, *l, w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p]
+    bx, by, lx, ly = w[A1 * P + p], w[A2 * P + p], w[L1 * P + p], w[L2 * P + p]
+    return bx, by, lx, ly, w[MAD * P + p], w[MINV * P + p], w[MDEN * P + p]
 
 
 @outlined
@@ -54,13 +54,14 @@ def link_rows(lanes, drives, arms, w):
 
 
 @leaf
-def small(m11, m12, m22, det, l1sq, sx, sy):
+def small(trace, det, l1sq, sx, sy):
     """Is a Newton step so small that what it leaves of the error, and what `moved` leaves out, is rounding?
 
-    Both go with the square of the step, and grow towards stretched arms and singular poses.
+    Both go with the square of the step, and grow towards stretched arms and singular poses.  trace, det : of the
+    Hessian.  At this bound they are about ten times the rounding of `geometry`.
     """
-    trace2 = (m11 + m22) * (m11 + m22)
-    return max(sx * sx, sy * sy) * (trace2 * trace2) * l1sq < 2e-13 * det
+    square = trace * trace
+    return max(sx * sx, sy * sy) * (square * square) * l1sq < 2e-13 * det
 
 
 @outlined
@@ -92,7 +93,7 @@ def newton_step(lanes, drives, arms, table, o, w):
         det, todo = m11 * m22 - m12 * m12, w[of(TODO, j, W, L)]
         least = min(m11, det)
         w[of(FAR, j, W, L)] += 0.0 if near >= 0.0 and least > 0.0 else todo
-        enough = small(m11, m12, m22, det, w[at(MODEL + L1SQ, 0, j, W, L)], sx, sy)
+        enough = small(m11 + m22, det, w[at(MODEL + L1SQ, 0, j, W, L)], sx, sy)
         more = todo if near >= 0.0 and least > 0.0 and not enough else 0.0
         w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(TODO, j, W, L)] = sx, sy, more
         w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
@@ -152,7 +153,7 @@ def single_newton(drives, arms, w):
             break
         sx, sy = solve2(m11, m12, m22, fx, fy)
         x, y = x + sx, y + sy
-        if small(m11, m12, m22, det, w[(MODEL + L1SQ) * W], sx, sy):
+        if small(m11 + m22, det, w[(MODEL + L1SQ) * W], sx, sy):
             for i in range(W):
                 keep(w, i, W, moved(kept(w, i, W), sx, sy))
             w[of(TODO, 0, W, 1)] = 0.0
