@@ -97,11 +97,13 @@ def width(N: int, alone: bool) -> int:
     return -(-N // 4) * 4 if alone and compiled() else N
 
 
-def aligned(size: int) -> np.ndarray:
-    """Zeros that start at a multiple of 64 bytes, as vector registers like it."""
-    room = np.zeros(size + 8)
+def aligned(numbers: np.ndarray) -> np.ndarray:
+    """A copy that starts at a multiple of 64 bytes, as vector registers like it."""
+    room = np.empty(len(numbers) + 8)
     start = -room.__array_interface__["data"][0] // 8 % 8
-    return room[start : start + size]
+    copy = room[start : start + len(numbers)]
+    copy[:] = numbers
+    return copy
 
 
 def plain(array: np.ndarray):

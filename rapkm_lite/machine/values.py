@@ -245,7 +245,7 @@ class Value:
 _KINDS = ("Manipulator", "Trajectory", "Sensors", "PD", "str")
 """Kinds of fields that every value is held to, by the name of the class: some stand in rooms above."""
 
-_CACHES = ("_hash", "_tables")
+_CACHES = ("_hash", "_tables", "_codes")
 """What is kept beside the fields and belongs to no value."""
 
 _known_names: dict[type, tuple[str, ...]] = {}

@@ -10,7 +10,7 @@ import numpy as np
 from ..control.compiled_law import CompiledLaw
 from ..engine import COMPILED, compiled, tables, without_compiler
 from ..engine.tables import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF
-from ..machine.values import room
+from ..machine.values import Value, room
 from ..mechanics.sampling import PART
 from .codes import Code, code_of
 from .patience import patience
@@ -28,8 +28,14 @@ __all__ = [
 
 
 def encode(law: Any, model) -> Code | None:
-    """The engine's form of a law, or None where it has none: then the law runs through the textbook layer."""
-    code = code_of(law, model)
+    """The engine's form of a law, or None where it has none: then the law runs through the textbook layer.
+
+    It is kept beside the fields of a law of the package, which do not change.
+    """
+    known = law.__dict__.setdefault("_codes", {}) if isinstance(law, Value) else {}
+    if model.n_arms not in known:
+        known[model.n_arms] = code_of(law, model)
+    code = known[model.n_arms]
     return None if code is None or (code.user is not None and not compiled()) else code
 
 
@@ -106,48 +112,58 @@ def _sums(setup: Setup, w) -> tuple:
     )
 
 
-def _work(setup: Setup, codes: list[Code], offsets, width: int):
-    """The work table of runs that begin: flat, its pair rows (blocks, width, L) and its run rows (rows, L)."""
-    rows, _ = _engine()
-    robot, L, N, path = setup.robot, len(codes), setup.robot.n_arms, setup.trajectory
-    work = _machines(robot, setup.model, width, L)
-    blocks, runs = work[: rows.BLOCKS * width * L].reshape(-1, width, L), work[rows.BLOCKS * width * L :].reshape(-1, L)
-    for name in codes[0].drives:
-        blocks[getattr(rows, name), :N] = np.array([code.drives[name] for code in codes]).T
-    for name in codes[0].run:
-        runs[getattr(rows, name)] = [code.run[name] for code in codes]
-    if "JOINT_J" in codes[0].run:
-        # Elbows are counted after all arms of a row.
-        joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
-        joints[joints >= N] += width - N
-    blocks[rows.OFFSET, :N] = offsets.T
-    start = path.x[0].tolist()
-    runs[rows.X : rows.VY + 1] = np.array([*start, *path.xd[0].tolist()])[:, None]
-    runs[rows.PX : rows.PY2 + 1] = np.array(3 * start)[:, None]
-    return work, blocks, runs
-
-
-def _machines(robot, model, width: int, L: int) -> np.ndarray:
-    """The work table (flat) of L runs of a machine with this model, which are told nothing else."""
-    blank = _blank(robot, model, width, L)
-    work = tables.aligned(len(blank))
-    work[:] = blank
-    return work
-
-
 @functools.lru_cache(maxsize=16)
-def _blank(robot, model, width: int, L: int) -> np.ndarray:
-    """What `_machines` copies, made once: values do not change."""
+def _blank(robot, model, width: int, L: int, start: tuple = (), codes: tuple = ()) -> np.ndarray:
+    """The work table (flat) of L runs of a machine with this model, without offsets.
+
+    start : end-effector position and velocity, if given; with it the codes of the runs, one each.
+    """
     rows, _ = _engine()
-    work = np.zeros((rows.BLOCKS * width + rows.SINGLES) * L)
-    blocks, runs = work[: rows.BLOCKS * width * L].reshape(-1, width, L), work[rows.BLOCKS * width * L :].reshape(-1, L)
+    N, work = robot.n_arms, np.zeros((rows.BLOCKS * width + rows.SINGLES) * L)
+    blocks, runs = _parts(work, width, L)
     for i, arms in enumerate((robot, model)):
         blocks[i * rows.MODEL : (i + 1) * rows.MODEL] = tables.arm_table(arms, width)[..., None]
-        start = rows.GRAVITY_X + i * rows.ENVIRONMENT
-        runs[start : start + rows.ENVIRONMENT] = tables.environment(arms)[:, None]
-    blocks[rows.WEIGHT, : robot.n_arms] = (robot.resistance / robot.torque_constant**2)[:, None]
+        first = rows.GRAVITY_X + i * rows.ENVIRONMENT
+        runs[first : first + rows.ENVIRONMENT] = tables.environment(arms)[:, None]
+    blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
     runs[rows.JOINT_J : rows.JOINT_K + 1] = -1.0
+    for j, code in enumerate(codes):
+        for name, values in code.drives.items():
+            blocks[getattr(rows, name), :N, j] = values
+        for name, value in code.run.items():
+            runs[getattr(rows, name), j] = value
+        runs[rows.X : rows.VY + 1, j] = start
+        runs[rows.PX : rows.PY2 + 1, j] = 3 * start[:2]
+    # Elbows are counted after all arms of a row.
+    joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
+    joints[joints >= N] += width - N
     return work
+
+
+def _parts(work: np.ndarray, width: int, L: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pair rows (blocks, width, L) and the run rows (rows, L) of a work table."""
+    pairs = _engine()[0].BLOCKS * width * L
+    return work[:pairs].reshape(-1, width, L), work[pairs:].reshape(-1, L)
+
+
+@functools.lru_cache(maxsize=64)
+def _shape(robot, model, code: Code, L: int, study: bool, faulty: bool, counted: bool):
+    """What the kernel has to know of runs side by side besides numbers: `Kind`, extra of the model, `Law`, columns."""
+    form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
+    asks = tables.NOTHING
+    if code.user is not None and code.user.at is not None:
+        asks = tables.DESIRED if code.user.at == "desired" else tables.POSED
+    pose = tables.TRUE if code.true_pose else tables.COUNTED if counted else tables.MEASURED
+    law = tables.Law(form, filtered, pose, model.same_kinematics(robot), code.switched, asks)
+    has_model = tables.PID < form < tables.USER
+    posed = () if has_model or filtered != tables.NO_FILTER or asks == tables.POSED else None
+    modelled = tables.sizes(int(tables.extra(model) is not None)) if has_model else None
+    width = tables.width(robot.n_arms, not study)
+    # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
+    drives = width if code.user is None else robot.n_arms
+    sizes = map(tables.sizes, (L, drives, width, int(faulty)))
+    columns = tables.FEW if modelled is None and code.user is None else tables.ALL
+    return tables.Kind(*sizes, posed, tables.extra(robot)), modelled, law, columns
 
 
 def _run(setup: Setup, codes: list[Code], offsets, history):
@@ -156,22 +172,17 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     history : None for a study; the `History` of a single run.
     """
     rows, loop = _engine()
-    robot, model, trajectory = setup.robot, setup.model, setup.trajectory
-    L, N, W = len(codes), robot.n_arms, tables.width(robot.n_arms, history is not None)
-    work, blocks, runs = _work(setup, codes, offsets, W)
-    code, sizes = codes[0], tables.sizes
-    user, buffer, asks = _user(code.user, N)
-    law = _law(code, asks, model.same_kinematics(robot), setup.sensors)
-    has_model = tables.PID < law.form < tables.USER
-    posed = () if has_model or law.filter != tables.NO_FILTER or asks == tables.POSED else None
-    # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
-    drives = W if user is None else N
-    faulty = sizes(int(setup.faults is not None))
-    kind = tables.Kind(sizes(L), sizes(drives), sizes(W), faulty, posed, tables.extra(robot))
+    robot, model, trajectory, sensors, code = setup.robot, setup.model, setup.trajectory, setup.sensors, codes[0]
     study = () if history is None else None
-    modelled = sizes(int(tables.extra(model) is not None)) if has_model else None
-    count = tables.FEW if modelled is None and user is None else tables.ALL
-    sensor, faults = tables.sensor(setup.sensors, trajectory.dt), tables.faults(setup.faults, W)
+    faulty, counted = setup.faults is not None, sensors.encoder is not None
+    kind, modelled, law, count = _shape(robot, model, code, len(codes), history is None, faulty, counted)
+    L, N, W = len(codes), robot.n_arms, len(kind.arms)
+    start = *trajectory.x[0].tolist(), *trajectory.xd[0].tolist()
+    work = tables.aligned(_blank(robot, model, W, L, start, tuple(codes)))
+    blocks, runs = _parts(work, W, L)
+    blocks[rows.OFFSET, :N] = offsets.T
+    user, buffer = _user(code.user, N)
+    sensor, faults = tables.sensor(sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
     log = None if history is None else tables.History._make([*map(tables.plain, history[:-1]), N])
     with patience(kind, study, modelled, user is None):
@@ -200,25 +211,15 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     return row
 
 
-def _law(code: Code, asks: int, same: bool, sensors) -> tables.Law:
-    """What the kernel has to know of a law; `same` where its model has the kinematics of the machine."""
-    form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
-    measured = tables.MEASURED if sensors.count is None else tables.COUNTED
-    pose = tables.TRUE if code.true_pose else measured
-    return tables.Law(form, filtered, pose, same, code.switched, asks)
-
-
 def _user(law: CompiledLaw | None, N: int):
-    """The pointer of a user's compiled law, its buffer, and the pose at which it wants matrices."""
+    """The pointer of a user's compiled law, and its buffer."""
     if law is None:
-        return None, tables.plain(np.empty(0)), tables.NOTHING
+        return None, tables.plain(np.empty(0))
     from ..engine.pointer import places, pointer
 
     law.check()
     matrices = law.at is not None
-    buffer = np.zeros(places(N, matrices, law.memory)[-1])
-    asks = tables.NOTHING if not matrices else tables.DESIRED if law.at == "desired" else tables.POSED
-    return pointer(law.function, N, matrices, law.memory), buffer, asks
+    return pointer(law.function, N, matrices, law.memory), np.zeros(places(N, matrices, law.memory)[-1])
 
 
 def _motion(trajectory, width: int, count: int, part: slice):
@@ -241,7 +242,7 @@ class Plant:
         self._observe, self._advance, self._dt, self._N = observe, advance, trajectory.dt, robot.n_arms
         self._nearest, self._drives = nearest, tables.sizes(robot.n_arms)
         W = tables.width(robot.n_arms, True)
-        self._w, self._arms = tables.plain(_machines(robot, model or robot, W, 1)), tables.sizes(W)
+        self._w, self._arms = tables.plain(tables.aligned(_blank(robot, model or robot, W, 1))), tables.sizes(W)
         self._extra, table = tables.extra(robot), _motion(trajectory, W, tables.FEW, slice(0, len(trajectory)))
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
