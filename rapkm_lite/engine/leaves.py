@@ -82,8 +82,7 @@ def geometry(base_x, base_y, l1sq, half, mode, x, y):
     # Arms that only fill up a row have mode 0: all of theirs is zero.
     across = mode * inside * quotient
     scale = root * quotient
-    near, inv = kappa * scale, rho2 * scale
-    far = inv - near
+    near, far, inv = kappa * scale, (rho2 - kappa) * scale, rho2 * scale
     bx, by = far * X - across * Y, far * Y + across * X
     lx, ly = near * X + across * Y, near * Y - across * X
     chord = X, Y, kappa * across, root * (mode * across)
