@@ -118,8 +118,8 @@ def test_links_after_a_small_step_are_those_of_the_new_place_to_first_order():
     make, move = getattr(geometry, "py_func", geometry), getattr(moved, "py_func", moved)
     arm, step = (0.1, -0.05, 0.04, 0.5 * (0.04 - 0.03), -1.0), np.array([3e-5, -2e-5])
     for x in ((0.2, 0.15), (0.0, 0.1), (-0.05, -0.2)):
-        links = make(*arm, *x)[1]
-        left = [np.abs(np.subtract(move(links, *s), make(*arm, *(x + s))[1])) for s in (step, step / 2)]
+        links = make(*arm, *x)[0]
+        left = [np.abs(np.subtract(move(links, *s), make(*arm, *(x + s))[0])) for s in (step, step / 2)]
         np.testing.assert_allclose(left[0], 4 * left[1], rtol=1e-2, atol=1e-13)
         assert left[0].max() > 1e-10
 

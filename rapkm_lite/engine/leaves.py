@@ -66,8 +66,8 @@ tanh = smooth_sign if COMPILED else math.tanh
 
 @leaf
 def geometry(base_x, base_y, l1sq, half, mode, x, y):
-    """An arm with its tip at (x, y): chord r, k, h; links b, l, a.d, 1 / (a x d), a x d; and (a x d)^2, which is
-    not positive outside the reach.
+    """An arm with its tip at (x, y): its links b, l, a.d, 1 / (a x d), a x d; and (a x d)^2, which is not positive
+    outside the reach.
 
     r is the way from the base to the tip.  With r' = (r_y, -r_x) the links are a = k r + h r' and d = (1 - k) r - h r';
     as a x d = h r^2, the part of b and l along r' is -1 / r^2 and 1 / r^2, whatever the root.  One division serves all.
@@ -85,16 +85,15 @@ def geometry(base_x, base_y, l1sq, half, mode, x, y):
     near, far, inv = kappa * scale, (rho2 - kappa) * scale, rho2 * scale
     bx, by = far * X - across * Y, far * Y + across * X
     lx, ly = near * X + across * Y, near * Y - across * X
-    chord = X, Y, kappa * across, root * (mode * across)
-    return chord, (bx, by, lx, ly, kappa - l1sq, inv, mode * root), area2
+    return (bx, by, lx, ly, kappa - l1sq, inv, mode * root), area2
 
 
 @leaf
-def turned(chord, ux, uy):
-    """Sine and cosine of the angle from a vector u to the proximal link, times the lengths of both."""
-    X, Y, k, h = chord
-    along, across = ux * X + uy * Y, ux * Y - uy * X
-    return k * across - h * along, k * along + h * across
+def turned(links, ux, uy):
+    """Sine and cosine of the angle from a vector u to the proximal link a, times the lengths of both."""
+    _, _, lx, ly, _, _, den = links
+    ax, ay = den * lx, den * ly
+    return ux * ay - uy * ax, ux * ax + uy * ay
 
 
 @leaf
@@ -150,8 +149,9 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
 
     u : unit vector of the desired proximal link.  e : measured minus desired base angle, rad.
     """
-    chord, (bx, by, lx, ly, ad, inv, _), area2 = place
-    s, t = turned(chord, scale * ux, scale * uy)
+    links, area2 = place
+    bx, by, lx, ly, ad, inv, _ = links
+    s, t = turned(links, scale * ux, scale * uy)
     near = min(min(0.1 - abs(s), t), area2)
     r = e - small_angle(s)
     # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).

@@ -27,13 +27,13 @@ def sense(lanes, arms, extra, table, o, w, dt):
         wanted, wanted_rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
-            chord, links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
+            links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
             m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(
                 extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             )
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
-            s, t = turned(chord, scale * ux, scale * uy)
+            s, t = turned(links, scale * ux, scale * uy)
             w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)] = s, t
             w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             angle = small_angle(s)
@@ -70,7 +70,7 @@ def pull(lanes, arms, extra, w):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            _, links, area2 = placed(0, w, i, j, W, L, w[of(SX, j, W, L)], w[of(SY, j, W, L)])
+            links, area2 = placed(0, w, i, j, W, L, w[of(SX, j, W, L)], w[of(SY, j, W, L)])
             m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(
                 extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
             )

@@ -49,7 +49,7 @@ def link_rows(lanes, drives, arms, w):
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
-            _, links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+            links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
             keep(w, i * L + j, W * L, links)
 
 
@@ -80,7 +80,7 @@ def newton_step(lanes, drives, arms, table, o, w):
             )
             w[at(P11, i, j, W, L)], w[at(P12, i, j, W, L)], w[at(P22, i, j, W, L)] = p11, p12, p22
             w[at(GX, i, j, W, L)], w[at(GY, i, j, W, L)], w[at(NEAR, i, j, W, L)] = gx, gy, near
-            keep(w, i * L + j, W * L, place[1])
+            keep(w, i * L + j, W * L, place[0])
     count = 0
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
@@ -132,7 +132,7 @@ def single_step(arms, w, x, y):
         )
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
         w[NEAR * W + i] = near
-        keep(w, i, W, place[1])
+        keep(w, i, W, place[0])
 
 
 @outlined
@@ -181,11 +181,11 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
     for _ in range(50):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            chord, links, area2 = placed(MODEL, w, i, j, W, L, x, y)
+            links, area2 = placed(MODEL, w, i, j, W, L, x, y)
             if not area2 > 0.0:
                 return x, y, False
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
-            s, t = turned(chord, ux, uy)
+            s, t = turned(links, ux, uy)
             r, bx, by = w[at(E, i, j, W, L)] - math.atan2(s, t), links[0], links[1]
             keep(w, i * L + j, W * L, links)
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r

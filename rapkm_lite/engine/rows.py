@@ -51,9 +51,9 @@ OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 
 ) = range(FY + 1, FY + 30)
 # The desired motion of a sample of a single run, in the order of the blocks of `tables.motion_table`.
 MOTION = WORK + 1
-# Two places of a single run's end-effector, ten rows each: links of `leaves.geometry`, k and h of its chord, (a x d)^2.
-PLACE, OTHER = MOTION + 9, MOTION + 19
-BLOCKS = OTHER + 10
+# Two places of a single run's end-effector, eight rows each: links of `leaves.geometry`, (a x d)^2.
+PLACE, OTHER = MOTION + 9, MOTION + 17
+BLOCKS = OTHER + 8
 
 (
     X,

@@ -26,20 +26,19 @@ def fetch(block, W, table, o, w):
 def put_place(arms, place, w, i, x, y):
     """Keep the geometry of arm i, the end-effector at (x, y), in the rows from `place` on."""
     W = len(arms)
-    (_, _, k, h), (bx, by, lx, ly, ad, inv, den), area2 = placed(0, w, i, 0, W, 1, x, y)
+    (bx, by, lx, ly, ad, inv, den), area2 = placed(0, w, i, 0, W, 1, x, y)
     w[place * W + i], w[(place + 1) * W + i], w[(place + 2) * W + i], w[(place + 3) * W + i] = bx, by, lx, ly
-    w[(place + 4) * W + i], w[(place + 5) * W + i], w[(place + 6) * W + i] = ad, inv, den
-    w[(place + 7) * W + i], w[(place + 8) * W + i], w[(place + 9) * W + i] = k, h, area2
+    w[(place + 4) * W + i], w[(place + 5) * W + i] = ad, inv
+    w[(place + 6) * W + i], w[(place + 7) * W + i] = den, area2
 
 
 @index
 def get_place(arms, place, w, i):
-    """Links, k and h of the chord, and (a x d)^2 of arm i from the rows that `put_place` wrote."""
+    """What `placed` gave of arm i, from the rows that `put_place` wrote."""
     W = len(arms)
     bx, by, lx, ly = w[place * W + i], w[(place + 1) * W + i], w[(place + 2) * W + i], w[(place + 3) * W + i]
     ad, inv, den = w[(place + 4) * W + i], w[(place + 5) * W + i], w[(place + 6) * W + i]
-    k, h, area2 = w[(place + 7) * W + i], w[(place + 8) * W + i], w[(place + 9) * W + i]
-    return (bx, by, lx, ly, ad, inv, den), k, h, area2
+    return (bx, by, lx, ly, ad, inv, den), w[(place + 7) * W + i]
 
 
 @outlined
@@ -61,11 +60,10 @@ def sense(arms, extra, table, o, w, dt):
     fetch(RATE, W, table, o, w)
     env = surroundings(w, 0, W, 1)
     for i in range(W):
-        links, k, h, area2 = get_place(arms, PLACE, w, i)
+        links, area2 = get_place(arms, PLACE, w, i)
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         scale = w[SCALE * W + i]
-        chord = x - w[BX * W + i], y - w[BY * W + i], k, h
-        s, t = turned(chord, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
+        s, t = turned(links, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
         w[SINE * W + i], w[COSINE * W + i] = s, t
         w[NEAR * W + i] = min(0.1 - abs(s), t)
         angle = small_angle(s)
@@ -96,7 +94,7 @@ def acceleration(arms, extra, acting, place, other, w, vx, vy, x, y):
     W = len(arms)
     env = surroundings(w, 0, W, 1)
     for i in range(W):
-        links, _, _, area2 = get_place(arms, place, w, i)
+        links, area2 = get_place(arms, place, w, i)
         m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
         c = w[acting * W + i]
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22

@@ -121,7 +121,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             link = base + want(table, o, ELBOW_RATE, i, W)
             den = ax * dy - ay * dx
         else:
-            _, (bx, by, lx, ly, _, _, den), _ = placed(MODEL, w, i, 0, W, 1, w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
+            (bx, by, lx, ly, _, _, den), _ = placed(MODEL, w, i, 0, W, 1, w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
             ax, ay, dx, dy = den * lx, den * ly, den * bx, den * by
             vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
             base, link = bx * vx + by * vy, -(lx * vx + ly * vy)
