@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .jit import index, leaf
-from .leaves import drag, geometry, share
+from .leaves import geometry, share, tanh, weight
 from .rows import *
 
 
@@ -25,18 +25,28 @@ def placed(first, w, i, j, W, L, x, y):
 
 
 @leaf
-def surroundings(w, j, W, L):
-    """Gravity vector, and the sharpness of the friction law, where the machine of a run stands."""
-    return w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)], w[of(SHARPNESS, j, W, L)]
-
-
-@leaf
-def moving(extra, w, i, j, W, L, env, links, vx, vy):
-    """`share` of an arm of the machine at the velocity (vx, vy) of its tip, with gravity and friction."""
+def moving(extra, w, i, j, W, L, links, vx, vy):
+    """`share` of an arm of the machine at the velocity (vx, vy) of its tip, with gravity."""
     m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
         w[at(S1, i, j, W, L)], w[at(S2, i, j, W, L)], w[at(L1SQ, i, j, W, L)], w[at(L2SQ, i, j, W, L)], links, vx, vy
     )
-    if extra is not None:
-        gx, gy = drag(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], w[at(FRICTION, i, j, W, L)], env, links, rate)
+    if extra is not None and len(extra) > 0:
+        gravity = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)]
+        gx, gy = weight(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], *gravity, links)
         fx, fy = fx + gx, fy + gy
     return m11, m12, m22, fx, fy, bx, by, rate, acc, decay
+
+
+@leaf
+def acting(extra, w, p, P, row, rate, sharpness):
+    """Torque in a row, entry p of pair rows of P numbers, less the friction of its drive at this rate."""
+    c = w[row * P + p]
+    if extra is not None:
+        c -= w[FRICTION * P + p] * tanh(rate * sharpness)
+    return c
+
+
+@leaf
+def slow(w, p, P, sharpness):
+    """Negative where the friction of a drive is not that of a drive that moves fast: tanh(20) is 1 to the last bit."""
+    return abs(w[QD * P + p]) * sharpness - (20.0 if w[FRICTION * P + p] > 0.0 else 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from . import compiled
 
 COMPILED = compiled()
 if COMPILED:
+    from llvmlite import ir
     from numba import njit, types
+    from numba.extending import intrinsic
 
     from .compiler import Wide
 
@@ -31,6 +34,27 @@ def _sources() -> str:
     """Fingerprint of the sources in this folder."""
     files = sorted(Path(__file__).parent.glob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
+
+
+SHIFT = 1.5 * 2.0**52
+"""Added to a small number it leaves the nearest whole number in the last bits of the sum."""
+
+if COMPILED:
+
+    @intrinsic
+    def power(_, shifted):
+        """2^k of k + SHIFT: the last bits go to where the exponent of a number stands."""
+
+        def generate(context, builder, signature, arguments):
+            (number,), whole = arguments, ir.IntType(64)
+            bits = builder.shl(builder.bitcast(number, whole), whole(52))
+            return builder.bitcast(builder.add(bits, whole(1023 << 52)), number.type)
+
+        return types.float64(types.float64), generate
+else:
+
+    def power(shifted):
+        return math.ldexp(1.0, int(shifted - SHIFT))
 
 
 def kernel(function) -> Callable[..., Any]:

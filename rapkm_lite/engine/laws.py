@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import accelerations, drag, inertia, small_angle, solve2
+from .leaves import accelerations, inertia, small_angle, solve2, tanh, weight
 from .minimal import best_pair, minimal_feedback, reference
 from .pose import kept
 from .rows import *
@@ -41,8 +41,9 @@ def arm_shares(w, p, P, extra, env, rates, links):
         w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], bx, by, lx, ly, base_acc, back_acc
     )
     if len(extra) > 0:
-        gx, gy = drag(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], w[(MODEL + FRICTION) * P + p], env, links, base)
-        fx, fy = fx + gx, fy + gy
+        gx, gy = weight(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], env[0], env[1], links)
+        braking = w[(MODEL + FRICTION) * P + p] * tanh(base * env[2])
+        fx, fy = fx + gx - bx * braking, fy + gy - by * braking
     w[P11 * P + p], w[P12 * P + p], w[P22 * P + p] = m11, m12, m22
     w[GX * P + p], w[GY * P + p] = -fx, -fy
     w[ACC_B * P + p], w[ACC_E * P + p] = base_acc, -base_acc - back_acc

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from .jit import COMPILED, leaf
+from .jit import COMPILED, SHIFT, leaf, power
 
 # Largest |qdd| h / v0 of a Runge-Kutta step across the bend of the friction law, and the angle in rad by which a step
 # that is longer may err, as where a machine is thrown about.
@@ -38,25 +38,20 @@ def small_angle(s):
 
 @leaf
 def smooth_sign(z):
-    """tanh(z) without branches, by halving the argument: t = e^u - 1 at u = -2 |z| / 64, doubled six times."""
-    u = max(-2.0 * abs(z), -40.0) * 0.015625
-    u2 = u * u
-    u4 = u2 * u2
-    # The series in pairs of pairs, so that less waits for each other: its last term is below 1e-17 of the first.
-    low = (
-        (1.0 + u * (1 / 2))
-        + u2 * (1 / 6 + u * (1 / 24))
-        + u4 * ((1 / 120 + u * (1 / 720)) + u2 * (1 / 5040 + u * (1 / 40320)))
-    )
-    high = (
-        (1 / 362880 + u * (1 / 3628800))
-        + u2 * (1 / 39916800 + u * (1 / 479001600))
-        + u4 * ((1 / 6227020800 + u * (1 / 87178291200)) + u2 * (1 / 1307674368000))
-    )
-    t = u * (low + u4 * u4 * high)
-    for _ in range(6):
-        t = t * (2.0 + t)
-    t = t / (2.0 + t)
+    """tanh(z) without branches: m / (2 + m) with m = e^u - 1 at u = -2 |z| = k ln 2 + r, k a whole number."""
+    u = max(-2.0 * abs(z), -40.0)
+    shifted = u * (1.0 / math.log(2.0)) + SHIFT
+    r = u - (shifted - SHIFT) * math.log(2.0)
+    r2 = r * r
+    r4 = r2 * r2
+    # e^r - 1 by its series in pairs, so that less waits for each other: the next term is below 1e-17 of the first.
+    low = (1.0 + r * (1 / 2)) + r2 * (1 / 6 + r * (1 / 24)) + r4 * ((1 / 120 + r * (1 / 720)) + r2 * (1 / 5040))
+    high = (1 / 40320 + r * (1 / 362880)) + r2 * (1 / 3628800 + r * (1 / 39916800))
+    high = high + r4 * ((1 / 479001600 + r * (1 / 6227020800)) + r2 * (1 / 87178291200))
+    series = r * (low + r4 * r2 * (r * high))
+    scale = power(shifted)
+    m = scale * series + (scale - 1.0)
+    t = m / (2.0 + m)
     return -t if z > 0.0 else t
 
 
@@ -120,14 +115,10 @@ def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
 
 
 @leaf
-def drag(w1, w2, friction, env, links, base):
-    """Force of gravity and friction on an arm whose base turns at the rate `base`.
-
-    env : gravity vector, and the sharpness 1 / v0 of the friction law.
-    """
+def weight(w1, w2, gx, gy, links):
+    """Force of gravity (gx, gy) on an arm at its tip."""
     bx, by, lx, ly, _, _, den = links
-    drive = w1 * den * (env[0] * ly - env[1] * lx) + friction * tanh(base * env[2])
-    distal = w2 * den * (env[0] * by - env[1] * bx)
+    drive, distal = w1 * den * (gx * ly - gy * lx), w2 * den * (gx * by - gy * bx)
     return lx * distal - bx * drive, ly * distal - by * drive
 
 

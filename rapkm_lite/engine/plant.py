@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from .arms import moving, placed, surroundings
+from .arms import acting, moving, placed
 from .jit import leaf, outlined
 from .leaves import small_angle, solve2, stiffness, turned
 from .rows import *
@@ -29,7 +29,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
         for j in range(L):
             links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
             m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(
-                extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+                extra, w, i, j, W, L, links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             )
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
@@ -71,10 +71,10 @@ def pull(lanes, arms, extra, w):
     for i in range(W):
         for j in range(L):
             links, area2 = placed(0, w, i, j, W, L, w[of(SX, j, W, L)], w[of(SY, j, W, L)])
-            m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(
-                extra, w, i, j, W, L, surroundings(w, j, W, L), links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
+            m11, m12, m22, fx, fy, bx, by, rate, _, _ = moving(
+                extra, w, i, j, W, L, links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
             )
-            c = w[at(C, i, j, W, L)]
+            c = acting(extra, w, i * L + j, W * L, C, rate, w[of(SHARPNESS, j, W, L)])
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c
             w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
@@ -95,9 +95,10 @@ def join(lanes, arms, w):
 
 @outlined
 def count_steps(lanes, arms, w, dt):
-    """Steps of equal length that each run needs in a hold because of friction; returns the largest number."""
+    """Steps of equal length that each run needs in a hold because of friction; returns the largest number, or 0.0 where
+    all drives of all runs move so fast that friction is constant in it."""
     L, W = len(lanes), len(arms)
-    most = 1.0
+    most = 0.0
     for j in range(L):
         mass, sharpness = w[of(MASS, j, W, L)], w[of(SHARPNESS, j, W, L)]
         m11, m12, m22 = mass, -0.0, mass
@@ -120,11 +121,11 @@ def count_steps(lanes, arms, w, dt):
                 dt,
             )
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = max(1.0, near * math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
-        w[of(STEPS, j, W, L)] = n
-        w[of(STEP, j, W, L)] = dt / n if n <= MOST_STEPS else dt
+        n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
+        w[of(STEPS, j, W, L)] = max(1.0, n)
+        w[of(STEP, j, W, L)] = dt / max(1.0, n) if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.
-        most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else 1.0)
+        most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else min(n, 1.0))
     return most
 
 
@@ -182,20 +183,38 @@ def step(lanes, arms, extra, w):
     last_stage(lanes, arms, w)
 
 
+@outlined
+def begin_hold(lanes, arms, extra, w, dt):
+    """The accelerations of the first stage, with the geometry of `sense`."""
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        for j in range(L):
+            p, P = i * L + j, W * L
+            c = acting(extra, w, p, P, C, w[QD * P + p], w[of(SHARPNESS, j, W, L)])
+            w[FX * P + p] += w[B1 * P + p] * c
+            w[FY * P + p] += w[B2 * P + p] * c
+    for j in range(L):
+        w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
+    join(lanes, arms, w)
+
+
 @leaf
 def hold(lanes, arms, extra, w, dt):
     """Hold the torques C for dt."""
     L, W = len(lanes), len(arms)
     P = W * L
-    for p in range(P):
-        w[FX * P + p] += w[B1 * P + p] * w[C * P + p]
-        w[FY * P + p] += w[B2 * P + p] * w[C * P + p]
-    join(lanes, arms, w)
+    begin_hold(lanes, arms, extra, w, dt)
     most = 1.0
-    for j in range(L):
-        w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
     if extra is not None:
         most = count_steps(lanes, arms, w, dt)
+        if most == 0.0 and len(extra) == 0:
+            for p in range(P):
+                c = w[C * P + p]
+                w[PUSH * P + p], w[C * P + p] = c, c - math.copysign(w[FRICTION * P + p], w[QD * P + p])
+            step(lanes, arms, None, w)
+            for p in range(P):
+                w[C * P + p] = w[PUSH * P + p]
+            return
     step(lanes, arms, extra, w)
     for s in range(1, int(most)):
         for j in range(L):

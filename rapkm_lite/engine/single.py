@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from .arms import moving, placed, surroundings
+from .arms import acting, moving, placed, slow
 from .jit import index, kernel, leaf, outlined
 from .leaves import small_angle, solve2, stiffness, turned
 from .plant import MOST_STEPS, STIFF, judge, mend
@@ -58,10 +58,9 @@ def sense(arms, extra, table, o, w, dt):
     fetch(COS, W, table, o, w)
     fetch(SIN, W, table, o, w)
     fetch(RATE, W, table, o, w)
-    env = surroundings(w, 0, W, 1)
     for i in range(W):
         links, area2 = get_place(arms, PLACE, w, i)
-        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
+        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, links, vx, vy)
         scale = w[SCALE * W + i]
         s, t = turned(links, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
         w[SINE * W + i], w[COSINE * W + i] = s, t
@@ -89,14 +88,14 @@ def join(arms, w):
 
 
 @index
-def acceleration(arms, extra, acting, place, other, w, vx, vy, x, y):
-    """End-effector acceleration at a place under the torques in the row `acting`; the other one is put at (x, y)."""
+def acceleration(arms, extra, row, place, other, w, vx, vy, x, y):
+    """End-effector acceleration at a place under the torques in a row; the other one is put at (x, y)."""
     W = len(arms)
-    env = surroundings(w, 0, W, 1)
+    sharpness = w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
         links, area2 = get_place(arms, place, w, i)
-        m11, m12, m22, fx, fy, bx, by, _, _, _ = moving(extra, w, i, 0, W, 1, env, links, vx, vy)
-        c = w[acting * W + i]
+        m11, m12, m22, fx, fy, bx, by, rate, _, _ = moving(extra, w, i, 0, W, 1, links, vx, vy)
+        c = acting(extra, w, i, W, row, rate, sharpness)
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
         w[LOW * W + i] = min(w[LOW * W + i], area2)
@@ -105,17 +104,17 @@ def acceleration(arms, extra, acting, place, other, w, vx, vy, x, y):
 
 
 @leaf
-def step(arms, extra, acting, w, x, y, vx, vy, k1x, k1y, dt):
+def step(arms, extra, row, w, x, y, vx, vy, k1x, k1y, dt):
     """A Runge-Kutta step (order 4) after its first stage, from PLACE to PLACE; half of it at rate v leads to OTHER."""
     h = 0.5 * dt
     ux, uy = vx + h * k1x, vy + h * k1y
-    k2x, k2y = acceleration(arms, extra, acting, OTHER, PLACE, w, ux, uy, x + h * ux, y + h * uy)
+    k2x, k2y = acceleration(arms, extra, row, OTHER, PLACE, w, ux, uy, x + h * ux, y + h * uy)
     wx, wy = vx + h * k2x, vy + h * k2y
-    k3x, k3y = acceleration(arms, extra, acting, PLACE, OTHER, w, wx, wy, x + dt * wx, y + dt * wy)
+    k3x, k3y = acceleration(arms, extra, row, PLACE, OTHER, w, wx, wy, x + dt * wx, y + dt * wy)
     zx, zy = vx + dt * k3x, vy + dt * k3y
     s = dt / 6.0
     x, y = x + s * (vx + 2.0 * (ux + wx) + zx), y + s * (vy + 2.0 * (uy + wy) + zy)
-    k4x, k4y = acceleration(arms, extra, acting, OTHER, PLACE, w, zx, zy, x, y)
+    k4x, k4y = acceleration(arms, extra, row, OTHER, PLACE, w, zx, zy, x, y)
     return x, y, vx + s * (k1x + 2.0 * (k2x + k3x) + k4x), vy + s * (k1y + 2.0 * (k2y + k3y) + k4y)
 
 
@@ -153,9 +152,6 @@ def friction_hold(arms, extra, w, k1x, k1y, dt):
     n = count_steps(arms, w, k1x, k1y, dt)
     w[of(STEPS, 0, W, 1)] = max(1.0, n)
     if n == 0.0 and len(extra) == 0:
-        # Nothing but constant friction: it joins the torques.
-        for i in range(W):
-            w[PUSH * W + i] = w[C * W + i] - math.copysign(w[FRICTION * W + i], w[QD * W + i])
         return step(arms, None, PUSH, w, x, y, vx, vy, k1x, k1y, dt)
     most = int(min(max(1.0, n), MOST_STEPS))
     h = dt / most
@@ -166,12 +162,29 @@ def friction_hold(arms, extra, w, k1x, k1y, dt):
     return x, y, vx, vy
 
 
+@outlined
+def brake(arms, extra, w):
+    """The torques PUSH: C less friction at the rates of the sample."""
+    W, sharpness = len(arms), w[of(SHARPNESS, 0, len(arms), 1)]
+    least = slow(w, 0, W, sharpness)
+    for i in range(1, W):
+        least = min(least, slow(w, i, W, sharpness))
+    if least >= 0.0:
+        for i in range(W):
+            w[PUSH * W + i] = w[C * W + i] - math.copysign(w[FRICTION * W + i], w[QD * W + i])
+    else:
+        for i in range(W):
+            w[PUSH * W + i] = acting(extra, w, i, W, C, w[QD * W + i], sharpness)
+
+
 @leaf
 def hold(arms, extra, w, dt):
     """As `plant.hold`, without its judgement."""
     W = len(arms)
+    if extra is not None:
+        brake(arms, extra, w)
     for i in range(W):
-        c = w[C * W + i]
+        c = w[C * W + i] if extra is None else w[PUSH * W + i]
         w[FX * W + i] += w[B1 * W + i] * c
         w[FY * W + i] += w[B2 * W + i] * c
     k1x, k1y = join(arms, w)

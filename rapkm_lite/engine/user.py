@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from .arms import placed
 from .jit import leaf, outlined, view
-from .leaves import smooth_sign, solve2
+from .leaves import solve2, tanh
 from .rows import *
 from .tables import *
 
@@ -137,7 +137,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         bend, elbow = tip * den, link - base
         C_[i, i], C_[i, N + i], C_[N + i, i] = -bend * elbow, -bend * link, bend * base
         distal = w[m + W2 * W] * (gx * dy - gy * dx)
-        drag = w[m + FRICTION * W] * smooth_sign(base * sharpness)
+        drag = w[m + FRICTION * W] * tanh(base * sharpness)
         Q_[i, 0], Q_[N + i, 0] = w[m + W1 * W] * (gx * ay - gy * ax) + distal + drag, distal
         fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link)
     U, V, H, T = scratch[0], scratch[1], scratch[2], scratch[3]
