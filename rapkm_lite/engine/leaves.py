@@ -38,20 +38,19 @@ def small_angle(s):
 
 @leaf
 def smooth_sign(z):
-    """tanh(z) without branches: m / (2 + m) with m = e^u - 1 at u = -2 |z| = k ln 2 + r, k a whole number."""
+    """tanh(z) without branches: (e^u - 1) / (e^u + 1) at u = -2 |z| = k ln 2 + r, k a whole number.
+
+    e^r = (p + q) / (p - q) with Pade's p and q of order six, which for |r| < 0.35 leave less than 2e-19.
+    """
     u = max(-2.0 * abs(z), -40.0)
     shifted = u * (1.0 / math.log(2.0)) + SHIFT
     r = u - (shifted - SHIFT) * math.log(2.0)
     r2 = r * r
-    r4 = r2 * r2
-    # e^r - 1 by its series in pairs, so that less waits for each other: the next term is below 1e-17 of the first.
-    low = (1.0 + r * (1 / 2)) + r2 * (1 / 6 + r * (1 / 24)) + r4 * ((1 / 120 + r * (1 / 720)) + r2 * (1 / 5040))
-    high = (1 / 40320 + r * (1 / 362880)) + r2 * (1 / 3628800 + r * (1 / 39916800))
-    high = high + r4 * ((1 / 479001600 + r * (1 / 6227020800)) + r2 * (1 / 87178291200))
-    series = r * (low + r4 * r2 * (r * high))
+    p = (665280.0 + 75600.0 * r2) + (r2 * r2) * (840.0 + r2)
+    q = r * (332640.0 + r2 * (10080.0 + 42.0 * r2))
     scale = power(shifted)
-    m = scale * series + (scale - 1.0)
-    t = m / (2.0 + m)
+    less, more = scale - 1.0, scale + 1.0
+    t = (less * p + more * q) / (more * p + less * q)
     return -t if z > 0.0 else t
 
 
