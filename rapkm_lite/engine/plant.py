@@ -34,7 +34,6 @@ def sense(lanes, arms, extra, table, o, w, dt):
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
             s, t = turned(links, scale * ux, scale * uy)
-            w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)] = s, t
             w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
             angle = small_angle(s)
             w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
@@ -42,7 +41,9 @@ def sense(lanes, arms, extra, table, o, w, dt):
             w[at(ED, i, j, W, L)] = rate - wanted_rate
             w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = bx, by
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
-            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)], w[at(ACC, i, j, W, L)] = fx, fy, acc
+            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx, fy
+            if extra is not None:
+                w[at(ACC, i, j, W, L)] = acc
             # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector
             # coordinates a Runge-Kutta step could jump over that instant.
             w[at(LOW, i, j, W, L)] = min(area2, 1.0 - dt * decay)
@@ -57,8 +58,9 @@ def mend(lanes, arms, table, o, w):
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
-            s, t = w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)]
-            if not (abs(s) <= 0.1 and t >= 0.0):
+            if w[at(NEAR, i, j, W, L)] < 0.0:
+                links, _ = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
+                s, t = turned(links, want(table, o, COS, i, W), want(table, o, SIN, i, W))
                 angle = math.atan2(s, t)
                 w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + angle
                 w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
@@ -80,17 +82,15 @@ def pull(lanes, arms, extra, w):
             w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
 
 
-@outlined
-def join(lanes, arms, w):
-    """End-effector accelerations from the shares of the arms."""
-    L, W = len(lanes), len(arms)
-    for j in range(L):
-        mass = w[of(MASS, j, W, L)]
-        m11, m12, m22, fx, fy = mass, -0.0, mass, -0.0, -0.0
-        for i in range(W):
-            m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
-            fx, fy = fx + w[at(FX, i, j, W, L)], fy + w[at(FY, i, j, W, L)]
-        w[of(KX, j, W, L)], w[of(KY, j, W, L)] = solve2(m11, m12, m22, fx, fy)
+@leaf
+def joined(arms, w, j, W, L):
+    """End-effector acceleration of a run from the shares of its arms."""
+    mass = w[of(MASS, j, W, L)]
+    m11, m12, m22, fx, fy = mass, -0.0, mass, -0.0, -0.0
+    for i in range(len(arms)):
+        m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
+        fx, fy = fx + w[at(FX, i, j, W, L)], fy + w[at(FY, i, j, W, L)]
+    return solve2(m11, m12, m22, fx, fy)
 
 
 @outlined
@@ -129,7 +129,7 @@ def count_steps(lanes, arms, w, dt):
     return most
 
 
-@leaf
+@outlined
 def first_stage(lanes, arms, w):
     """Begin the sums of a step of length STEP, and go half of it ahead."""
     L, W = len(lanes), len(arms)
@@ -141,13 +141,14 @@ def first_stage(lanes, arms, w):
         w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = vx + h * kx, vy + h * ky
 
 
-@leaf
+@outlined
 def stage(lanes, arms, w, part):
     """Add a stage to the sums, and go a part of the step ahead."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         h = part * w[of(STEP, j, W, L)]
-        vx, vy, kx, ky = w[of(SVX, j, W, L)], w[of(SVY, j, W, L)], w[of(KX, j, W, L)], w[of(KY, j, W, L)]
+        kx, ky = joined(arms, w, j, W, L)
+        vx, vy = w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
         w[of(TX, j, W, L)] += 2.0 * vx
         w[of(TY, j, W, L)] += 2.0 * vy
         w[of(TVX, j, W, L)] += 2.0 * kx
@@ -156,36 +157,36 @@ def stage(lanes, arms, w, part):
         w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)] + h * kx, w[of(VY, j, W, L)] + h * ky
 
 
-@leaf
+@outlined
 def last_stage(lanes, arms, w):
     """The state at the end of the step."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         h = w[of(STEP, j, W, L)] / 6.0
+        kx, ky = joined(arms, w, j, W, L)
         w[of(X, j, W, L)] += h * (w[of(TX, j, W, L)] + w[of(SVX, j, W, L)])
         w[of(Y, j, W, L)] += h * (w[of(TY, j, W, L)] + w[of(SVY, j, W, L)])
-        w[of(VX, j, W, L)] += h * (w[of(TVX, j, W, L)] + w[of(KX, j, W, L)])
-        w[of(VY, j, W, L)] += h * (w[of(TVY, j, W, L)] + w[of(KY, j, W, L)])
+        w[of(VX, j, W, L)] += h * (w[of(TVX, j, W, L)] + kx)
+        w[of(VY, j, W, L)] += h * (w[of(TVY, j, W, L)] + ky)
 
 
 @leaf
 def step(lanes, arms, extra, w):
-    """A Runge-Kutta step (order 4) of length STEP after the accelerations of its first stage.
+    """A Runge-Kutta step (order 4) of length STEP after the accelerations KX, KY of its first stage.
 
     Few and long loops over the runs: short ones would be unrolled before they could become vector instructions.
     """
     first_stage(lanes, arms, w)
-    for s in range(3):
+    for part in (0.5, 1.0):
         pull(lanes, arms, extra, w)
-        join(lanes, arms, w)
-        if s < 2:
-            stage(lanes, arms, w, 0.5 if s == 0 else 1.0)
+        stage(lanes, arms, w, part)
+    pull(lanes, arms, extra, w)
     last_stage(lanes, arms, w)
 
 
 @outlined
 def begin_hold(lanes, arms, extra, w, dt):
-    """The accelerations of the first stage, with the geometry of `sense`."""
+    """The accelerations KX, KY of the first stage, with the shares of `sense` and the torques of the hold."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
@@ -194,37 +195,50 @@ def begin_hold(lanes, arms, extra, w, dt):
             w[FX * P + p] += w[B1 * P + p] * c
             w[FY * P + p] += w[B2 * P + p] * c
     for j in range(L):
+        w[of(KX, j, W, L)], w[of(KY, j, W, L)] = joined(arms, w, j, W, L)
         w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
-    join(lanes, arms, w)
+
+
+@leaf
+def constant_friction(lanes, arms, w):
+    """A hold in which all drives move so fast that friction is one more torque; meanwhile PUSH keeps C."""
+    P = len(arms) * len(lanes)
+    for p in range(P):
+        c = w[C * P + p]
+        w[PUSH * P + p], w[C * P + p] = c, c - math.copysign(w[FRICTION * P + p], w[QD * P + p])
+    step(lanes, arms, None, w)
+    for p in range(P):
+        w[C * P + p] = w[PUSH * P + p]
+
+
+@leaf
+def small_steps(lanes, arms, extra, w, most):
+    """A hold in as many steps as friction asks for; a run that needs fewer stands still while others go on."""
+    L, W = len(lanes), len(arms)
+    step(lanes, arms, extra, w)
+    for s in range(1, int(most)):
+        for j in range(L):
+            w[of(STEP, j, W, L)] = w[of(STEP, j, W, L)] if s < w[of(STEPS, j, W, L)] else 0.0
+            w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
+            w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
+        pull(lanes, arms, extra, w)
+        for j in range(L):
+            w[of(KX, j, W, L)], w[of(KY, j, W, L)] = joined(arms, w, j, W, L)
+        step(lanes, arms, extra, w)
 
 
 @leaf
 def hold(lanes, arms, extra, w, dt):
     """Hold the torques C for dt."""
-    L, W = len(lanes), len(arms)
-    P = W * L
     begin_hold(lanes, arms, extra, w, dt)
-    most = 1.0
+    if extra is None:
+        step(lanes, arms, extra, w)
     if extra is not None:
         most = count_steps(lanes, arms, w, dt)
         if most == 0.0 and len(extra) == 0:
-            for p in range(P):
-                c = w[C * P + p]
-                w[PUSH * P + p], w[C * P + p] = c, c - math.copysign(w[FRICTION * P + p], w[QD * P + p])
-            step(lanes, arms, None, w)
-            for p in range(P):
-                w[C * P + p] = w[PUSH * P + p]
-            return
-    step(lanes, arms, extra, w)
-    for s in range(1, int(most)):
-        for j in range(L):
-            # A run that needs fewer steps stands still while others go on.
-            w[of(STEP, j, W, L)] = w[of(STEP, j, W, L)] if s < w[of(STEPS, j, W, L)] else 0.0
-            w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
-            w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-        pull(lanes, arms, extra, w)
-        join(lanes, arms, w)
-        step(lanes, arms, extra, w)
+            constant_friction(lanes, arms, w)
+        else:
+            small_steps(lanes, arms, extra, w, most)
 
 
 @outlined

@@ -14,9 +14,9 @@ BX, BY, L1SQ, L2SQ, HALF, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCAL
 MODEL = 14
 # What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
 OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
-# The machine at the sample: angle and rate, sine and cosine of the angle error, rows b, shares of the arms; what
+# The machine at the sample: angle and rate, rows b, shares of the arms; what
 # tells a lost arm and a far one.
-(Q, QD, SINE, COSINE, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 15)
+(Q, QD, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 13)
 # The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
 (
     E,

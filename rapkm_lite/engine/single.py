@@ -63,14 +63,15 @@ def sense(arms, extra, table, o, w, dt):
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, links, vx, vy)
         scale = w[SCALE * W + i]
         s, t = turned(links, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
-        w[SINE * W + i], w[COSINE * W + i] = s, t
         w[NEAR * W + i] = min(0.1 - abs(s), t)
         angle = small_angle(s)
         w[Q * W + i], w[QD * W + i] = desired(table, o, w, ANGLE, i, W, 1) + angle, rate
         w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - desired(table, o, w, RATE, i, W, 1)
         w[B1 * W + i], w[B2 * W + i] = bx, by
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
-        w[FX * W + i], w[FY * W + i], w[ACC * W + i] = fx, fy, acc
+        w[FX * W + i], w[FY * W + i] = fx, fy
+        if extra is not None:
+            w[ACC * W + i] = acc
         w[LOW * W + i] = min(area2, 1.0 - dt * decay)
         put_place(arms, OTHER, w, i, x + 0.5 * dt * vx, y + 0.5 * dt * vy)
     near = w[NEAR * W]
