@@ -13,15 +13,8 @@ def placed(first, w, i, j, W, L, x, y):
 
     first : 0 for the machine, MODEL for the model.
     """
-    return geometry(
-        w[at(first + BX, i, j, W, L)],
-        w[at(first + BY, i, j, W, L)],
-        w[at(first + L1SQ, i, j, W, L)],
-        w[at(first + HALF, i, j, W, L)],
-        w[at(first + MODE, i, j, W, L)],
-        x,
-        y,
-    )
+    P, p = W * L, at(first, i, j, W, L)
+    return geometry(w[BX * P + p], w[BY * P + p], w[L1SQ * P + p], w[HALF * P + p], w[MODE * P + p], x, y)
 
 
 @leaf

@@ -176,14 +176,16 @@ def moved(links, sx, sy):
 
 
 @leaf
-def stiffness(friction, sharpness, m11, m12, m22, bx, by, rate, acc, kx, ky, dt):
+def stiffness(friction, sharpness, inertia, b, rate, acc, k, dt):
     """What friction of a drive asks of a hold: lambda dt, steps across the bend, and 1 where the drive can pass zero.
 
-    lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.
+    lambda : its share f_c / v0 b^T M^-1 b in the decay rate of creep, 1/s.  inertia : m11, m12, m22 of M.  k :
+    acceleration of the end-effector.
     """
+    (m11, m12, m22), (bx, by) = inertia, b
     gx, gy = solve2(m11, m12, m22, bx, by)
     yields = friction * (bx * gx + by * gy)
-    qdd = abs(bx * kx + by * ky + acc)
+    qdd = abs(bx * k[0] + by * k[1] + acc)
     passes = abs(rate) < 20.0 / sharpness + (qdd + 2.0 * yields) * dt
     steps = min((qdd + yields) * dt * sharpness / FAST, yields * dt * dt / FINE)
     return yields * sharpness * dt, steps, 1.0 if passes and friction > 0.0 else 0.0

@@ -104,22 +104,11 @@ def count_steps(lanes, arms, w, dt):
         m11, m12, m22 = mass, -0.0, mass
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
-        stiff, fast, near = 0.0, 0.0, 0.0
+        stiff, fast, near, k = 0.0, 0.0, 0.0, (w[of(KX, j, W, L)], w[of(KY, j, W, L)])
         for i in range(W):
-            a, b, c = stiffness(
-                w[at(FRICTION, i, j, W, L)],
-                sharpness,
-                m11,
-                m12,
-                m22,
-                w[at(B1, i, j, W, L)],
-                w[at(B2, i, j, W, L)],
-                w[at(QD, i, j, W, L)],
-                w[at(ACC, i, j, W, L)],
-                w[of(KX, j, W, L)],
-                w[of(KY, j, W, L)],
-                dt,
-            )
+            f, row = w[at(FRICTION, i, j, W, L)], (w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)])
+            rate, acc = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)]
+            a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, k, dt)
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
         n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = max(1.0, n)

@@ -14,102 +14,37 @@ BX, BY, L1SQ, L2SQ, HALF, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCAL
 MODEL = 14
 # What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
 OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
-# The machine at the sample: angle and rate, rows b, shares of the arms; what
-# tells a lost arm and a far one.
-(Q, QD, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY) = range(WEIGHT + 1, WEIGHT + 13)
-# The controller: measured errors, its memory, its pose, its torques; sums of a study; the desired motion of a sample.
+# The machine at the sample: angle and rate, rows b, base acceleration; what tells a lost arm and a far one; shares of
+# the arms in the equations of motion.
+Q, QD, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY = range(WEIGHT + 1, WEIGHT + 13)
+# The controller: measured errors, what encoders and laws remember; A and a Newton step of the pose; the model's links;
+# accelerations and errors of the joints; torques, also less friction; sums of a study.
 (
-    E,
-    ED,
-    LAST,
-    SLOW,
-    READ,
-    MEMORY,
-    A1,
-    A2,
-    P11,
-    P12,
-    P22,
-    GX,
-    GY,
-    L1,
-    L2,
-    MAD,
-    MDEN,
-    MINV,
-    ACC_B,
-    ACC_E,
-    ELBOW_E,
-    ELBOW_ED,
-    ASK_B,
-    ASK_E,
-    C,
-    PUSH,
-    OLD,
-    COPPER,
-    WORK,
-) = range(FY + 1, FY + 30)
+    E, ED, SLOW, READ, MEMORY,
+    A1, A2, P11, P12, P22, GX, GY,
+    L1, L2, MAD, MDEN, MINV,
+    ACC_B, ACC_E, ELBOW_E, ELBOW_ED, ASK_B, ASK_E,
+    C, PUSH, OLD, COPPER, WORK,
+) = range(FY + 1, FY + 29)  # fmt: skip
 # The desired motion of a sample of a single run, in the order of the blocks of `tables.motion_table`.
 MOTION = WORK + 1
 # Two places of a single run's end-effector, eight rows each: links of `leaves.geometry`, (a x d)^2.
 PLACE, OTHER = MOTION + 9, MOTION + 17
 BLOCKS = OTHER + 8
 
+# Run rows: the state, its acceleration, that of a stage, the sums of a step, its length, how many there are; the pose,
+# the two before it, its velocity, what its search needs; the joints of a law, their gains; reference rate, acceleration
+# and force of a law, F^T F; sums of a study, how it ended; the environment as in `tables.environment`.
 (
-    X,
-    Y,
-    VX,
-    VY,
-    KX,
-    KY,
-    SX,
-    SY,
-    SVX,
-    SVY,
-    TX,
-    TY,
-    TVX,
-    TVY,
-    STEP,
-    STEPS,
-    PX,
-    PY,
-    PX1,
-    PY1,
-    PX2,
-    PY2,
-    PVX,
-    PVY,
-    TODO,
-    FAR,
-    JOINT_J,
-    JOINT_K,
-    PAIR_P1,
-    PAIR_P2,
-    PAIR_D1,
-    PAIR_D2,
-    HYSTERESIS,
-    REF_X,
-    REF_Y,
-    ACC_X,
-    ACC_Y,
-    PUSH_X,
-    PUSH_Y,
-    G11,
-    G12,
-    G22,
-    TORQUE2,
-    ANTAGONISM,
-    MISS2,
-    FARTHEST,
-    STATUS,
-    SAMPLE,
-    GRAVITY_X,
-    GRAVITY_Y,
-    SHARPNESS,
-    MASS,
-) = range(52)
-# The environment of the machine as in `tables.environment`, and after it that of the model.
+    X, Y, VX, VY, KX, KY,
+    SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS,
+    PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR,
+    JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS,
+    REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
+    TORQUE2, ANTAGONISM, MISS2, FARTHEST, STATUS, SAMPLE,
+    GRAVITY_X, GRAVITY_Y, SHARPNESS, MASS,
+) = range(52)  # fmt: skip
+# After the environment of the machine stands that of the model.
 ENVIRONMENT, SINGLES = 4, 56
 
 

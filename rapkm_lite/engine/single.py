@@ -127,20 +127,8 @@ def count_steps(arms, w, kx, ky, dt):
     m11, m12, m22 = mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W)
     stiff, fast, near = 0.0, 0.0, 0.0
     for i in range(W):
-        a, b, c = stiffness(
-            w[FRICTION * W + i],
-            sharpness,
-            m11,
-            m12,
-            m22,
-            w[B1 * W + i],
-            w[B2 * W + i],
-            w[QD * W + i],
-            w[ACC * W + i],
-            kx,
-            ky,
-            dt,
-        )
+        row, rate, acc = (w[B1 * W + i], w[B2 * W + i]), w[QD * W + i], w[ACC * W + i]
+        a, b, c = stiffness(w[FRICTION * W + i], sharpness, (m11, m12, m22), row, rate, acc, (kx, ky), dt)
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
     return max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS)))) if near > 0.0 else 0.0
 
