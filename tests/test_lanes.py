@@ -254,6 +254,18 @@ def test_friction_of_a_machine_that_is_thrown_about():
     assert_allclose(rk.sweep(robot, law, path, offset).x_final[0], states[-1, :2], rtol=0, atol=1e-8)
 
 
+def test_friction_of_neighbours_changes_no_bit():
+    """Constant friction of drives that all move fast, and its tanh beside a neighbour that is slow, are one number."""
+    robot, path = MACHINES["testbed"].replace(friction=[4e-3, 0.3, 0.0]), rk.circle(MACHINES["testbed"], 0.1, 1.0)
+    offsets = np.random.default_rng(5).normal(0.0, 0.02, (40, 3))
+    together = rk.sweep(robot, PD, path, offsets)
+    for i in (0, 13, 39):
+        alone = rk.sweep(robot, PD, path, offsets[i])
+        assert_array_equal(together.energies[i], alone.energies[0])
+        run = rk.simulate(robot, PD, path, offsets[i])
+        assert_allclose(alone.energies[0], run.energy, rtol=0, atol=1e-11 * np.abs(run.energy).max())
+
+
 def test_friction_beyond_all_measure():
     robot, still = MACHINES["testbed"].replace(friction=50.0, friction_velocity=1e-6), MOTIONS["at rest"]
     words = r"f_c / v0 = 5e\+07 N m s/rad \(friction 50 N m, friction_velocity 1e-06 rad/s\) needs more than 4000 steps"
