@@ -39,22 +39,24 @@ def _sources() -> str:
 SHIFT = 1.5 * 2.0**52
 """Added to a small number it leaves the nearest whole number in the last bits of the sum."""
 
-if COMPILED:
 
-    @intrinsic
-    def power(_, shifted):
-        """2^k of k + SHIFT: the last bits go to where the exponent of a number stands."""
+def _power(shifted):
+    return math.ldexp(1.0, int(shifted - SHIFT))
 
-        def generate(context, builder, signature, arguments):
-            (number,), whole = arguments, ir.IntType(64)
-            bits = builder.shl(builder.bitcast(number, whole), whole(52))
-            return builder.bitcast(builder.add(bits, whole(1023 << 52)), number.type)
 
-        return types.float64(types.float64), generate
-else:
+def _power_by_bits(_, shifted):
+    """The last bits go to where the exponent of a number stands."""
 
-    def power(shifted):
-        return math.ldexp(1.0, int(shifted - SHIFT))
+    def generate(context, builder, signature, arguments):
+        (number,), whole = arguments, ir.IntType(64)
+        bits = builder.shl(builder.bitcast(number, whole), whole(52))
+        return builder.bitcast(builder.add(bits, whole(1023 << 52)), number.type)
+
+    return types.float64(types.float64), generate
+
+
+power: Callable[..., Any] = intrinsic(_power_by_bits) if COMPILED else _power
+"""2^k of k + SHIFT."""
 
 
 def kernel(function) -> Callable[..., Any]:

@@ -161,9 +161,9 @@ def _shape(robot, model, code: Code, L: int, study: bool, faulty: bool, counted:
     width = tables.width(robot.n_arms, not study)
     # Arms that fill up a row drive with zeros, so that machines of three and four arms share a kernel.
     drives = width if code.user is None else robot.n_arms
-    sizes = map(tables.sizes, (L, drives, width, int(faulty)))
-    columns = tables.FEW if modelled is None and code.user is None else tables.ALL
-    return tables.Kind(*sizes, posed, tables.extra(robot)), modelled, law, columns
+    sizes, columns = tables.sizes, tables.FEW if modelled is None and code.user is None else tables.ALL
+    kind = tables.Kind(sizes(L), sizes(drives), sizes(width), sizes(int(faulty)), posed, tables.extra(robot))
+    return kind, modelled, law, columns
 
 
 def _run(setup: Setup, codes: list[Code], offsets, history):
