@@ -38,7 +38,7 @@ def arm_shares(w, p, P, extra, env, rates, links):
         w[(MODEL + L2SQ) * P + p],
     )
     m11, m12, m22, fx, fy = inertia(
-        w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], bx, by, lx, ly, base_acc, back_acc
+        w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], w[(MODEL + TIP) * P + p], bx, by, lx, ly, base_acc, back_acc
     )
     if len(extra) > 0:
         gx, gy = weight(w[(MODEL + W1) * P + p], w[(MODEL + W2) * P + p], env[0], env[1], links)
@@ -220,9 +220,7 @@ def distribute(lanes, drives, arms, w):
     """c = A (A^T A)^-1 (M w + h + g), weighted where W is not the identity."""
     L, N, W = len(lanes), len(drives), len(arms)
     for j in range(L):
-        mass = w[of(ENVIRONMENT + MASS, j, W, L)]
-        m11, m12, m22 = mass, 0.0, mass
-        n11 = n12 = n22 = 0.0
+        m11 = m12 = m22 = n11 = n12 = n22 = 0.0
         fx, fy = w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)]
         for i in range(N):
             m11, m12, m22 = m11 + w[at(P11, i, j, W, L)], m12 + w[at(P12, i, j, W, L)], m22 + w[at(P22, i, j, W, L)]

@@ -101,13 +101,13 @@ def accelerations(base, back, base_ref, back_ref, ad, inv, l1sq, l2sq):
 
 
 @leaf
-def inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc):
+def inertia(s1, s2, tip, bx, by, lx, ly, base_acc, back_acc):
     """Share of an arm in the mass matrix and in the force at zero xdd: m11, m12, m22, fx, fy."""
     sx, sy, tx, ty = s1 * bx, s1 * by, s2 * lx, s2 * ly
     return (
-        sx * bx + tx * lx,
+        tip + sx * bx + tx * lx,
         sx * by + tx * ly,
-        sy * by + ty * ly,
+        tip + sy * by + ty * ly,
         -(sx * base_acc + tx * back_acc),
         -(sy * base_acc + ty * back_acc),
     )
@@ -122,13 +122,13 @@ def weight(w1, w2, gx, gy, links):
 
 
 @leaf
-def share(s1, s2, l1sq, l2sq, links, vx, vy):
+def share(s1, s2, tip, l1sq, l2sq, links, vx, vy):
     """An arm in the equations of motion: m11, m12, m22, fx, fy of `inertia`; b; base rate and its part of the base
     acceleration at zero xdd; decay rate of a x d, 1/s."""
     bx, by, lx, ly, ad, inv, _ = links
     base, back = bx * vx + by * vy, lx * vx + ly * vy
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
-    m11, m12, m22, fx, fy = inertia(s1, s2, bx, by, lx, ly, base_acc, back_acc)
+    m11, m12, m22, fx, fy = inertia(s1, s2, tip, bx, by, lx, ly, base_acc, back_acc)
     return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv * (base + back)
 
 

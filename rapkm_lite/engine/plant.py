@@ -85,8 +85,7 @@ def pull(lanes, arms, extra, w):
 @leaf
 def joined(arms, w, j, W, L):
     """End-effector acceleration of a run from the shares of its arms."""
-    mass = w[of(MASS, j, W, L)]
-    m11, m12, m22, fx, fy = mass, -0.0, mass, -0.0, -0.0
+    m11 = m12 = m22 = fx = fy = -0.0
     for i in range(len(arms)):
         m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
         fx, fy = fx + w[at(FX, i, j, W, L)], fy + w[at(FY, i, j, W, L)]
@@ -100,8 +99,7 @@ def count_steps(lanes, arms, w, dt):
     L, W = len(lanes), len(arms)
     most = 0.0
     for j in range(L):
-        mass, sharpness = w[of(MASS, j, W, L)], w[of(SHARPNESS, j, W, L)]
-        m11, m12, m22 = mass, -0.0, mass
+        sharpness, m11, m12, m22 = w[of(SHARPNESS, j, W, L)], -0.0, -0.0, -0.0
         for i in range(W):
             m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
         stiff, fast, near, k = 0.0, 0.0, 0.0, (w[of(KX, j, W, L)], w[of(KY, j, W, L)])

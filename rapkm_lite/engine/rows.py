@@ -42,10 +42,10 @@ BLOCKS = OTHER + 8
     JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS,
     REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
     TORQUE2, ANTAGONISM, MISS2, FARTHEST, STATUS, SAMPLE,
-    GRAVITY_X, GRAVITY_Y, SHARPNESS, MASS,
-) = range(52)  # fmt: skip
+    GRAVITY_X, GRAVITY_Y, SHARPNESS,
+) = range(51)  # fmt: skip
 # After the environment of the machine stands that of the model.
-ENVIRONMENT, SINGLES = 4, 56
+ENVIRONMENT, SINGLES = 3, 54
 
 
 @index

@@ -84,8 +84,7 @@ def sense(arms, extra, table, o, w, dt):
 def join(arms, w):
     """End-effector acceleration from the shares of the arms."""
     W = len(arms)
-    mass = w[of(MASS, 0, W, 1)]
-    return solve2(mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W), total(FX, w, W), total(FY, w, W))
+    return solve2(total(M11, w, W), total(M12, w, W), total(M22, w, W), total(FX, w, W), total(FY, w, W))
 
 
 @index
@@ -123,8 +122,7 @@ def step(arms, extra, row, w, x, y, vx, vy, k1x, k1y, dt):
 def count_steps(arms, w, kx, ky, dt):
     """Steps that friction asks of a hold; 0.0 where all drives move so fast that friction is constant in it."""
     W = len(arms)
-    mass, sharpness = w[of(MASS, 0, W, 1)], w[of(SHARPNESS, 0, W, 1)]
-    m11, m12, m22 = mass + total(M11, w, W), total(M12, w, W), mass + total(M22, w, W)
+    sharpness, m11, m12, m22 = w[of(SHARPNESS, 0, W, 1)], total(M11, w, W), total(M12, w, W), total(M22, w, W)
     stiff, fast, near = 0.0, 0.0, 0.0
     for i in range(W):
         row, rate, acc = (w[B1 * W + i], w[B2 * W + i]), w[QD * W + i], w[ACC * W + i]

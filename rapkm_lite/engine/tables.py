@@ -61,8 +61,8 @@ def _tip_masses(robot) -> np.ndarray:
 
 
 def environment(robot) -> np.ndarray:
-    """Gravity vector in m/s^2, inverse friction velocity in s/rad and mass at the end-effector in kg, (4,)."""
-    return np.array([*robot.gravity, 1 / robot.friction_velocity, _tip_masses(robot).sum()])
+    """Gravity vector in m/s^2 and inverse friction velocity in s/rad, (3,)."""
+    return np.array([*robot.gravity, 1 / robot.friction_velocity])
 
 
 # Blocks for laws without a model, which then read half as much, and for all others.
