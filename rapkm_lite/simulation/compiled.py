@@ -127,13 +127,13 @@ def _blank(robot, model, width: int, L: int, start: tuple = (), codes: tuple = (
         runs[first : first + rows.ENVIRONMENT] = tables.environment(arms)[:, None]
     blocks[rows.WEIGHT, :N] = (robot.resistance / robot.torque_constant**2)[:, None]
     runs[rows.JOINT_J : rows.JOINT_K + 1] = -1.0
-    for j, code in enumerate(codes):
-        for name, values in code.drives.items():
-            blocks[getattr(rows, name), :N, j] = values
-        for name, value in code.run.items():
-            runs[getattr(rows, name), j] = value
-        runs[rows.X : rows.VY + 1, j] = start
-        runs[rows.PX : rows.PY2 + 1, j] = 3 * start[:2]
+    if codes:
+        for name in codes[0].drives:
+            blocks[getattr(rows, name), :N] = np.array([code.drives[name] for code in codes]).T
+        for name in codes[0].run:
+            runs[getattr(rows, name)] = [code.run[name] for code in codes]
+        runs[rows.X : rows.VY + 1] = np.array(start)[:, None]
+        runs[rows.PX : rows.PY2 + 1] = np.array(3 * start[:2])[:, None]
     # Elbows are counted after all arms of a row.
     joints = runs[rows.JOINT_J : rows.JOINT_K + 1]
     joints[joints >= N] += width - N
