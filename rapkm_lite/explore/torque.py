@@ -80,7 +80,8 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             if singular[fixed[law]]:
                 numbers["distance from its singular curve"] = distance(law, side)
         norm = norms(law, side)
-        picture.line("map", t.t[::5], redundant(side), color=NEUTRAL, linewidth=1.2, linestyle="--")
+        other = norm[::5] if law == "redundant coordinates" else redundant(side)
+        picture.line("map", t.t[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", t.t, np.minimum(norm, 1e6), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
