@@ -231,7 +231,10 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
         # Hold.
         hold(lanes, arms, extra, study, history, w, dt)
-        if plant.judge(lanes, arms, w, k) == len(lanes):
+        going = False
+        if history is not None:
+            going = single.sound(arms, extra, w)
+        if not going and plant.judge(lanes, arms, w, k) == len(lanes):
             return
 
 

@@ -184,6 +184,18 @@ def hold(arms, extra, w, dt):
 
 
 @leaf
+def sound(arms, extra, w):
+    """Is a run beyond doubt, so that `judge` need not look at it?"""
+    W = len(arms)
+    x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    low, size = w[LOW * W], (abs(x) + abs(y)) + (abs(vx) + abs(vy))
+    for i in range(W):
+        low, size = min(low, w[LOW * W + i]), size + abs(w[C * W + i])
+    steps = 1.0 if extra is None else w[of(STEPS, 0, W, 1)]
+    return low > 0.0 and size < 1e300 and steps <= MOST_STEPS and w[of(STATUS, 0, W, 1)] == DONE
+
+
+@leaf
 def put(arms, w, x, y, vx, vy):
     """Write the state of the machine."""
     W = len(arms)

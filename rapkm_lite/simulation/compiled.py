@@ -150,9 +150,8 @@ def _parts(work: np.ndarray, width: int, L: int) -> tuple[np.ndarray, np.ndarray
 def _shape(robot, model, code: Code, L: int, study: bool, faulty: bool, counted: bool):
     """What the kernel has to know of runs side by side besides numbers: `Kind`, extra of the model, `Law`, columns."""
     form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
-    asks = tables.NOTHING
-    if code.user is not None and code.user.at is not None:
-        asks = tables.DESIRED if code.user.at == "desired" else tables.POSED
+    at = None if code.user is None else code.user.at
+    asks = tables.NOTHING if at is None else tables.DESIRED if at == "desired" else tables.POSED
     pose = tables.TRUE if code.true_pose else tables.COUNTED if counted else tables.MEASURED
     law = tables.Law(form, filtered, pose, model.same_kinematics(robot), code.switched, asks)
     has_model = tables.PID < form < tables.USER
@@ -173,18 +172,19 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     """
     rows, loop = _engine()
     robot, model, trajectory, sensors, code = setup.robot, setup.model, setup.trajectory, setup.sensors, codes[0]
-    study = () if history is None else None
+    L, N, study = len(codes), robot.n_arms, () if history is None else None
     faulty, counted = setup.faults is not None, sensors.encoder is not None
-    kind, modelled, law, count = _shape(robot, model, code, len(codes), history is None, faulty, counted)
-    L, N, W = len(codes), robot.n_arms, len(kind.arms)
-    start = *trajectory.x[0].tolist(), *trajectory.xd[0].tolist()
+    kind, modelled, law, count = _shape(robot, model, code, L, history is None, faulty, counted)
+    W, start = len(kind.arms), (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
     work = tables.aligned(_blank(robot, model, W, L, start, tuple(codes)))
     blocks, runs = _parts(work, W, L)
     blocks[rows.OFFSET, :N] = offsets.T
     user, buffer = _user(code.user, N)
     sensor, faults = tables.sensor(sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
-    log = None if history is None else tables.History._make([*map(tables.plain, history[:-1]), N])
+    log = history
+    if history is not None and not compiled():
+        log = tables.History._make([*map(tables.plain, history[:-1]), N])
     with patience(kind, study, modelled, user is None):
         for first in range(0, samples, PART):
             part = slice(first, min(first + PART, samples))
@@ -196,7 +196,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
                 # Without a compiler a division by zero or an infinite angle ends the run here.
                 w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
             finally:
-                if history is not None and log is not None and not compiled():
+                if history is not None and log is not None and log is not history:
                     for column, values in zip(history[:-1], log, strict=False):
                         column[:] = values
             if w is not work:

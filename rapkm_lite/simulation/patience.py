@@ -14,8 +14,7 @@ _known = set()
 _TEXT = "rapkm_lite compiles its engine for this kind of run; once, some seconds ..."
 
 
-@contextlib.contextmanager
-def patience(*kind, after: float = 0.7, text: str = _TEXT):
+def patience(*kind, after: float = 0.7, text: str = _TEXT) -> contextlib.AbstractContextManager:
     """Show one line if the first call of this kind takes longer than `after` seconds, and take it away at its end.
 
     Without a kind, if this call does.
@@ -24,8 +23,12 @@ def patience(*kind, after: float = 0.7, text: str = _TEXT):
     anywhere else nothing is shown.
     """
     if kind in _known or not (_notebook() or _in_terminal()):
-        yield
-        return
+        return contextlib.nullcontext()
+    return _shown_after(kind, after, text)
+
+
+@contextlib.contextmanager
+def _shown_after(kind: tuple, after: float, text: str):
     clear = []
     timer = threading.Timer(after, lambda: clear.append(_show(text)))
     try:

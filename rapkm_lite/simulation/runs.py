@@ -224,11 +224,11 @@ def complete(setup: Setup, law) -> Run:
 def _run(setup: Setup, law, outcome: Outcome) -> Run:
     """The rows of an outcome that hold something."""
     status, sample, *columns = outcome
-    rows = slice(sample + (status in (DONE, LEFT_WORKSPACE, TOO_STIFF)))
+    columns = [setup.trajectory.t, *columns]
     if status != DONE:
-        table = np.concatenate(columns, axis=-1)[rows]
-        rows = slice(int(np.append(np.all(np.abs(table) < 1e100, axis=-1), False).argmin()))
-    columns = [column[rows] for column in (setup.trajectory.t, *columns)]
+        table = np.concatenate(columns[1:], axis=-1)[: sample + (status in (LEFT_WORKSPACE, TOO_STIFF))]
+        rows = int(np.append(np.all(np.abs(table) < 1e100, axis=-1), False).argmin())
+        columns = [column[:rows] for column in columns]
     # What a kernel has finished is finite and frozen.
     make = Run if status != DONE or columns[1].flags.writeable else Run.trusted
     return make(setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns)
