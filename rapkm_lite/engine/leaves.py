@@ -40,7 +40,7 @@ def small_angle(s):
 def smooth_sign(z):
     """tanh(z) without branches: (e^u - 1) / (e^u + 1) at u = -2 |z| = k ln 2 + r, k a whole number.
 
-    e^r = (p + q) / (p - q) with Pade's p and q of order six, which for |r| < 0.35 leave less than 2e-19.
+    e^r = (p + q) / (p - q) with Pade's p and q of order six, which for |r| <= ln 2 / 2 leave 2e-19.
     """
     u = max(-2.0 * abs(z), -40.0)
     shifted = u * (1.0 / math.log(2.0)) + SHIFT
