@@ -21,6 +21,14 @@ from .user import fill
 
 
 @leaf
+def start(arms, history, clock, w):
+    """The first geometry of a single run, which its holds then make ahead."""
+    if history is not None:
+        if clock.first == 0:
+            single.begin(arms, w)
+
+
+@leaf
 def sense(lanes, arms, extra, study, history, table, o, w, dt):
     """The machine at a sample, in the layout of a study or of a single run."""
     far = 0
@@ -192,9 +200,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     lanes, drives, arms, faulty, posed, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     rows = len(table) // columns
-    if history is not None:
-        if clock.first == 0:
-            single.begin(arms, w)
+    start(arms, history, clock, w)
     for row in range(rows):
         k, o = counted(clock.first + row), counted(row * columns)
 
@@ -231,6 +237,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
         # Hold.
         hold(lanes, arms, extra, study, history, w, dt)
+        # A single run that is sound needs no judgement.
         going = False
         if history is not None:
             going = single.sound(arms, extra, w)
