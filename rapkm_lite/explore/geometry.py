@@ -15,7 +15,7 @@ from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
-from ..mechanics.kinematics import inverse_kinematics, working_modes
+from ..mechanics.kinematics import cross, inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle, triangle
 from ..simulation.energy import copper_loss
 from .controls import choice, slider
@@ -47,7 +47,6 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     # An image ends where its last pixels end, half a step beyond their centres.
     extent = tuple(end + way * (g[1] - g[0]) / 2 for g in (gx, gy) for end, way in ((g[0], -1), (g[-1], 1)))
     outline = marks.workspace_outline(robot)
-    curves = lru_cache(maxsize=8)(lambda mode: marks.singular_curves(robot, modes[mode]))
     matrices = lru_cache(maxsize=8)(
         lambda mode: act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
     )
@@ -59,12 +58,17 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         rows = list(which[drives] or range(robot.n_arms))
         return on_grid(inside, act.singular_values(matrices(mode)[:, rows])[:, 1])[nearest].filled(0.0)
 
+    @lru_cache(maxsize=64)
+    def curves(mode: str, pair: tuple) -> list[np.ndarray]:
+        one, other = (matrices(mode)[:, i] for i in pair)
+        return marks.zero_lines(gx, gy, inside, cross(one, other))
+
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for pair in [which[drives]] if which[drives] else []:
-            for curve in curves(mode)[pair]:
+            for curve in curves(mode, pair):
                 picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
                 picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
         A = act.control_matrix(robot, q)
@@ -80,7 +84,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             for i in pair if weak else ():
                 picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
             marks.draw_machine(picture, name, robot, q, arms=pair, names=False)
-            words = f"{pair_name(pair)}: {value:.2f} rad/m" + ", parallel" * bool(weak)
+            words = f"{pair_name(pair)}: {value:.2f} rad/m" + ",\nparallel" * bool(weak)
             look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
             picture.title(name, words, fontsize=10, **look)
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"

@@ -25,9 +25,7 @@ MOST = {"torque": 1000.0, "error": 100.0}
 
 
 def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
-    """Norm of the feedback map of a law along a path, N m per rad/s^2, (k,)."""
-    if isinstance(law, RedundantCTC):
-        return feedback_norm(robot, t.q)
+    """Norm of the feedback map of a law with a pair along a path, N m per rad/s^2, (k,)."""
     chosen = law.pairs(robot, t.q) if isinstance(law, SwitchedCTC) else np.tile(law.independent, (len(t), 1))
     norm = np.empty(len(t))
     for pair in {tuple(p) for p in chosen.tolist()}:
@@ -79,10 +77,10 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
                 picture.line("plane", *line.T, color=pair_line(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
             if singular[fixed[law]]:
                 numbers["distance from its singular curve"] = distance(law, side)
-        norm = norms(law, side)
-        other = norm[::5] if law == "redundant coordinates" else redundant(side)
+        other = redundant(side)
+        times, norm = (t.t[::5], other) if law == "redundant coordinates" else (t.t, norms(law, side))
         picture.line("map", t.t[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
-        picture.line("map", t.t, np.minimum(norm, 1e6), color=AFTER)
+        picture.line("map", times, np.minimum(norm, 1e6), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy

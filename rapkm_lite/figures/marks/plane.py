@@ -43,5 +43,10 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
 def singular_curves(robot: Manipulator, mode=None) -> dict:
     """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
     x, y, inside, points = grid_points(robot, 161)
-    values = on_grid(inside, distal_cross_products(robot, inverse_kinematics(robot, points, mode)))
-    return {pair: contour_generator(x, y, values[..., i]).lines(0.0) for i, pair in enumerate(drive_pairs(robot))}
+    values = distal_cross_products(robot, inverse_kinematics(robot, points, mode))
+    return {pair: zero_lines(x, y, inside, values[:, i]) for i, pair in enumerate(drive_pairs(robot))}
+
+
+def zero_lines(x, y, inside, values) -> list[np.ndarray]:
+    """The lines, each (j, 2), where values (k,) at the points of `grid_points` change their sign."""
+    return contour_generator(x, y, on_grid(inside, values)).lines(0.0)
