@@ -14,11 +14,12 @@ import matplotlib
 import nbformat
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import rapkm_lite as rk
 from rapkm_lite import explore
 from rapkm_lite.explore.controls import moved, snap
-from rapkm_lite.figures.marks import encode
+from rapkm_lite.figures.marks import encode, figure
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
@@ -121,6 +122,16 @@ def test_every_choice_is_drawn(name):
                 assert_sound(explorer.set(**{control: option[1] if isinstance(option, tuple) else option}))
 
 
+@pytest.mark.parametrize("mode", explore.machine().controls["mode"].options)
+def test_no_title_of_a_stored_picture_is_cut(mode):
+    drawn = figure(made("machine").set(mode=mode).picture)
+    drawn.draw_without_rendering()
+    titles = [text for ax in drawn.axes for text in ax.findobj(Text) if text.get_text() == ax.get_title("left") != ""]
+    assert len(titles) == 4
+    for title in titles:
+        assert title.get_window_extent().x1 <= drawn.bbox.x1, title
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_control_changes_the_picture_and_reset_brings_it_back(name):
     explorer = made(name)
@@ -205,6 +216,19 @@ def test_singular_curves_keep_the_distance_from_the_centroid_that_the_reference_
     curves = explore.torque.singular_curves(rk.load())
     gaps = [min(np.linalg.norm(line, axis=-1).min() for line in lines) for lines in curves.values()]
     np.testing.assert_allclose(gaps, 0.1012, atol=2e-4)
+
+
+def test_curve_on_the_map_lies_between_poses_that_bend_the_pair_to_either_side():
+    robot, mode = rk.load(), [1, -1, 1]
+    explorer = made("machine").set(mode="(+, −, +)", drives="pair (1,3)")
+    curves = [m.data for m in marks(explorer) if m.kind == "line" and m.style.get("linewidth") == 2.2]
+    points = np.concatenate([(c[1:] + c[:-1]) / 2 for c in curves])
+    ways = np.concatenate([np.diff(c, axis=0) for c in curves])
+    across = 1e-3 * np.stack([-ways[:, 1], ways[:, 0]], axis=-1) / np.linalg.norm(ways, axis=1, keepdims=True)
+    sides = points + across, points - across
+    seen = np.all([rk.reachable(robot, side) for side in sides], axis=0)
+    one, other = (rk.distal_cross_products(robot, rk.inverse_kinematics(robot, s[seen], mode))[:, 1] for s in sides)
+    assert seen.sum() > 50 and np.all(one * other < 0)
 
 
 def line(picture, slope, power=1.0):
