@@ -10,6 +10,7 @@ from samples import FRICTIONLESS, MACHINES, MODES, TESTBED, machines, modes, nor
 from scipy.optimize import brentq, linprog, minimize, root
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.partition import PARTITION_RULES
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 PAIRS = [(0, 1), (0, 2), (1, 2)]
@@ -496,6 +497,14 @@ def test_maps_agree_with_the_pointwise_functions(mode):
         chosen = rk.switching_map(TESTBED, rule, mode, n=40)[2].compressed()
         assert np.mean(np.array(PAIRS)[chosen] == rk.select_independent(A_tilde, rule)) > 0.999  # ties aside
     assert np.array_equal(rk.switching_map(TESTBED, mode=mode, n=40)[2].compressed(), cross.argmax(axis=-1))
+
+
+@pytest.mark.parametrize("rule", ["cross", *PARTITION_RULES])
+def test_a_switching_map_of_several_modes_is_one_for_each(rule):
+    both = rk.switching_map(TESTBED, rule, MODES[:2], n=25)[2]
+    for chosen, mode in zip(both, MODES[:2], strict=True):
+        alone = rk.switching_map(TESTBED, rule, mode, n=25)[2]
+        assert np.array_equal(chosen.mask, alone.mask) and np.array_equal(chosen.compressed(), alone.compressed())
 
 
 def test_maps_of_all_modes_at_once_hold_no_nan():

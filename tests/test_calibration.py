@@ -9,7 +9,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import cautions, closure, poses, rounding
+from rapkm_lite.mechanics.encoders import cautions, closure, gauge, poses, rounding
 from rapkm_lite.mechanics.rests import Gain, Rests, fitted_gain, one_sided, rests
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
@@ -431,7 +431,20 @@ def test_readings_that_are_counts_are_known_by_their_steps():
     whole = np.array([[0, 2], [1, 5], [3, 4], [7, -3]])
     for count in (1e-4, 3e-3, 0.1):
         assert_allclose(rounding(count * whole), count / np.sqrt(12), rtol=1e-9)
+        # Each encoder may have a zero of its own between two counts.
+        assert_allclose(rounding(count * (whole + [0.2, 0.65])), count / np.sqrt(12), rtol=1e-9)
         assert rounding(count * (whole + [[0.0, 0.0], [0.0, 0.0], [0.3, 0.0], [0.0, 0.0]])) == 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gauge_of_the_base_points_is_scale_turn_and_shift(name):
+    """Differences of the base points in these directions are those of a similar, turned or shifted drawing."""
+    base = MACHINES[name].replace(base=MACHINES[name].base + [0.03, -0.02]).base
+    G = gauge(MACHINES[name].replace(base=base))
+    assert_allclose(G.T @ G, np.eye(4), atol=1e-14)
+    turn, shift = np.array([[0.0, -1.0], [1.0, 0.0]]), np.ones((len(base), 1))
+    for field in (base, base @ turn.T, shift * [1.0, 0.0], shift * [0.0, 1.0]):
+        assert_allclose(G @ (G.T @ field.ravel()), field.ravel(), atol=1e-14)
 
 
 def test_a_small_singular_value_counts_down_to_ten_times_the_noise():

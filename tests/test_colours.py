@@ -128,7 +128,23 @@ def test_films_refuse_what_they_cannot_show(frames, alt, more, sentence):
         plotting.film(turning, frames, alt, **more)
 
 
-def test_a_film_that_is_too_large_says_what_to_do():
+def test_a_film_that_would_be_too_large_leaves_frames_out_and_lasts_as_long():
     rng = np.random.default_rng(1)
-    with pytest.raises(ValueError, match="fewer frames or a smaller figsize"):
+    noise = lambda ax, k: ax.imshow(rng.uniform(size=(60, 60)), cmap="gray")  # noqa: E731
+    film = plotting.film(noise, range(60), "Noise.", figsize=(2, 2), seconds=6, rest=1)
+    moving = Image.open(io.BytesIO(film.moving))
+    shown = moving.n_frames
+    assert 2 < shown < 60 and len(film.moving) <= 120_000
+    assert film.note == f"{shown} of 60 pictures, because all of them make more than 120 kB."
+    lasts = []
+    for k in range(shown):
+        moving.seek(k)
+        moving.load()
+        lasts.append(moving.info["duration"])
+    assert sum(lasts) == pytest.approx(7000, abs=shown)
+
+
+def test_a_film_that_is_too_large_with_few_frames_says_what_to_do():
+    rng = np.random.default_rng(1)
+    with pytest.raises(ValueError, match="take a smaller figsize"):
         plotting.film(lambda ax, k: ax.imshow(rng.uniform(size=(200, 200))), range(12), "Noise.", figsize=(5, 5))

@@ -196,5 +196,8 @@ def test_tables_agree_with_the_lesson(path):
         if line.startswith(f"| [{path.stem}]")
     ).split("|")
     assert minutes and row[3].strip() == minutes[1]
+    start = nbformat.read(NOTEBOOKS / "00_start_here.ipynb", as_version=4)
+    here = [line for cell in start.cells for line in cell.source.splitlines() if f"]({path.name}) |" in line]
+    assert [line.split("|")[3].strip() for line in here] == [minutes[1]] * (path.stem != "00_start_here")
     for name in re.findall(r"`([\w.]+)`", row[5]):
         assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"

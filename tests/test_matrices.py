@@ -10,6 +10,8 @@ from rapkm_lite.mechanics.antagonism import _references
 from rapkm_lite.mechanics.cores import prestress_shares
 from rapkm_lite.mechanics.linalg import many_inverses, pivots
 
+TREE = rk.mass_matrix, rk.coriolis_matrix, rk.generalized_forces
+
 
 @machines
 def test_they_are_the_formulas_of_the_machine(robot):
@@ -29,6 +31,16 @@ def test_they_are_the_formulas_of_the_machine(robot):
     ]
     for ours, theirs in same:
         assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("which", range(3))
+def test_matrices_of_other_poses_are_refused(which):
+    q, qd, _, _ = random_motion(FRICTIONLESS, 4, bend=0.2)
+    J, J_dot = rk.constraint_jacobian(FRICTIONLESS, q), rk.constraint_jacobian_dot(FRICTIONLESS, q, qd)
+    tree = [f(FRICTIONLESS, q) if f is rk.mass_matrix else f(FRICTIONLESS, q, qd) for f in TREE]
+    tree[which] = tree[which][:3]
+    with pytest.raises(ValueError, match=rf"{'GCQ'[which]}.*\(3,\)|\(3,\).*{'GCQ'[which]}"):
+        rk.redundant_terms(rk.projector(J), rk.projector_dot(J, J_dot), *tree)
 
 
 # A made-up mechanism with delta = 3, m = 4, as a planar 4RRR machine has: n = 9, r = 6, J(t) = J0 + t J1.

@@ -105,7 +105,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             # The knob slides along its line until it is in the panel; its number is on the side of the middle.
             places = level[i] * normal[i] + half * np.outer(np.linspace(0.72, -0.72, 145), along)
             knob = places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))]
-            side = -0.21 * half * np.sign(level[i] or 1.0)
+            side = -0.14 * half * np.sign(level[i] or 1.0)
             words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
             picture.text("opinions", *(knob + side * normal[i]), f"{i + 1}", **words, zorder=6)
             picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})

@@ -123,7 +123,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         return {
             "time": f"{run.t[k]:.2f} s",
             "force on the end-effector": f"{np.hypot(*total):.2f} N",
-            "sum of the drives' forces": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
+            "sizes of the drives' forces, added": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
             "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
             "path error": f"{error[k]:.2f} mm",
         }

@@ -20,6 +20,7 @@ from PIL import Image, ImageColor
 from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
+_FEWEST = 8  # frames, of a film that would be larger with all
 # Where the kernel itself runs in a browser (Pyodide), drawing a frame takes most of a second.
 _MOST_FRAMES = 8 if sys.platform == "emscripten" else None
 
@@ -112,11 +113,19 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
             method=4,
         )
         if len(film) <= LARGEST:
-            return film
-    raise ValueError(
-        f"frames: {len(shots)} pictures of {shots[0].width} x {shots[0].height} make {len(film) / 1000:.0f} kB; "
-        f"allowed: {LARGEST / 1000:.0f} kB, so take fewer frames or a smaller figsize"
-    )
+            break
+    return film
+
+
+def _timed(shots: list[Image.Image], seconds: float, rest: float, loops: int) -> bytes:
+    """The animated WebP in equal steps, whose last picture rests."""
+    each = round(1000 * seconds / len(shots))
+    return _moving(shots, [each] * (len(shots) - 1) + [each + round(1000 * rest)], loops)
+
+
+def _kept(count: int, most: int, poster: int) -> list[int]:
+    """About `most` of `count` indices, evenly; first, last and poster are among them."""
+    return sorted({*np.linspace(0, count - 1, most).round().astype(int).tolist(), poster % count})
 
 
 def film(
@@ -142,9 +151,10 @@ def film(
     loops : how often it plays; it always stops, on its last frame.
     poster : index of the frame that stands for the film where motion is not wanted.
     most : the most frames; of more, some are left out, and the film says so.  In a browser's own kernel 8, else all.
+        Some are left out, too, where all would make more than 120 kB.
 
     Set the limits of the axes in `draw`.  Raises ValueError without words or time, with fewer than two frames,
-    with loops < 1, or when the film would be larger than 120 kB.
+    with loops < 1, or when eight frames would make more than 120 kB.
 
     >>> import numpy as np
     >>> film(lambda ax, s: ax.plot([0, np.cos(s)], [0, np.sin(s)]), np.linspace(0, 1, 3), "A hand turns.").alt
@@ -161,17 +171,22 @@ def film(
         raise ValueError(f"loops = {loops}; allowed: 1 or more, a film comes to its end")
     if most is not None and most < 2:
         raise ValueError(f"most = {most}; allowed: two or more, or None for all")
-    note = ""
+    count, note = len(steps), ""
     if most is not None and len(steps) > most:
-        # First, last and poster are among them.
-        kept = sorted({*np.linspace(0, len(steps) - 1, most).round().astype(int).tolist(), poster % len(steps)})
-        note = f"{len(kept)} of {len(steps)} pictures, because drawing them takes long here."
+        kept = _kept(len(steps), most, poster)
+        note = f"{len(kept)} of {count} pictures, because drawing them takes long here."
         steps, poster = [steps[k] for k in kept], kept.index(poster % len(steps))
     with matplotlib.style.context(STYLE):
         shots = _shots(draw, steps, panels, figsize, dpi)
-    each = round(1000 * seconds / len(steps))
-    moving = _moving(shots, [each] * (len(shots) - 1) + [each + round(1000 * rest)], loops)
     still = shots[poster]
+    while len(moving := _timed(shots, seconds, rest, loops)) > LARGEST:
+        if len(shots) <= _FEWEST:
+            raise ValueError(
+                f"frames: {len(shots)} pictures of {still.width} x {still.height} make {len(moving) / 1000:.0f} kB; "
+                f"allowed: {LARGEST / 1000:.0f} kB, so take a smaller figsize"
+            )
+        shots = [shots[k] for k in _kept(len(shots), 3 * len(shots) // 4, -1)]
+        note = f"{len(shots)} of {count} pictures, because all of them make more than {LARGEST / 1000:.0f} kB."
     return Film(
         moving=moving,
         poster=_file(still, "WEBP", quality=85, method=6),

@@ -255,7 +255,7 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
         for ax, (name, q) in zip(axes, poses.items(), strict=False):
             plot_cut_tree(robot, q[k], ax).legend().remove()
             ax.text(-0.26, 0.29, f"{name}, {t[k]:.1f} s", fontweight="bold")
-            ax.set(xlim=(-0.27, 0.36), ylim=(-0.25, 0.32))
+            ax.set(xlim=(-0.27, 0.36), ylim=(-0.32, 0.32))
             ax.set_axis_off()
         for (name, gap), (colour, dash) in zip(gaps.items(), ((ALARM, "-"), (AFTER, "--")), strict=True):
             axes[-1].plot(t[: k + 1], 1e3 * np.asarray(gap[: k + 1]), color=colour, ls=dash, label=name)

@@ -85,5 +85,7 @@ def plot_demand(part, demand, points: dict, ax=None):
         ax.plot(shares, np.full(len(shares), level), "o", ms=6, color=colour, label=label)
     ax.axhline(0, color="#BBBBBB", lw=0.8)
     ax.set(xlabel="share of the edge", ylabel="$|\\eta^T q_a''|$ in rad", xlim=(0, 1), ylim=(-0.45 * top, 1.1 * top))
+    # Below zero stand the via points, which have no value.
+    ax.set_yticks([tick for tick in ax.get_yticks() if 0 <= tick <= 1.1 * top])
     ax.legend(loc="upper right")
     return ax
