@@ -39,10 +39,7 @@ def readable(lines: list[str]) -> list[str]:
 def escaped(text: str) -> str:
     """What is no literal, without characters that reStructuredText would take as markup."""
     parts = re.split(r"(``.*?``|`[^`]+`)", text)
-    return "".join(
-        part if k % 2 else re.sub(r"([*|\\])", r"\\\1", re.sub(r"_(?!\w)", r"\\_", part))
-        for k, part in enumerate(parts)
-    )
+    return "".join(part if k % 2 else re.sub(r"[*|\\]|_(?!\w)", r"\\\g<0>", part) for k, part in enumerate(parts))
 
 
 def _docstring(app, what, name, obj, options, lines):

@@ -95,9 +95,10 @@ def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
     for k, cell in enumerate(cells):
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
+            # They float to the right, the first one farthest.
             marks = "".join(
                 f'<a class="to-index" id="{a}" href="{depth}equations.html#{a}">{_label(a)} in the index</a>\n'
-                for a in found.get(k, [])
+                for a in reversed(found.get(k, []))
             )
             text = linked(text).replace("](solutions)", "](solutions/index.md)")
             if depth:

@@ -55,7 +55,9 @@ function now(run, dt) {
     pose.at(run.x[2 * k], run.x[2 * k + 1]);
     return { pose, torque: Array.from(run.torque.subarray(N * k, N * k + N)) };
   }
-  const settled = rest(robot, 1e-3 * state.x, 1e-3 * state.y, K_P, offsets());
+  let settled = null;
+  // Near the rim offsets may push the machine out of its reach: then it rests a little further in.
+  for (let s = 1; !settled; s -= 0.01) settled = rest(robot, 1e-3 * s * state.x, 1e-3 * s * state.y, K_P, offsets());
   if (state.filter !== "off") settled.pose.filter(settled.torque);
   return settled;
 }
@@ -162,7 +164,7 @@ function picture(dt) {
   const [bars, highest] = drawEnergy(here), [chain, size] = drawForces(at);
   const scale = limit(at.torque.map((c) => 1e3 * c), [30, 60, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
   const frames = {
-    machine: [-285, 285, -270, 300], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
+    machine: [-355, 355, -340, 370], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
     forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
   };
   const saved = 1 - total(here.on) / total(here.off), measured = 1 - total(table1[1]) / total(table1[0]);
@@ -203,7 +205,8 @@ const snap = (name, value) => {
 
 /** The point nearest to the wish on the way from here that all arms reach. */
 function reachable(x, y) {
-  const pose = new Pose(robot), far = (s) => [state.x + s * (x - state.x), state.y + s * (y - state.y)];
+  const pose = new Pose(robot), here = [state.x, state.y];
+  const far = (s) => [x, y].map((v, k) => Math.round(here[k] + s * (v - here[k])));
   const fits = (s) => pose.at(...far(s).map((v) => 1e-3 * v)) && Math.min(...pose.inv.map(Math.abs).map((v) => 1 / v)) > 0.004;
   if (fits(1)) return far(1);
   let [good, bad] = [0, 1];
@@ -220,7 +223,7 @@ function change(to, by = {}) {
       [state.x, state.y] = [1e3 * pose.x, 1e3 * pose.y];
     }
     const [x, y] = [snap("x", wish.x ?? state.x), snap("y", wish.y ?? state.y)];
-    [state.x, state.y] = reachable(x, y).map((v) => Math.round(v));
+    [state.x, state.y] = reachable(x, y);
     state.moving = false;
     stop();
   }

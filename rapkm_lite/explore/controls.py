@@ -179,6 +179,17 @@ def moving(handles: list[dict], controls: dict) -> None:
         raise KeyError(f"a handle moves {name!r}, which is no control; allowed: {', '.join(controls)}")
 
 
+def follow(handles: list[dict], controls: dict) -> bool:
+    """A handle that was stopped short takes its sliders along; was there one?"""
+    before = [widget.value for widget in controls.values()]
+    for handle in handles:
+        x, y = handle["at"]
+        if handle["along"] is None and y is not None:
+            for name, (a, b, *c) in handle["set"].items():
+                controls[name].value = snap(controls[name], a * x + b * y + sum(c))
+    return before != [widget.value for widget in controls.values()]
+
+
 def ranges(controls: dict) -> dict:
     """The least and the largest value of each slider."""
     return {name: _ends(widget) for name, widget in controls.items() if hasattr(widget, "min")}

@@ -17,7 +17,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, check, moved, moving, parts, player, ranges, snap, tidied
+from .controls import Shown, check, follow, moved, moving, parts, player, ranges, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -238,19 +238,12 @@ class Explorer:
                     for name, value in wishes.items():
                         self.controls[name].value = value
                     self._step()
-                    self._follow()
+                    if follow(self.picture.handles, self.controls):
+                        self._step()
                 self._send(**question)
             except Exception:
                 self.canvas.send({"kind": "lost", **question})
                 raise
-
-    def _follow(self) -> None:
-        """A handle that was stopped short takes its sliders along."""
-        for handle in self.picture.handles:
-            x, y = handle["at"]
-            if handle["along"] is None and y is not None:
-                for name, (a, b, *c) in handle["set"].items():
-                    self.controls[name].value = snap(self.controls[name], a * x + b * y + sum(c))
 
     def _send(self, **more) -> None:
         if self._watched:

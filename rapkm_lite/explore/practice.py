@@ -22,7 +22,7 @@ from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import distance_panels, draw_distance, frictionless, over_time, ready_made
+from .shared import beyond, distance_panels, draw_distance, frictionless, over_time, ready_made
 
 FAULTS = {
     "nothing": [],
@@ -143,6 +143,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)
+            beyond(picture, panel, 1e3 * torque)
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",

@@ -102,12 +102,15 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             target = rest + (level[i] - normal[i] @ rest) * normal[i]
             picture.line("opinions", *ends.T, **arm_line(i) | {"linewidth": 2.4})
             picture.line("opinions", *np.stack([rest, target]).T, color=arm_colour(i), linewidth=6, alpha=0.55)
-            # The knob slides along its line until it is in the panel; its number is on the side of the middle.
+            # The knob slides along its line until it is in the panel; its number is on the side of the middle,
+            # or on the other one where that is much farther from the other lines.
             places = level[i] * normal[i] + half * np.outer(np.linspace(0.72, -0.72, 145), along)
             knob = places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))]
-            side = -0.14 * half * np.sign(level[i] or 1.0)
+            inward = -0.14 * half * np.sign(level[i] or 1.0) * normal[i]
+            spots = knob + inward, knob - inward
+            clear = [np.abs(normal @ spot - level).min() for spot in spots]
             words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
-            picture.text("opinions", *(knob + side * normal[i]), f"{i + 1}", **words, zorder=6)
+            picture.text("opinions", *spots[clear[1] > 1.5 * clear[0]], f"{i + 1}", **words, zorder=6)
             picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
         corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
         if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
@@ -183,7 +186,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 k = np.argmax(away)
                 if away[k] > 0:
                     taken.append(ring[:, k])
-                    picture.text("map", *ring[:, k], f"{level:g} J", fontsize=9, color=shade, ha="center", va="center")
+                    look = {"color": min(shade, "0.45"), "ha": "center", "va": "center"}
+                    picture.text("map", *ring[:, k], f"{level:g}\u202fJ", fontsize=9, **look)
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)

@@ -74,6 +74,13 @@ def curves(picture, panel: str, t, values, least: float, most: float = np.inf) -
     picture.fit(panel, values, least=least, most=most)
 
 
+def beyond(picture, panel: str, values) -> None:
+    """A word where values leave the picture."""
+    if (most := np.abs(values).max()) > picture.ylim(panel)[1]:
+        words = f"goes on to {most:.0f}"
+        picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
+
+
 def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN m") -> dict:
     """The panels of `draw_distance`."""
     return {"error": over_time("distance from the path in mm", end), "torque": over_time(torque, end, robot)}

@@ -8,9 +8,10 @@
 const POINT = 96 / 72;
 const PATIENCE = 5000; // ms after which nobody waits for an answer: the kernel is busy, or another one
 const AFLOAT = 2; // questions under way at the same time: three are no faster and lag more
+const ENTER = { key: "Enter", keyCode: 13, bubbles: true };
 
 /** True minus signs before numbers, not in words with a hyphen. */
-export const minus = (words) => String(words).replace(/(^|[\s(/])-(?=\d)/g, "$1−");
+export const minus = (words) => String(words).replace(/(^|[\s([/])-(?=\d)/g, "$1−");
 
 /** "σ_min" and "10^−3" as pieces {text, shift}: shift -1 is a subscript, 1 a superscript. */
 export function pieces(words) {
@@ -184,15 +185,12 @@ class Panel {
     ctx.clearRect(0, 0, wide, high);
     for (const [style, points] of plan.strokes) stroke(this, points, style);
     for (const text of plan.texts) this.write(text);
-    (palette?.[theme.dark ? "dark" : "light"] ?? []).forEach((colour, k) => {
-      ctx.fillStyle = colour;
-      ctx.fillRect(x, y - (k + 1) * h, w, h + 0.5);
-    });
+    const colours = palette?.[theme.dark ? "dark" : "light"] ?? [];
+    colours.forEach((fillStyle, k) => Object.assign(ctx, { fillStyle }).fillRect(x, y - (k + 1) * h, w, h + 0.5));
     for (const mark of marks.filter((m) => PAINT[m.kind]).sort((a, b) => a.style.z - b.style.z)) {
       ctx.save();
       ctx.globalAlpha = mark.style.alpha ?? 1;
-      // Markers on the edge are seen whole, and words may hang over it.
-      const more = PAINT[mark.kind] === words ? wide : mark.style.marker ? 8 : 0;
+      const more = PAINT[mark.kind] === words ? wide : mark.style.marker ? 8 : 0; // markers on the edge are whole
       ctx.beginPath();
       ctx.rect(box.left - more, box.top - more, box.width + 2 * more, box.height + 2 * more);
       ctx.clip();
@@ -243,8 +241,7 @@ function line(panel, { points }, style) {
 function area(panel, path, style) {
   const { ctx, theme } = panel;
   trace(ctx, path, true);
-  ctx.fillStyle = theme.colour(style.face, true) ?? "transparent";
-  ctx.fill("evenodd");
+  Object.assign(ctx, { fillStyle: theme.colour(style.face, true) ?? "transparent" }).fill("evenodd");
   stroke(panel, path, style, true);
 }
 
@@ -381,11 +378,10 @@ export function mount(el, scene, link) {
     Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
-    knob.style.translate = `${x}px ${y - 14 * bare}px`; // above the numbers of the axis
+    knob.style.translate = `${bare ? Math.max(x, panel.box.left + 9) : x}px ${y - 14 * bare}px`; // off the numbers
     knob.onkeydown = (event) => {
       const by = steps(handle, event.key, event.shiftKey);
-      if (by) event.preventDefault();
-      if (by) ask({}, by);
+      if (by) event.preventDefault(), ask({}, by);
     };
   }
 
@@ -402,8 +398,7 @@ export function mount(el, scene, link) {
     waiting = { to: {}, by: {} };
     open.add(seq);
     setTimeout(pump, PATIENCE, seq);
-    // A page without a kernel answers before this returns.
-    link.send(message);
+    link.send(message); // a page without a kernel answers before this returns
   }
 
   function receive(message, buffers = []) {
@@ -418,19 +413,19 @@ export function mount(el, scene, link) {
     Object.assign(state, { marks, places: message.places ?? {}, code: message.code ?? "" });
     // While there is a problem the last handles stay, as the way back.
     if (message.handles.length || !message.problem) state.handles = message.handles;
-    Object.assign(problem, { textContent: minus(message.problem ?? ""), hidden: !message.problem });
+    rich(problem, minus(message.problem ?? "")).hidden = !message.problem;
     numbers.replaceChildren(...(message.numbers ?? []).map(([name, text]) => {
       const span = rich(make("span"), `${name}: `);
       rich(make("b", {}, span), minus(text));
       return span;
     }));
-    if (message.note || message.from) say(minus(message.note ?? ""));
+    const places = JSON.stringify(state.places);
+    if (message.note || message.from || places !== root.dataset.places) say(minus(message.note ?? ""));
     root.classList.add("live");
     paint();
-    Object.assign(root.dataset, { drawn: ++state.drawn, places: JSON.stringify(state.places) });
-    // Read out when the hand rests, not at every step.
+    Object.assign(root.dataset, { drawn: ++state.drawn, places });
     clearTimeout(rest);
-    rest = setTimeout(atRest, 700, message.sentence ?? "");
+    rest = setTimeout(atRest, 700, message.sentence ?? ""); // read out when the hand rests, not at every step
   }
 
   // Taking hold of the nearest knob or line, else of a line that is pushed along the panel.
@@ -476,8 +471,8 @@ export function mount(el, scene, link) {
   function atRest(words) {
     sentence.textContent = words;
     for (const control of around()?.querySelectorAll(".rapkm-control") ?? []) {
-      const label = control.querySelector(".widget-label");
-      const name = (control.dataset.words ??= label?.textContent || control.textContent.trim());
+      const label = control.querySelector(".widget-label"), said = (el) => el?.textContent.replace("\u200b", "").trim();
+      const name = (control.dataset.words ??= said(label) || said(control)); // a box has an empty label besides
       for (const part of control.querySelectorAll(".noUi-handle, .ui-slider-handle, .widget-readout, select, input")) {
         part.ariaLabel = name;
         part.dataset.lmSuppressShortcuts = "true";
@@ -488,11 +483,17 @@ export function mount(el, scene, link) {
       part.ariaLabel = part.querySelector("i")?.className.replace(/.*fa-/, "").replace("retweet", "repeat") ?? "";
   }
 
-  // A number typed beside a slider may lie between two of its steps.
-  function typed({ target, key = "Enter" }) {
-    if (key !== "Enter" || !target.matches?.(".widget-readout") || !around()?.contains(target)) return;
-    const number = () => Number(target.textContent.replace("−", "-")), before = number();
-    setTimeout(() => before === number() || say(minus(`${before} was rounded to ${number()}`)), 400);
+  // A number typed beside a slider may lie between two of its steps; one that is left counts as entered.
+  function typed({ type, target, key }) {
+    if (!target.matches?.(".widget-readout") || !around()?.contains(target)) return;
+    const words = () => target.textContent.replace("−", "-").trim(), before = words(), { was } = target.dataset;
+    if (type === "focus") target.dataset.was = before;
+    if (type === "blur" && before !== was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
+    if (key !== "Enter" || before === was) return;
+    setTimeout(() => {
+      const now = (target.dataset.was = words()), how = Number.isNaN(Number(before)) ? "read as" : "rounded to";
+      if (Number(before || NaN) !== Number(now)) say(minus(`${before || "nothing"} was ${how} ${now}`));
+    }, 400);
   }
 
   // A new style sheet may come late, so the picture is painted again for a while.
@@ -502,7 +503,7 @@ export function mount(el, scene, link) {
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint, { signal });
   document.addEventListener("keydown", page, { signal, capture: true });
-  for (const name of ["blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
+  for (const name of ["focus", "blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
   link.receive(receive);
   link.send({ kind: "hello" });
   return Object.assign(() => {
@@ -516,8 +517,7 @@ export function mount(el, scene, link) {
 function page(event) {
   const screens = [...document.querySelectorAll(".rapkm-screen")], way = { PageDown: 1, PageUp: -1 }[event.key];
   if (!way || !screens.length) return;
-  event.preventDefault();
-  event.stopImmediatePropagation();
+  event.preventDefault(), event.stopImmediatePropagation();
   const now = screens.findLastIndex((screen) => screen.getBoundingClientRect().top < innerHeight / 2);
   screens[now + way]?.scrollIntoView({ block: "start" });
 }

@@ -11,14 +11,14 @@ from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
 from ..figures.maps import pair_line, pair_name
 from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves
-from ..figures.style import AFTER, ALARM, NEUTRAL
+from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, over_time, ready_made
+from .shared import beyond, curves, frictionless, over_time, ready_made
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -86,9 +86,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         for panel, values, least in (("torque", torque, 300.0), ("error", error, 20.0)):
             curves(picture, panel, run.t, values, least, MOST[panel])
-            if np.abs(values).max() > picture.ylim(panel)[1]:
-                words = f"goes on to {np.abs(values).max():.0f}"
-                picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
+            beyond(picture, panel, values)
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {

@@ -92,7 +92,8 @@ class Manipulator(Value):
             )
         if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
             raise ValueError(
-                f"lengths = {lengths.tolist()} let no point be reached by all {N} arms from base = {base.tolist()}; "
+                f"lengths = {lengths.round(6).tolist()} let no point be reached by all {N} arms from base = "
+                f"{base.round(6).tolist()}; "
                 "allowed: arms that can meet (longer links or closer base points)"
             )
 

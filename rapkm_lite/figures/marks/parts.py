@@ -103,7 +103,7 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
             at = i + 1 + (k - (len(groups) - 1) / 2) * width
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
             words = re.sub("^−(?=[0.]+$)", "", format(value, form).replace("-", "−"))
-            picture.text(panel, at, value, words, ha="center", fontsize=9, va="bottom" if value >= 0 else "top")
+            picture.text(panel, at, value, words, ha="center", fontsize=9, va="top" if words[0] == "−" else "bottom")
 
 
 def per_drive(values, digits: int) -> str:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
+from matplotlib.transforms import ScaledTranslation
 from PIL import Image, features
 
 from ..style import ALARM, STYLE
@@ -105,6 +106,9 @@ def _words(ax, mark: Mark) -> None:
     where = {"transform": ax.transAxes} if mark.kind == "words" else {"clip_on": True}
     # Words on a line have a rim of paper, as on the canvas.
     where |= {} if mark.style.get("color") == "white" else {"path_effects": [_RIM]}
+    # The rim would bite into the bar that carries the words.
+    lift = ScaledTranslation(0, {"bottom": 2, "top": -2}.get(mark.style.get("va"), 0) / 72, ax.figure.dpi_scale_trans)
+    where["transform"] = where.get("transform", ax.transData) + lift
     ax.text(*mark.data[0], mathtext(mark.words), **where, **mark.style)
 
 
