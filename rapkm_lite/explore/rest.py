@@ -110,7 +110,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             spots = knob + inward, knob - inward
             clear = [np.abs(normal @ spot - level).min() for spot in spots]
             words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
-            picture.text("opinions", *spots[clear[1] > 1.5 * clear[0]], f"{i + 1}", **words, zorder=6)
+            picture.text("opinions", *spots[int(clear[1] > 1.5 * clear[0])], f"{i + 1}", **words, zorder=6)
             picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
         corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
         if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
