@@ -45,7 +45,7 @@ def fault(*faults):
 
 
 LONGER = ROBOT.replace(lengths=0.28)
-FIRST = ROBOT.replace(lengths=[[0.28, 0.28], [0.2, 0.2], [0.2, 0.2]])
+FIRST_TWO = ROBOT.replace(lengths=[[0.28, 0.28], [0.28, 0.28], [0.2, 0.2]])
 SETS = [
     ("working mode", ROBOT, TASK, CIRCLE, mode(1, 1, -1)),
     ("working mode", ROBOT, PD, CIRCLE, mode(1, -1, 1)),
@@ -56,13 +56,19 @@ SETS = [
     ("lengths that are off by 40 %", ROBOT, TASK, TRIANGLE, {"model": LONGER}),
     ("lengths that are off by 40 %", ROBOT, FILTER, TRIANGLE, {"model": LONGER}),
     ("lengths that are off by 40 %", ROBOT, CTC, CIRCLE, {"model": LONGER}),
-    ("lengths that are off by 40 %", ROBOT, FILTER, rk.circle(ROBOT, 0.1, 0.5), {"model": FIRST}),
-    ("lengths that are off by 40 %", ROBOT, rk.AntagonismFilter(mine), rk.circle(ROBOT, 0.1, 0.5), {"model": FIRST}),
+    ("lengths that are off by 40 %", ROBOT, FILTER, rk.circle(ROBOT, 0.1, 0.5), {"model": FIRST_TWO}),
+    (
+        "lengths that are off by 40 %",
+        ROBOT,
+        rk.AntagonismFilter(mine),
+        rk.circle(ROBOT, 0.1, 0.5),
+        {"model": FIRST_TWO},
+    ),
     ("offset = .* is large", ROBOT, rk.AntagonismFilter(mine), HOLD, {"offset": [1.5, -1.5, 1.5]}),
     ("offset = ", ROBOT, FILTER, HOLD, {"offset": [2.5, -2.5, 2.5]}),
     ("offset = ", ROBOT, TASK, HOLD, {"offset": [2.5, -2.5, 2.5]}),
     ("offset = ", ROBOT, REDUNDANT, TRIANGLE, {"offset": [0.5, -0.5, 0.5]}),
-    ("offset = ", ROBOT, TASK, rk.hold(ROBOT, [0.15, -0.05], 0.5), {"offset": [0.3, -0.3, 0.3]}),
+    ("offset = ", ROBOT, TASK, rk.hold(ROBOT, [0.15, -0.05], 0.5), {"offset": [0.5, -0.5, 0.5]}),
     ("offset = ", ROBOT, FILTER, TRIANGLE, {"offset": [1.0, -1.0, 1.0]}),
     ("TorqueLimit", HANGING, TASK, HOLD, fault(rk.TorqueLimit(0.02))),
     ("TorqueLimit", HANGING, REDUNDANT, HOLD, fault(rk.TorqueLimit(0.03))),

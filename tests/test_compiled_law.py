@@ -305,3 +305,32 @@ def test_a_law_that_raises_says_what_the_plain_function_says(how, wrapped):
     assert_allclose(one.partial.c, other.partial.c, rtol=0, atol=1e-11)
     study = rk.sweep(ROBOT, around(law), PATH, np.tile(OFFSET, (2, 1)), failed="mask")
     assert study.failed.all() and study.reasons == (one.reason,) * 2
+
+
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+def test_a_limit_of_the_drives_makes_no_torque_of_what_is_none(bad):
+    def law(t, q_a, qd_a, d):
+        c = -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+        if t > 0.1:
+            c[1] = bad
+        return c
+
+    for one in (law, rk.compiled(law)):
+        with pytest.raises(rk.SimulationError, match=r"allowed: finite") as caught:
+            rk.simulate(ROBOT, one, PATH, OFFSET, faults=rk.TorqueLimit([np.inf, 0.3, np.inf]))
+        assert caught.value.time == pytest.approx(0.101)
+
+
+def test_a_law_that_fails_at_the_last_sample_fails_in_a_study_too():
+    def law(t, q_a, qd_a, d):
+        c = -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+        if t > 0.29999:
+            c[0] = np.nan
+        return c
+
+    for one in (law, rk.compiled(law)):
+        with pytest.raises(rk.SimulationError) as caught:
+            rk.simulate(ROBOT, one, PATH, OFFSET)
+        study = rk.sweep(ROBOT, one, PATH, np.tile(OFFSET, (2, 1)), failed="mask")
+        assert caught.value.time == pytest.approx(0.3) and study.failed.all()
+        assert_allclose(study.failure_time, 0.3)

@@ -255,3 +255,17 @@ def test_a_quarter_turn_is_the_product_with_i(lead):
     v = np.random.default_rng(3).normal(size=(*lead, 2))
     turned = (v[..., 0] + 1j * v[..., 1]) * 1j
     assert_allclose(turn(v), np.stack([turned.real, turned.imag], axis=-1), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.2])
+def test_pose_of_readings_that_contradict_each_other_is_that_of_an_independent_solver(spread):
+    """Residuals of tenths of a radian: steps of Gauss and Newton alone shrink there by a third, or not at all."""
+    rng = np.random.default_rng(5)
+    x = random_points(TESTBED, 40, 5, 0.6)
+    q_a = rk.inverse_kinematics(TESTBED, x)[:, :3] + rng.normal(0.0, spread, (40, 3))
+    for angles, guess in zip(q_a, x, strict=True):
+        found = rk.forward_kinematics(TESTBED, rk.estimate_pose(TESTBED, angles, guess))
+        apart = lambda p: wrap(rk.inverse_kinematics(TESTBED, p)[:3] - angles)  # noqa: B023, E731
+        other = least_squares(apart, found, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        assert_allclose(found, other.x, atol=1e-7)
+        assert np.abs(rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, found)).T @ apart(found)).max() < 1e-10

@@ -198,3 +198,61 @@ def test_a_law_without_coordinates_shows_none():
     for law in (PD, task, lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a)):
         assert np.all(rk.simulate(ROBOT, law, path, OFFSET).pairs == -1)
     assert np.all(rk.simulate(ROBOT, rk.CTC(900.0, 60.0, (0, 2)), path, OFFSET).pairs == [0, 2])
+
+
+# Long arms whose drives can turn right round, and a path once around all of them.
+ROUND = rk.Manipulator(base=[[-0.1, 0.0], [0.1, 0.0], [0.0, 0.15]], lengths=1.0, masses=0.2)
+LAP = rk.circle(ROUND, 1.0, 4.0)
+
+
+def textbook(law):
+    """The same law as a function, which runs through the textbook layer."""
+    return lambda t, q_a, qd_a, desired: law.K_P * (desired.q[:3] - q_a) + law.K_D * (desired.qd[:3] - qd_a)
+
+
+@pytest.mark.parametrize("filtered", [None, 2e-3])
+def test_drives_that_stand_while_the_path_goes_round_keep_their_angles(filtered):
+    """Angles are continuous: nothing moves, so none changes, whatever turn the path is on."""
+    seen = []
+
+    def slack(t, q_a, qd_a, desired):
+        seen.append((q_a.copy(), qd_a.copy()))
+        return np.zeros(3)
+
+    run = rk.simulate(ROUND, slack, LAP, velocity_filter=filtered)
+    assert np.ptp(run.q_a, axis=0).max() < 1e-12 and np.ptp(run.error, axis=0).min() > 5.0
+    assert np.ptp([q for q, _ in seen], axis=0).max() < 1e-12 and np.abs([qd for _, qd in seen]).max() < 1e-9
+
+
+@pytest.mark.parametrize("wrap", [lambda law: law, textbook], ids=["engine", "textbook"])
+def test_work_of_drives_that_fall_turns_behind_is_the_energy_of_the_machine(wrap):
+    """Without friction and gravity all work of the drives is kinetic energy, on whatever turn they are."""
+    run = rk.simulate(ROUND, wrap(rk.PD(0.02, 0.001)), LAP)
+    assert np.abs(run.error).max() > np.pi and np.abs(np.diff(run.q_a, axis=0)).max() < 0.1
+    kinetic = rk.kinetic_energy(ROUND, run.q[-1], run.qd[-1]) - rk.kinetic_energy(ROUND, run.q[0], run.qd[0])
+    assert rk.mechanical_work(run).sum() == pytest.approx(kinetic, abs=1e-9)
+    study = rk.sweep(ROUND, wrap(rk.PD(0.02, 0.001)), LAP, [[0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(study.energies[0], run.energy, rtol=1e-9)
+
+
+def test_filter_finds_the_pose_of_drives_that_are_turns_behind():
+    """A matrix for W is the same law, but one of the textbook layer."""
+    filters = [rk.AntagonismFilter(rk.PD(0.02, 0.001), W=W) for W in (None, np.eye(3))]
+    compiled, plain = (rk.simulate(ROUND, law, LAP, offset=[0.02, -0.01, 0.0]) for law in filters)
+    assert np.abs(compiled.error).max() > np.pi
+    np.testing.assert_allclose(compiled.x, plain.x, atol=1e-7)
+    np.testing.assert_allclose(compiled.energy, plain.energy, rtol=1e-7)
+
+
+@pytest.mark.parametrize("drive", range(3))
+def test_a_pose_far_from_all_readings_is_the_same_in_both_loops(drive):
+    """Readings that contradict each other by some tenths of a radian, as those of an encoder that repeats itself."""
+    silent = rk.EncoderDropout(drive, 0.2, 0.55)
+    path, ends = rk.triangle(ROBOT, duration=1.5), []
+    for W in (None, np.eye(3)):
+        try:
+            ends.append(rk.simulate(ROBOT, rk.AntagonismFilter(PD, W=W), path, faults=silent))
+        except rk.SimulationError as error:
+            ends.append(error.partial)
+    assert len(ends[0]) == len(ends[1])
+    np.testing.assert_allclose(ends[0].c, ends[1].c, atol=1e-6)

@@ -133,6 +133,16 @@ def share(s1, s2, tip, l1sq, l2sq, links, vx, vy):
 
 
 @leaf
+def curvature(l2sq, links, r):
+    """Share of an arm of residual r in the Hessian of half the squared error of the pose: m11, m12, m22 of
+    b b^T - r d2 q / dx2, with the second derivative (a.d b b^T + l2^2 l l^T) / (a x d) of the base angle."""
+    bx, by, lx, ly, ad, inv, _ = links
+    h = r * inv
+    g1, g2 = 1.0 - h * ad, h * l2sq
+    return g1 * bx * bx - g2 * lx * lx, g1 * bx * by - g2 * lx * ly, g1 * by * by - g2 * ly * ly
+
+
+@leaf
 def pose_terms(l2sq, scale, place, ux, uy, e):
     """An arm in the least-squares pose of the measured base angles: Hessian and gradient of half the squared error, and
     a number that is negative where the series does not hold or the arm does not reach.
@@ -140,21 +150,12 @@ def pose_terms(l2sq, scale, place, ux, uy, e):
     u : unit vector of the desired proximal link.  e : measured minus desired base angle, rad.
     """
     links, area2 = place
-    bx, by, lx, ly, ad, inv, _ = links
+    bx, by = links[0], links[1]
     s, t = turned(links, scale * ux, scale * uy)
     near = min(min(0.1 - abs(s), t), area2)
     r = e - small_angle(s)
-    # Second derivative of the base angle: (a.d b b^T + l2^2 l l^T) / (a x d).
-    h = r * inv
-    g1, g2 = 1.0 - h * ad, h * l2sq
-    return (
-        g1 * bx * bx - g2 * lx * lx,
-        g1 * bx * by - g2 * lx * ly,
-        g1 * by * by - g2 * ly * ly,
-        bx * r,
-        by * r,
-        near,
-    )
+    # An arm that has turned right round has another r.
+    return (*curvature(l2sq, links, r), bx * r, by * r, min(near, 3.0 - abs(r)))
 
 
 @leaf

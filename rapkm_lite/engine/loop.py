@@ -21,10 +21,15 @@ from .user import fill
 
 
 @leaf
-def start(arms, history, clock, w):
-    """The first geometry of a single run, which its holds then make ahead."""
-    if history is not None:
-        if clock.first == 0:
+def start(lanes, arms, history, clock, table, w):
+    """The turn of the angles before the first sample, and the first geometry of a single run, which its holds then
+    make ahead."""
+    if clock.first == 0:
+        L, W = len(lanes), len(arms)
+        for i in range(W):
+            for j in range(L):
+                w[at(Q, i, j, W, L)] = w[at(OLD, i, j, W, L)] = want(table, 0, ANGLE, i, W)
+        if history is not None:
             single.begin(arms, w)
 
 
@@ -92,7 +97,9 @@ def take_answer(drives, arms, w, buffer):
     """The torques that a user's law left at the end of the buffer."""
     N, W = len(drives), len(arms)
     for i in range(N):
-        w[C * W + i] = buffer[len(buffer) - N + i]
+        c = buffer[len(buffer) - N + i]
+        # No limit of a drive makes a torque of what is none.
+        w[C * W + i] = c if abs(c) < 1e100 else math.nan
 
 
 @leaf
@@ -200,7 +207,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     lanes, drives, arms, faulty, posed, extra = kind
     columns = 6 + (FEW if modelled is None and user is None else ALL) * len(arms)
     rows = len(table) // columns
-    start(arms, history, clock, w)
+    start(lanes, arms, history, clock, table, w)
     for row in range(rows):
         k, o = counted(clock.first + row), counted(row * columns)
 
@@ -217,8 +224,10 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         find_pose(lanes, drives, arms, posed, modelled, history, study, law, table, o, w, k)
         if study is not None:
-            if k + 1 == clock.samples:
-                return
+            # A user's law is asked once more, as in a single run.
+            if user is None:
+                if k + 1 == clock.samples:
+                    return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
         command(lanes, drives, arms, modelled, user, law, table, o, w, k * dt, dt, buffer)
@@ -228,6 +237,10 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
         # Record.
         if study is not None:
+            if user is not None:
+                if k + 1 == clock.samples:
+                    last_torque(drives, arms, w, k)
+                    return
             add_up(lanes, drives, arms, w)
         if history is not None:
             record(arms, history, w, k)

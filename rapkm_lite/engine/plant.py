@@ -49,21 +49,32 @@ def sense(lanes, arms, extra, table, o, w, dt):
             w[at(LOW, i, j, W, L)] = min(area2, 1.0 - dt * decay)
     for p in range(W * L):
         count += 1 if w[NEAR * W * L + p] < 0.0 else 0
+    for j in range(L):
+        count += 1 if w[of(AROUND, j, W, L)] > 0.0 else 0
     return count
 
 
 @leaf
 def mend(lanes, arms, table, o, w):
-    """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent."""
+    """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent.
+
+    An angle stays on the turn of the sample before; where that is not the nearest to the desired one, AROUND says so.
+    """
     L, W = len(lanes), len(arms)
-    for i in range(W):
-        for j in range(L):
-            if w[at(NEAR, i, j, W, L)] < 0.0:
+    for j in range(L):
+        around = 0.0
+        for i in range(W):
+            if w[at(NEAR, i, j, W, L)] < 0.0 or w[of(AROUND, j, W, L)] > 0.0:
+                wanted = want(table, o, ANGLE, i, W)
                 links, _ = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
                 s, t = turned(links, want(table, o, COS, i, W), want(table, o, SIN, i, W))
                 angle = math.atan2(s, t)
-                w[at(Q, i, j, W, L)] = want(table, o, ANGLE, i, W) + angle
+                turns = math.floor((w[at(OLD, i, j, W, L)] - wanted - angle) / (2.0 * math.pi) + 0.5)
+                angle += 2.0 * math.pi * turns
+                around = max(around, abs(turns))
+                w[at(Q, i, j, W, L)] = wanted + angle
                 w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
+        w[of(AROUND, j, W, L)] = around
 
 
 @outlined

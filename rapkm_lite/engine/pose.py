@@ -6,7 +6,7 @@ import math
 
 from .arms import placed
 from .jit import kernel, leaf, outlined
-from .leaves import moved, pose_terms, solve2, turned
+from .leaves import curvature, moved, pose_terms, solve2, turned
 from .rows import *
 from .tables import *
 
@@ -175,11 +175,12 @@ def nearest(drives, arms, w, q_a, x, y):
 
 
 @outlined
-def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
-    """Least-squares pose of one run from a rough start; returns it, and whether it converged."""
+def rough_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
+    """Least-squares pose of one run from a rough start, as `estimate_pose` finds it; and whether it converged."""
     N, W = len(drives), len(arms)
+    most = 0.1 / w[at(MODEL + SCALE, 0, j, W, L)]
     for _ in range(50):
-        m11 = m12 = m22 = fx = fy = -0.0
+        m11 = m12 = m22 = h11 = h12 = h22 = fx = fy = -0.0
         for i in range(N):
             links, area2 = placed(MODEL, w, i, j, W, L, x, y)
             if not area2 > 0.0:
@@ -187,12 +188,18 @@ def gauss_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
             s, t = turned(links, ux, uy)
             r, bx, by = w[at(E, i, j, W, L)] - math.atan2(s, t), links[0], links[1]
+            r -= 2.0 * math.pi * math.floor(r / (2.0 * math.pi) + 0.5)
+            p11, p12, p22 = curvature(w[at(MODEL + L2SQ, i, j, W, L)], links, r)
             keep(w, i * L + j, W * L, links)
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
+            h11, h12, h22 = h11 + p11, h12 + p12, h22 + p22
+        if h11 > 0.0 and h11 * h22 - h12 * h12 > 1e-3 * (m11 * m22 - m12 * m12):
+            m11, m12, m22 = h11, h12, h22
         sx, sy = solve2(m11, m12, m22, fx, fy)
         if abs(sx) < tolerance and abs(sy) < tolerance:
             return x, y, True
-        x, y = x + sx, y + sy
+        part = min(1.0, most / max(abs(sx), abs(sy)))
+        x, y = x + part * sx, y + part * sy
     return x, y, False
 
 
@@ -223,7 +230,7 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
     if rough > 0:
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
-                px, py, found = gauss_newton(
+                px, py, found = rough_newton(
                     drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
                 )
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py

@@ -54,6 +54,7 @@ def sense(arms, extra, table, o, w, dt):
     """As `plant.sense`."""
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
+    move(W, w, Q * W, w, OLD * W)
     fetch(ANGLE, W, table, o, w)
     fetch(COS, W, table, o, w)
     fetch(SIN, W, table, o, w)
@@ -77,7 +78,7 @@ def sense(arms, extra, table, o, w, dt):
     near = w[NEAR * W]
     for i in range(1, W):
         near = min(near, w[NEAR * W + i])
-    return 0 if near >= 0.0 else 1
+    return 0 if near >= 0.0 and w[of(AROUND, 0, W, 1)] == 0.0 else 1
 
 
 @leaf
@@ -203,9 +204,14 @@ def put(arms, w, x, y, vx, vy):
 
 
 @kernel
-def observe(arms, extra, table, x, y, vx, vy, w, q, qd):
-    """True base angles and rates (N,) for a controller in Python; `row` is the desired motion."""
+def observe(arms, extra, table, x, y, vx, vy, w, q, qd, follows):
+    """True base angles and rates (N,) for a controller in Python; `table` is the desired motion of a sample, which
+    follows on the last one or begins a run."""
     put(arms, w, x, y, vx, vy)
+    if not follows:
+        fetch(ANGLE, len(arms), table, 0, w)
+        move(len(arms), w, (MOTION + ANGLE) * len(arms), w, Q * len(arms))
+        w[of(AROUND, 0, len(arms), 1)] = 0.0
     begin(arms, w)
     if sense(arms, extra, table, 0, w, 0.0) > 0:
         mend(((),), arms, table, 0, w)
@@ -223,6 +229,8 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     for i in range(len(c)):
         w[C * W + i] = c[i]
     hold(arms, extra, w, dt)
+    # The angles are those of the last sample that was looked at.
+    move(W, w, OLD * W, w, Q * W)
     w[of(STATUS, 0, W, 1)] = DONE
     judge(((),), arms, w, 0)
     return (w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)], w[of(STATUS, 0, W, 1)])

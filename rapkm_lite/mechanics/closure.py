@@ -18,6 +18,7 @@ from . import cores
 from .at import at
 from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints, reachable
+from .redundancy import base_angle_hessians
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
@@ -80,13 +81,25 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
     return H
 
 
+def _pose_hessian(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The Hessian of half the squared residuals in x, (..., 2, 2); A^T A where it is not well positive definite.
+
+    Where residuals are large, A^T A alone makes steps that shrink slowly, or not at all.
+    """
+    square = A.mT @ A
+    hessian = square - np.einsum("...i,...ijk->...jk", residual, base_angle_hessians(robot, q))
+    regular = (hessian[..., 0, 0] > 0.0) & (np.linalg.det(hessian) > 1e-3 * np.linalg.det(square))
+    return np.where(regular[..., None, None], hessian, square)
+
+
 def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 50) -> np.ndarray:
     """The configuration whose base angles are nearest to the measured ones, (..., 2N) in rad.
 
     N measured angles over-determine the two coordinates of the pose, and calibration offsets make them contradict each
-    other.  The pose taken is the least-squares one, min_x sum_i (q_i(x) - q_a,i)^2, found by Gauss-Newton steps with
-    the control matrix A = d q_a / d x from the end-effector position `guess` (..., 2) in m; its working mode is
-    ``robot.mode``.  For N = 2 this is the forward kinematics of the five-bar.
+    other.  The pose taken is the least-squares one, min_x sum_i (q_i(x) - q_a,i)^2, found by Newton steps from the
+    end-effector position `guess` (..., 2) in m, of Gauss and Newton with the control matrix A = d q_a / d x where the
+    exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
+    kinematics of the five-bar.
     Raises ConvergenceError with the residual and the pose, also where the iteration leaves the workspace.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
@@ -103,11 +116,13 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
             break
         A = at(robot, q).A
         residual = wrap(q_a - q[..., : robot.n_arms])
-        gradient = matvec(A.mT, residual)
-        step = solve("A^T A (an input singularity)", A.mT @ A, gradient[..., None])[..., 0]
+        hessian = _pose_hessian(robot, q, A, residual)
+        step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
         if np.abs(step).max(initial=0.0) < limit:
             return q
-        x = x + step
+        # A tenth of a link at most: from farther away a step may miss the workspace.
+        size = np.abs(step).max(axis=-1, keepdims=True)
+        x = x + step * np.minimum(1.0, 0.1 * robot.lengths[0, 0] / np.maximum(size, 1e-300))
     bad = np.where(reachable(robot, x), np.abs(step).max(axis=-1), np.inf)
     worst = np.unravel_index(np.argmax(bad), lead)
     where = "inside" if reachable(robot, x[worst]) else "outside"

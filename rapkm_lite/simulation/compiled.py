@@ -243,19 +243,19 @@ class Plant:
         self._nearest, self._drives = nearest, tables.sizes(robot.n_arms)
         W = tables.width(robot.n_arms, True)
         self._w, self._arms = tables.plain(tables.aligned(_blank(robot, model or robot, W, 1))), tables.sizes(W)
-        self._extra, table = tables.extra(robot), _motion(trajectory, W, tables.FEW, slice(0, len(trajectory)))
+        self._extra, self.status, self._next = tables.extra(robot), DONE, -1
+        table = _motion(trajectory, W, tables.FEW, slice(0, len(trajectory)))
         columns = len(table) // len(trajectory)
         self._table = [table[k : k + columns] for k in range(0, len(table), columns)]
-        self.status = DONE
         start = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
         with patience("plant", W, self._extra):
             self.observe(0, start)
             self.hold(start, np.zeros(robot.n_arms), self._dt)
 
     def observe(self, k: int, state) -> tuple[np.ndarray, np.ndarray]:
-        """True base angles and rates (N,) at sample k."""
-        q, qd = np.empty(self._N), np.empty(self._N)
-        self._observe(self._arms, self._extra, self._table[k], *state, self._w, q, qd)
+        """True base angles and rates (N,) at sample k; of the sample after the last one, on the same turn."""
+        q, qd, follows, self._next = np.empty(self._N), np.empty(self._N), k == self._next, k + 1
+        self._observe(self._arms, self._extra, self._table[k], *state, self._w, q, qd, follows)
         return q, qd
 
     def nearest(self, q_a: np.ndarray, guess) -> tuple[float, float] | None:
