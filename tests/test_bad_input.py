@@ -344,6 +344,23 @@ def test_the_rates_that_open_the_loops_most_for_their_size_are_named():
             rk.forward_dynamics(robot, q, np.stack([wrong, fast])[order], np.zeros((2, 3)))
 
 
+@pytest.mark.parametrize("call", ["forward_dynamics", "inverse_dynamics", "required_wrench"])
+def test_one_rate_at_many_poses_is_that_rate_at_each_of_them(call):
+    """Leading axes are broadcast: the sentence is that of J qd at the worst pose, and rest is rest at each of them."""
+    robot = rk.load()
+    q = rk.inverse_kinematics(robot, [[0.02, 0.05], [-0.03, 0.01]])
+    rest = np.array([0.1, 0.0, 0.0]) if call == "forward_dynamics" else np.zeros(6)
+    speed = np.abs(rk.constraint_jacobian(robot, q).sum(axis=-1)).max()
+    for qd in (np.ones(6), np.ones((1, 6)), np.ones((2, 6))):
+        with pytest.raises(ValueError, match=f"qd opens the loops at {speed:.3g} m/s; allowed: 0.002 m/s"):
+            getattr(rk, call)(robot, q, qd, rest)
+    together = getattr(rk, call)(robot, q, np.zeros(6), rest)
+    for k, pose in enumerate(q):
+        alone = getattr(rk, call)(robot, pose, np.zeros(6), rest)
+        for one, many in zip(alone, together, strict=True) if call == "forward_dynamics" else [(alone, together)]:
+            np.testing.assert_allclose(many[k], one, rtol=0, atol=1e-12)
+
+
 OUTSIDE = [[0.3, 0.3], [-0.25, -0.2], [1e3, 0.0]]
 
 

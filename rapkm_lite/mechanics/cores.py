@@ -81,7 +81,8 @@ def check_tangent(tree: Tree, J: np.ndarray, qd: np.ndarray) -> None:
     So wide, because rates that are differences of closed poses, or belong to a slightly wrong model, are rates of use.
     """
     speed = np.abs(matvec(J, qd)).max(axis=-1)
-    limit = 1e-2 * tree.longest * np.maximum(np.abs(qd).max(axis=-1), 1.0)
+    # One rate may meet many poses.
+    limit = np.broadcast_to(1e-2 * tree.longest * np.maximum(np.abs(qd).max(axis=-1), 1.0), speed.shape)
     if np.any(speed > limit):
         k = np.unravel_index(np.argmax(speed / limit), speed.shape)
         raise ValueError(
