@@ -16,6 +16,7 @@ from rapkm_lite.engine import COMPILED
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
+PD = rk.PD(7.05, 0.225)
 
 
 class InPython(rk.Law):
@@ -110,6 +111,43 @@ def test_inside_a_filter_and_in_a_study():
     study = rk.sweep(ROBOT, pid, PATH, np.stack([OFFSET, -OFFSET, OFFSET]))
     assert_array_equal(study.energies[0], study.energies[2])
     assert_allclose(study.energies[0], rk.simulate(ROBOT, pid, PATH, OFFSET).energy, rtol=0, atol=1e-11)
+
+
+def in_place(t, q_a, qd_a, d):
+    q_a -= d.q_a
+    qd_a -= d.qd_a
+    c = -7.05 * q_a - 0.225 * qd_a
+    q_a[:] = 7.0
+    qd_a[:] = -9.0
+    return c
+
+
+def test_what_was_measured_is_the_laws_own_to_write():
+    """It is PD, compiled or not, also inside filters, of which that with a W runs in Python."""
+    law = rk.compiled(in_place)
+    for around in (lambda law: law, rk.AntagonismFilter, lambda law: rk.AntagonismFilter(law, W=np.eye(3))):
+        for one in (law, in_place):
+            run, expected = (rk.simulate(ROBOT, around(each), PATH, OFFSET) for each in (one, PD))
+            assert_allclose(run.c, expected.c, rtol=0, atol=1e-11)
+            assert_allclose(run.q_a, expected.q_a, rtol=0, atol=1e-11)
+
+
+def test_a_law_that_writes_into_what_was_measured_is_lost_as_any_other():
+    """The run is repeated in Python to say what the law answered: with its time, words and samples."""
+
+    @rk.compiled
+    def law(t, q_a, qd_a, d):
+        q_a -= d.q_a
+        qd_a -= d.qd_a
+        c = -7.05 * q_a - 0.225 * qd_a
+        return c * np.nan if t > 0.15 else c
+
+    for one, around in ((law, lambda law: law), (law.function, lambda law: law), (law, rk.AntagonismFilter)):
+        with pytest.raises(rk.SimulationError, match=r"law\(t = 0.1510 s, ...\)\[0\] = nan; allowed: finite") as caught:
+            rk.simulate(ROBOT, around(one), PATH, OFFSET)
+        whole = rk.simulate(ROBOT, around(PD), PATH, OFFSET)
+        assert len(caught.value.partial) == 151
+        assert_allclose(caught.value.partial.c, whole.c[:151], rtol=0, atol=1e-11)
 
 
 def test_values():

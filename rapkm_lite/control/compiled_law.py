@@ -89,7 +89,8 @@ class CompiledLaw(LawValue):
             given.append(at_pose(sample.model, q, qd))
         if self.memory:
             given.append(memory)
-        return self.function(sample.t, sample.q_a, sample.qd_a, desired, *given), memory
+        # It may write into what was measured, as it may compiled.
+        return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), desired, *given), memory
 
     def __repr__(self):
         return f"compiled({self._name}, at={self.at!r}, memory={self.memory})"
@@ -120,6 +121,7 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
 
     at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
+    q_a and qd_a are the function's own, too: what it writes into them stays with it.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
     Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it
