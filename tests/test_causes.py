@@ -303,6 +303,15 @@ def test_a_wrong_model_is_not_blamed_where_the_right_one_would_not_help():
         assert "(unstable gain: near the desired state" in lost(law=law, **options)
 
 
+def test_a_model_is_not_blamed_for_set_points():
+    """Drives that are told to part by 4 rad from the middle on lose the run without a wrong model, so also with it."""
+    apart = np.where(CIRCLE.t[:, None] > 0.2, [2.0, -2.0, 2.0], 0.0)
+    path, model = CIRCLE.with_set_points(CIRCLE.q_a + apart, CIRCLE.qd_a), ROBOT.replace(lengths=0.2 * (1 + 1e-9))
+    assert not model.same_kinematics(ROBOT)
+    said = lost(path=path)
+    assert lost(path=path, model=model) == said and "controller's model has" not in said
+
+
 def test_a_right_model_and_right_encoders_are_not_blamed():
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, offset=OFFSET)
     assert "controller's model" not in said and "offset =" not in said

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import FRICTIONLESS, TESTBED
 
 import rapkm_lite as rk
-from rapkm_lite.mechanics import trajectory
+from rapkm_lite.mechanics import sampling
 from rapkm_lite.simulation import compiled
 
 OFFSET = [4e-3, -2e-3, 5e-3]
@@ -69,7 +69,7 @@ def test_a_path_in_parts_is_the_same_path(monkeypatch):
     robot = rk.Manipulator(base=[[-0.1, 0.0], [0.12, 0.0]], lengths=[[0.2, 0.25], [0.3, 0.3]], masses=0.1)
     xd = 0.15 * np.stack([-np.sin(t), np.cos(t)], axis=-1)
     whole = rk.follow(robot, t, x, xd, np.zeros_like(x))
-    monkeypatch.setattr(trajectory, "PART", 170)
+    monkeypatch.setattr(sampling, "PART", 170)
     parts = rk.follow(robot, t, x, xd, np.zeros_like(x))
     assert np.ptp(whole.q[:, 0]) > 50.0
     for name in ("x", "xd", "q", "qd", "qdd"):

@@ -111,6 +111,56 @@ def test_samples_and_other_machines():
     assert repr(path) == "Trajectory(501 samples, 5 s, 'testbed')"
 
 
+def late(path, samples=20):
+    """Set-points of a clock that is late."""
+    return path.with_set_points(np.concatenate([path.q_a[:1].repeat(samples, 0), path.q_a[:-samples]]))
+
+
+def test_set_points_stay_as_far_from_the_path_for_another_machine():
+    """q - q(x) is kept, q(x) the closed angles: there and back are the set-points, which are those of no x."""
+    own, other = MACHINES["asymmetric"], TESTBED
+    path, there = rk.circle(own, 0.05, 0.5), rk.circle(other, 0.05, 0.5)
+    told = late(path)
+    moved = told.for_robot(other)
+    assert moved.robot is other and np.array_equal(moved.x, path.x)
+    for name in ("q_a", "qd_a"):
+        apart = getattr(told, name) - getattr(path, name)
+        assert np.abs(apart).max() > 0.1
+        assert_allclose(getattr(moved, name) - getattr(there, name), apart, rtol=0, atol=1e-14 * np.abs(told.qd).max())
+        assert_allclose(getattr(moved.for_robot(own), name), getattr(told, name), rtol=1e-14, atol=1e-13)
+    assert np.array_equal(moved.q[:, 3:], there.q[:, 3:]) and np.array_equal(moved.qdd, there.qdd)
+    with pytest.raises(ValueError, match="robot has 4 arms; allowed: 3, as many as the set-points"):
+        told.for_robot(MACHINES["four_arms"])
+
+
+@pytest.mark.parametrize("samples", [2, 7, 300, 501])
+def test_angles_of_the_path_are_no_set_points(samples):
+    """To the last bit, also of a part of a path and where the path is told its own angles, for any number of arms."""
+    path = rk.circle(TESTBED, 0.05, 0.5)
+    given = {name: getattr(path, name)[:samples] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
+    part = rk.Trajectory(3, **given, robot=TESTBED)
+    for name in ("asymmetric", "four_arms"):
+        expected = rk.circle(MACHINES[name], 0.05, 0.5)
+        for one in (path, part, part.with_set_points(part.q_a, part.qd_a)):
+            found = one.for_robot(MACHINES[name])
+            assert all(np.array_equal(getattr(found, k), getattr(expected, k)[: len(one)]) for k in given)
+
+
+def test_set_points_reach_the_drives_through_a_model_that_is_slightly_wrong():
+    """A model that errs by 1e-12 changes a run by as much, not by what a late clock does; in a study, too."""
+    robot, law = MACHINES["asymmetric"], rk.PD(30.0, 0.8)
+    path = rk.circle(robot, 0.05, 0.5)
+    model = robot.replace(lengths=robot.lengths * (1 + 1e-12))
+    right, wrong = (rk.simulate(robot, law, late(path), model=each) for each in (None, model))
+    assert np.abs(right.x - rk.simulate(robot, law, path).x).max() > 0.02
+    assert_allclose(wrong.x, right.x, rtol=0, atol=1e-11)
+    assert_allclose(wrong.c, right.c, rtol=0, atol=1e-9)
+    study = rk.sweep(robot, law, late(path), np.zeros((2, 3)), model=model)
+    assert_allclose(study.energies[0], right.energy, rtol=1e-9)
+    with pytest.raises(ValueError, match="model cannot follow the trajectory: robot has 4 arms; allowed: 3"):
+        rk.simulate(MACHINES["four_arms"], law, late(path))
+
+
 @pytest.mark.parametrize("factor", [0.5, 1.5])
 def test_rates_of_another_motion_are_refused(factor):
     path = rk.circle(TESTBED, 0.05, 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..machine.arguments import positive_number, real_array, short
 from ..machine.manipulator import Manipulator
+from ..machine.values import all_frozen
 from . import cores
 from .kinematics import inverse_kinematics
 
@@ -44,7 +45,13 @@ def equidistant(t) -> np.ndarray:
 
 
 def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:
-    """Refuse rates that are no derivative of the positions; a few jumps are set-points, and allowed."""
+    """Refuse other shapes than (k, 2), and rates that are no derivative of the positions; a few jumps are set-points,
+    and allowed."""
+    for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
+        if v.shape != (len(t), 2):
+            raise ValueError(
+                f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
+            )
     for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
         if (fastest := np.abs(v).max()) > 1e30:
             raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")
@@ -61,6 +68,11 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -
         )
 
 
+def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The way from 0 to 1 at the shares s (...,) of the time, from rest to rest, and its derivatives by s."""
+    return s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+
+
 def slow_turns(t: np.ndarray, turns) -> float:
     """The turns of a circle, unless samples would show another one; a quintic is 15/8 times as fast as on average."""
     turns = positive_number("turns", turns)
@@ -71,6 +83,26 @@ def slow_turns(t: np.ndarray, turns) -> float:
             "turns, a longer duration or a shorter dt"
         )
     return turns
+
+
+def columns(robot: Manipulator, t: np.ndarray, motion: Motion, given: dict) -> list[np.ndarray]:
+    """x, xd, xdd (k, 2) and q, qd, qdd (k, 2N) of a motion at the times t (k,), read-only.
+
+    motion : gives x, xd, xdd of some rows.  given : what the caller was asked for, for the sentence of an error.
+    Raises ValueError when the path leaves the workspace.
+    """
+    made = [np.empty((len(t), size)) for size in [2, 2, 2, *[robot.n_joints] * 3]]
+    for first in range(0, len(t), PART):
+        rows, before = slice(first, first + PART), made[3][first - 1 : first]
+        path = motion(rows)
+        try:
+            parts = *path, *joint_motion(robot, *path, before)
+        except ValueError as error:
+            raise refusal(robot, motion(slice(None))[0], given, error) from None
+        for column, part in zip(made, parts, strict=True):
+            column[rows] = part
+    del column
+    return all_frozen(made)
 
 
 def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
-from ..machine.values import Value, all_frozen, frozen
-from .sampling import PART, Motion, check_rates, chosen, equidistant, joint_motion, refusal, sample_times, slow_turns
+from ..machine.values import Value, frozen
+from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,16 +109,34 @@ class Trajectory(Desired):
         return self._samples.setdefault(k, sample)
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
-        """The same end-effector motion for another machine (other joint angles)."""
+        """The same end-effector motion for another machine (other joint angles).
+
+        Set-points that are not the angles of x stay as far from them as they are here.
+        Raises ValueError when the path leaves its workspace, and for set-points of another number of drives.
+        """
         if manipulator(robot).same_kinematics(self.robot):
             return self
-        return _follow(robot, self.t, lambda rows: (self.x[rows], self.xd[rows], self.xdd[rows]), {"machine": robot})
+        if self._apart is not None and robot.n_arms != self.n_arms:
+            raise ValueError(f"robot has {robot.n_arms} arms; allowed: {self.n_arms}, as many as the set-points")
+        made = _follow(robot, self.t, self._motion, {"machine": robot})
+        return made._changed(**{k: getattr(made, k) + v for k, v in self._apart.items()}) if self._apart else made
+
+    def _motion(self, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.x[rows], self.xd[rows], self.xdd[rows]
+
+    @cached_property
+    def _apart(self) -> dict[str, np.ndarray] | None:
+        """How far q, qd and qdd are from those of x, xd and xdd; None where they are those."""
+        own = columns(self.robot, self.t, self._motion, {"machine": self.robot})[3:]
+        apart = {name: getattr(self, name) - column for name, column in zip(_MOTION[3:], own, strict=True)}
+        return apart if any(np.any(v) for v in apart.values()) else None
 
     def with_set_points(self, q_a, qd_a=None) -> Trajectory:
         """The same path with other set-points for the drives, which need not close the loops (fig. 3).
 
         A drive that interpolates on its own, or whose clock is late, gets such angles.  Only laws that work on base
         angles and rates, such as `PD`, follow them; x, elbow angles and accelerations stay those of the path.
+        For another machine, or a model with another geometry, they stay as far from the angles of the path.
         q_a : (k, N) rad.  qd_a : (k, N) rad/s; default: central differences of q_a.
         Raises ValueError for other shapes, or numbers that are not finite.
 
@@ -151,29 +169,15 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     manipulator(robot)
     t = equidistant(t)
     x, xd, xdd = (real_array(name, v, 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
-    for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
-        if v.shape != (len(t), 2):
-            raise ValueError(
-                f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
-            )
     check_rates(t, x, xd, xdd)
     return _follow(robot, t, lambda rows: (x[rows], xd[rows], xdd[rows]), {"samples": len(t)})
 
 
 def _follow(robot: Manipulator, t, motion: Motion, given: dict) -> Trajectory:
     """`follow` without its checks; `motion` gives x, xd, xdd of some rows, `given` is what the caller was asked for."""
-    columns = [np.empty((len(t), size)) for size in [2, 2, 2, *[robot.n_joints] * 3]]
-    for first in range(0, len(t), PART):
-        rows, before = slice(first, first + PART), columns[3][first - 1 : first]
-        path = motion(rows)
-        try:
-            parts = *path, *joint_motion(robot, *path, before)
-        except ValueError as error:
-            raise refusal(robot, motion(slice(None))[0], given, error) from None
-        for column, part in zip(columns, parts, strict=True):
-            column[rows] = part
-    del column
-    return Trajectory(robot.n_arms, *all_frozen(columns), t=t, robot=robot)
+    made = Trajectory(robot.n_arms, *columns(robot, t, motion, given), t=t, robot=robot)
+    made.__dict__["_apart"] = None
+    return made
 
 
 def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3, rest: float = 0.0) -> Trajectory:
@@ -191,11 +195,6 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     if corners.ndim != 2 or len(corners) < 2:
         raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
     return _polygon(robot, corners, duration, dt, rest, {"corners": corners.tolist()})
-
-
-def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The way from 0 to 1 at the shares s (...,) of the time, from rest to rest, and its derivatives by s."""
-    return s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
 
 
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:

@@ -169,7 +169,8 @@ def simulate(
         (A function that remembers in variables outside cannot be copied: write an object, or a `Law` with `start`.)
     offset : calibration offsets (N,) in rad, measured minus true angle.
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
-    model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles.
+    model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles, from
+        which set-points of `Trajectory.with_set_points` stay as far as they are from the path's.
     velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
         first-order low-pass; None for the true rates.
     faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.

@@ -15,7 +15,7 @@ import numpy as np
 from ...machine.arguments import matvec
 from ...mechanics.cores import wrap
 from ...mechanics.matrices import complement, complement_dot
-from ...mechanics.trajectory import quintic
+from ...mechanics.sampling import quintic
 from .mechanism import Mechanism, derive, symbolic
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
