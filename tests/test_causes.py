@@ -1,10 +1,13 @@
 """The reason of a lost run names what was broken on purpose, by hand, so that the truth is known."""
 
+import re
+
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 import rapkm_lite as rk
-from rapkm_lite.simulation.growth import growth
+from rapkm_lite.simulation.growth import growth, magnified
 from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
@@ -249,6 +252,31 @@ def test_growth_is_that_of_a_double_integrator_under_feedback(name):
         felt = -np.hstack([900.0 * one, 20.0 * one])
         law = rk.CTC(900.0, 20.0, None, pose=pose)
         assert growth(setup, law, 0) == pytest.approx(per_sample(felt), rel=1e-11, abs=0.0)
+
+
+def test_a_loop_that_grows_slowly_is_told_by_the_samples_in_which_it_doubles():
+    """Beside a rest that gravity makes unstable, with next to no gains: xdd = -Gbar^-1 dQbar/dx dx, of which the
+    positive eigenvalue s^2 doubles an error in log(2) / (s dt) samples."""
+
+    def pose(x):
+        q = rk.inverse_kinematics(HANGING, x)
+        return rk.at(HANGING, q, 0 * q)
+
+    rest = fsolve(lambda x: pose(x).minimal[2], [0.17, -0.1], xtol=1e-13)
+    force = [(pose(rest + d).minimal[2] - pose(rest - d).minimal[2]) / 2e-6 for d in 1e-6 * np.eye(2)]
+    square = np.linalg.eigvals(np.linalg.solve(pose(rest).minimal[0], -np.stack(force, axis=-1))).max()
+    said = rf"sampled loop doubles an error in {np.log(2.0) / (square**0.5 * 1e-3):.3g} samples of 0.001 s\)$"
+    with pytest.raises(rk.SimulationError, match=said):
+        rk.simulate(HANGING, rk.PD(1e-9, 1e-9), rk.hold(HANGING, rest + [1e-7, 0.0], 3.0))
+
+
+@pytest.mark.parametrize("factor", [1.0 + 1e-6, 1.0004, 1.004, 1.0499, 1.0501, 1.5, 40.0])
+def test_what_is_said_of_a_growth_is_that_growth(factor):
+    """f per sample, or twice in n samples with f^n = 2: as three digits tell it, and never 1-fold."""
+    said = magnified(factor, 1e-3)
+    number = float(re.search(r"error (?:in )?([\d.e+]+)", said)[1])
+    found = number if "-fold per sample" in said else 2.0 ** (1.0 / number)
+    assert np.log(found) == pytest.approx(np.log(factor), rel=2e-2) and "error 1-fold" not in said
 
 
 @pytest.mark.parametrize(("times", "cause"), [(2.5, "grew 2.5-fold"), (1.3, "left the workspace")])

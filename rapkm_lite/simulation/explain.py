@@ -23,7 +23,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
 from .faults import Fault, TorqueLimit, blank_table
-from .growth import growth, inner_law, swinging
+from .growth import growth, inner_law, magnified, swinging
 from .loop import closed_loop
 from .setup import Setup
 
@@ -109,10 +109,7 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
     yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
     if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
-        yield (
-            f"unstable gain: near the desired state the sampled loop magnifies an error {factor:.3g}-fold per "
-            f"sample of {setup.trajectory.dt:g} s"
-        )
+        yield f"unstable gain: near the desired state the sampled loop {magnified(factor, setup.trajectory.dt)}"
     yield from _sensors(setup, law, k)
     yield from _singular(setup, law, slice(k), 0.1)
     if factor is not None and factor > 1.001:
@@ -162,11 +159,13 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
 
 def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
     """An integral gain beyond what K_P and K_D hold; Routh: K_I < K_P K_D / m for a mass m."""
-    inner, grows = inner_law(law), factor is not None and factor > 1.0 + 1e-6
-    if grows and isinstance(inner, PID) and np.any(inner.K_I) and _runs(setup, _replaced(law, K_I=0.0), k):
+    inner = inner_law(law)
+    if factor is None or factor <= 1.0 + 1e-6 or not isinstance(inner, PID) or not np.any(inner.K_I):
+        return
+    if _runs(setup, _replaced(law, K_I=0.0), k):
         yield (
             f"unstable gain K_I = {short(inner.K_I.tolist())} of the integral: near the desired state the sampled loop "
-            f"magnifies an error {factor:.5g}-fold per sample of {setup.trajectory.dt:g} s; without it it is not lost"
+            f"{magnified(factor, setup.trajectory.dt)}; without it it is not lost"
         )
 
 

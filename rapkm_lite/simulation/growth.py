@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,17 @@ def growth(setup: Setup, law, k: int) -> float | None:
         except (ValueError, RuntimeError, TypeError, ArithmeticError, np.linalg.LinAlgError):
             pass
     return None
+
+
+def magnified(factor: float, dt: float) -> str:
+    """What a loop does to an error that grows by a factor > 1 per sample of dt in s, in words that are not "1-fold".
+
+    >>> magnified(2.5, 1e-3), magnified(2.0 ** (1 / 300), 1e-3)
+    ('magnifies an error 2.5-fold per sample of 0.001 s', 'doubles an error in 300 samples of 0.001 s')
+    """
+    if factor > 1.05:
+        return f"magnifies an error {factor:.3g}-fold per sample of {dt:g} s"
+    return f"doubles an error in {math.log(2.0) / math.log(factor):.3g} samples of {dt:g} s"
 
 
 def swinging(c: np.ndarray) -> float:
