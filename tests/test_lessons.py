@@ -186,6 +186,14 @@ def test_readme_asks_the_question_of_the_lesson(path):
     assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
 
 
+def test_the_first_lesson_says_how_long_the_others_take():
+    start = nbformat.read(NOTEBOOKS / "00_start_here.ipynb", as_version=4)
+    text = "\n".join(cell.source for cell in start.cells)
+    said = dict(re.findall(r"^\| \[.+\]\((\w+\.ipynb)\) \|.+\| (\d+) \|$", text, re.M))
+    lessons = {path.name: path for path in NUMBERED[1:]}
+    assert said == {name: str(shape.minutes.stated(nbformat.read(path, 4))) for name, path in lessons.items()}
+
+
 @pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_tables_agree_with_the_lesson(path):
     text = "\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
@@ -196,8 +204,5 @@ def test_tables_agree_with_the_lesson(path):
         if line.startswith(f"| [{path.stem}]")
     ).split("|")
     assert minutes and row[3].strip() == minutes[1]
-    start = nbformat.read(NOTEBOOKS / "00_start_here.ipynb", as_version=4)
-    here = [line for cell in start.cells for line in cell.source.splitlines() if f"]({path.name}) |" in line]
-    assert [line.split("|")[3].strip() for line in here] == [minutes[1]] * (path.stem != "00_start_here")
     for name in re.findall(r"`([\w.]+)`", row[5]):
         assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"

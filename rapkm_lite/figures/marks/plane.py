@@ -47,6 +47,6 @@ def singular_curves(robot: Manipulator, mode=None) -> dict:
     return {pair: zero_lines(x, y, inside, values[:, i]) for i, pair in enumerate(drive_pairs(robot))}
 
 
-def zero_lines(x, y, inside, values) -> list[np.ndarray]:
+def zero_lines(x, y, inside, values) -> list:
     """The lines, each (j, 2), where values (k,) at the points of `grid_points` change their sign."""
-    return contour_generator(x, y, on_grid(inside, values)).lines(0.0)
+    return list(contour_generator(x, y, on_grid(inside, values)).lines(0.0))

@@ -103,13 +103,14 @@ def _patch(ax, mark: Mark) -> None:
 
 
 def _words(ax, mark: Mark) -> None:
-    where = {"transform": ax.transAxes} if mark.kind == "words" else {"clip_on": True}
+    where = {"clip_on": mark.kind != "words"}
     # Words on a line have a rim of paper, as on the canvas.
     where |= {} if mark.style.get("color") == "white" else {"path_effects": [_RIM]}
     # The rim would bite into the bar that carries the words.
-    lift = ScaledTranslation(0, {"bottom": 2, "top": -2}.get(mark.style.get("va"), 0) / 72, ax.figure.dpi_scale_trans)
-    where["transform"] = where.get("transform", ax.transData) + lift
-    ax.text(*mark.data[0], mathtext(mark.words), **where, **mark.style)
+    up = {"bottom": 2, "top": -2}.get(str(mark.style.get("va")), 0)
+    place = ax.transAxes if mark.kind == "words" else ax.transData
+    place += ScaledTranslation(0, up / 72, ax.figure.dpi_scale_trans)
+    ax.text(*mark.data[0], mathtext(mark.words), transform=place, **where, **mark.style)
 
 
 def _title(ax, mark: Mark) -> None:
