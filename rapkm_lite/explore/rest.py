@@ -187,7 +187,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 if away[k] > 0:
                     taken.append(ring[:, k])
                     look = {"color": min(shade, "0.45"), "ha": "center", "va": "center"}
-                    picture.text("map", *ring[:, k], f"{level:g}\u202fJ", fontsize=9, **look)
+                    picture.text("map", *ring[:, k], f"{level:g}", fontsize=9, **look)
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)
@@ -215,7 +215,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     ticks |= {"xlabel": "principal direction, cheapest first"}
     frame = {"xlim": (-12, 12), "ylim": (-12, 12), "aspect": "equal"}
     panels = {
-        "map": {"xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
+        "map": {"title": "Energy in J", "xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
         "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
         "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.2, 1.2), "legend": arms, **ticks},
     }
