@@ -175,8 +175,8 @@ def simulate(
         first-order low-pass; None for the true rates.
     faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
-    A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s it errs by less than a nanometre at dt = 2 ms,
-    by 0.2 micrometres at 10 ms.
+    A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s it errs by less than 1 nm at dt = 2 ms, by
+    0.2 micrometres at 10 ms.
     Stiff friction costs time: a hold in which a drive is nearly at rest takes dt f_c / v0 over the inertia that the
     drive moves in Runge-Kutta steps, one for the friction of the testbed, 3000 (5 ms) for 1 N m and v0 = 0.1 mrad/s;
     beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
