@@ -473,10 +473,10 @@ export function mount(el, scene, link) {
     for (const control of around()?.querySelectorAll(".rapkm-control") ?? []) {
       const label = control.querySelector(".widget-label"), said = (el) => el?.textContent.replace("\u200b", "").trim();
       const name = (control.dataset.words ??= said(label) || said(control)); // a box has an empty label besides
-      for (const part of control.querySelectorAll(".noUi-handle, .ui-slider-handle, .widget-readout, select, input")) {
-        part.ariaLabel = name;
-        part.dataset.lmSuppressShortcuts = "true";
-      }
+      for (const part of control.querySelectorAll(".noUi-handle, .ui-slider-handle, .widget-readout, select, input"))
+        Object.assign(part, { ariaLabel: name }).dataset.lmSuppressShortcuts = "true";
+      // At a key from nobody's hand JupyterLab would take the focus into the cell.
+      control.onkeydown = (event) => event.isTrusted || event.stopPropagation();
       if (label?.textContent.includes("_")) rich(label, name);
     }
     for (const part of around()?.querySelectorAll(".widget-play button") ?? [])
@@ -486,13 +486,13 @@ export function mount(el, scene, link) {
   // A number typed beside a slider may lie between two of its steps; one that is left counts as entered.
   function typed({ type, target, key }) {
     if (!target.matches?.(".widget-readout") || !around()?.contains(target)) return;
-    const words = () => target.textContent.replace("−", "-").trim(), before = words(), { was } = target.dataset;
+    const words = () => target.textContent.replace("−", "-").trim(), before = words(), { drawn } = state;
     if (type === "focus") target.dataset.was = before;
-    if (type === "blur" && before !== was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
-    if (key !== "Enter" || before === was) return;
-    setTimeout(() => {
-      const now = (target.dataset.was = words()), how = Number.isNaN(Number(before)) ? "read as" : "rounded to";
-      if (Number(before || NaN) !== Number(now)) say(minus(`${before || "nothing"} was ${how} ${now}`));
+    if (type === "blur" && before !== target.dataset.was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
+    if (key === "Enter") setTimeout(() => {
+      const now = (target.dataset.was = words()), how = before && !isNaN(before) ? "rounded to" : "read as";
+      if (state.drawn > drawn + 1 || around()?.querySelector(".noUi-active")) return; // the hand has moved on
+      say(Number(before || NaN) === Number(now) ? "" : minus(`${before || "nothing"} was ${how} ${now}`));
     }, 400);
   }
 
