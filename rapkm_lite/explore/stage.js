@@ -373,9 +373,9 @@ export function mount(el, scene, link) {
     const label = (name) => scene.labels?.[name] ?? name, told = (name) => `${label(name)}: ${state.places[name]}`;
     if (knob.parentElement !== panel.plot) panel.plot.append(knob);
     const ariaLabel = `${names.map(label).join(" and ")}, in the picture`, ariaValueText = names.map(told).join(", ");
-    const className = bare ? "rapkm-knob bare" : "rapkm-knob", ariaValueNow = state.places[names[0]];
+    const className = `rapkm-knob ${bare ? "bare" : ""}`, hidden = false, ariaValueNow = state.places[names[0]];
     const [ariaValueMin, ariaValueMax] = scene.ranges?.[names[0]] ?? [null, null];
-    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
+    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
     knob.style.translate = `${bare ? Math.max(x, panel.box.left + 9) : x}px ${y - 14 * bare}px`; // off the numbers
