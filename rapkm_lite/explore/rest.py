@@ -93,25 +93,27 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         torque = 1e3 * steady_state_torque(A, K_P, offset)
         # Drive i is content on the line A_i p = -offset_i of points p about the desired one; all lengths in mm.
         rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset), rcond=None)[0]
-        size = np.linalg.norm(A, axis=1)
+        size, half = np.linalg.norm(A, axis=1), picture.ylim("opinions")[1]
         normal, level = A / size[:, None], -1e3 * offset / size
-        half = picture.ylim("opinions")[1]
+        along, seen = np.stack([-normal[:, 1], normal[:, 0]], axis=-1), [rest]
         for i in range(N):
-            along = np.array([-normal[i, 1], normal[i, 0]])
-            ends = level[i] * normal[i] + np.outer([-3 * half, 3 * half], along)
+            ends = level[i] * normal[i] + np.outer([-3 * half, 3 * half], along[i])
             target = rest + (level[i] - normal[i] @ rest) * normal[i]
             picture.line("opinions", *ends.T, **arm_line(i) | {"linewidth": 2.4})
             picture.line("opinions", *np.stack([rest, target]).T, color=arm_colour(i), linewidth=6, alpha=0.55)
-            # The knob slides along its line until it is in the panel; its number is on the side of the middle,
-            # or on the other one where that is much farther from the other lines.
-            places = level[i] * normal[i] + half * np.outer(np.linspace(0.72, -0.72, 145), along)
-            knob = places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))]
-            inward = -0.14 * half * np.sign(level[i] or 1.0) * normal[i]
-            spots = knob + inward, knob - inward
-            clear = [np.abs(normal @ spot - level).min() for spot in spots]
-            words = {"color": arm_colour(i), "fontweight": "bold", "fontsize": 10, "ha": "center", "va": "center"}
-            picture.text("opinions", *spots[int(clear[1] > 1.5 * clear[0])], f"{i + 1}", **words, zorder=6)
-            picture.handle("opinions", *knob, grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
+            # The knob slides along its line until it is in the panel.
+            places = level[i] * normal[i] + half * np.outer(np.linspace(0.72, -0.72, 145), along[i])
+            seen.append(places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))])
+            picture.handle("opinions", *seen[-1], grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
+        for i, knob in enumerate(seen[1:]):
+            # Its number is beside it, where there is room for it between the lines and all else that is seen.
+            way, side = half * np.outer(np.linspace(-1, 1, 41), along[i]), 0.14 * half * normal[i]
+            spots = np.concatenate([knob + way + side, knob + way - side])
+            far = 0.7 * np.linalg.norm(spots[:, None] - seen, axis=-1)
+            room = np.hstack([far, np.abs(spots @ normal.T - level), 2 * half - 2 * np.abs(spots)]).min(axis=1)
+            seen.append(spots[np.argmin(far[:, i + 1] - 20 * room)])
+            look = {"color": arm_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
+            picture.text("opinions", *seen[-1], f"{i + 1}", **look)
         corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
         if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
             picture.polygon("opinions", corners, facecolor="#DCE6F0", zorder=0.5)
@@ -120,10 +122,9 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         picture.line("opinions", *rest, color=NEUTRAL, zorder=6, **tip)
         marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
         picture.fit("torque", 1.25 * torque, least=10.0)
-        apart = np.abs(normal @ rest - level)
         return {
             "rest": f"({rest[0]:z.2f}, {rest[1]:z.2f}) mm beside the desired point",
-            "distances from the lines": marks.per_drive(apart, 2) + " mm",
+            "distances from the lines": marks.per_drive(np.abs(normal @ rest - level), 2) + " mm",
             "torque at rest": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
         }
@@ -160,8 +161,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=robot.base.mean(axis=0) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    circle = np.linspace(0, 2 * np.pi, 181)
-    wheel = np.stack([np.cos(circle), np.sin(circle)])
+    wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
         if robot.n_arms < 3:
