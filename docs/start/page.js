@@ -92,7 +92,7 @@ function drawMachine({ pose, torque }) {
     marks.push(["line", "machine", dot(colours[i], "o", 8, colours[i]), [bx, by]]);
     marks.push(["line", "machine", dot(colours[i], "o", 6, "#ffffff"), elbow]);
     const words = `drive ${i + 1}`;
-    marks.push(["label", "machine", text("#222222", { va: by > 0 ? "bottom" : "top" }), [bx, by + (by > 0 ? 14 : -14)], words]);
+    marks.push(["label", "machine", text("#222222", { va: by > 0 ? "bottom" : "top" }), [bx, by + (by > 0 ? 20 : -20)], words]);
   }
   for (let i = 0; i < N; i++) {
     const force = [pose.bx[i], pose.by[i]].map((b) => PER_NEWTON * b * torque[i]);
@@ -164,7 +164,7 @@ function picture(dt) {
   const [bars, highest] = drawEnergy(here), [chain, size] = drawForces(at);
   const scale = limit(at.torque.map((c) => 1e3 * c), [30, 60, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
   const frames = {
-    machine: [-355, 355, -340, 370], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
+    machine: [-275, 365, -332, 376], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
     forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
   };
   const saved = 1 - total(here.on) / total(here.off), measured = 1 - total(table1[1]) / total(table1[0]);
@@ -198,8 +198,8 @@ function picture(dt) {
 
 // ---------------------------------------------------------------- settings
 
-const snap = (name, value) => {
-  const { low, high, step } = controls[name];
+const snap = (name, value, step = controls[name].step) => {
+  const { low, high } = controls[name];
   return Math.min(Math.max(Number((step * Math.round(value / step)).toFixed(6)), low), high);
 };
 
@@ -249,7 +249,9 @@ function fromAddress() {
   const whole = location.hash.slice(1).split(",").map(Number), names = Object.keys(controls);
   if (whole.length !== names.length + 2 || !whole.every(Number.isInteger)) return;
   const value = (k) => whole[k] * (k < 2 ? 1 : controls[names[k]].step);
-  change({ x: value(0), y: value(1) });
+  // At the rim a place may lie between two steps.
+  [state.x, state.y] = reachable(snap("x", value(0), 1), snap("y", value(1), 1));
+  stop();
   names.slice(2).forEach((name, k) => (state[name] = snap(name, value(k + 2))));
   state.filter = filters[whole.at(-2)] ?? "off";
   state.moving = whole.at(-1) === 1;
