@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-from docutils import nodes
-
 # "name : what it is" begins a paragraph about an argument; longer ones go on with an indent.
 ARGUMENT = re.compile(r"([A-Za-z_]\w*(?:, [A-Za-z_]\w*)*) : (.*)")
 
@@ -37,8 +35,8 @@ def readable(lines: list[str]) -> list[str]:
 
 
 def escaped(text: str) -> str:
-    """What is no literal, without characters that reStructuredText would take as markup."""
-    parts = re.split(r"(``.*?``|`[^`]+`)", text)
+    """What is no literal and no stressed word, without characters that reStructuredText would take as markup."""
+    parts = re.split(r"(``.*?``|`[^`]+`|(?<![\w*])\*\w+\*(?![\w*]))", text)
     return "".join(part if k % 2 else re.sub(r"[*|\\]|_(?!\w)", r"\\\g<0>", part) for k, part in enumerate(parts))
 
 
@@ -48,6 +46,8 @@ def _docstring(app, what, name, obj, options, lines):
 
 def _fold(app, doctree, docname):
     """Sections called "Dig deeper" become folded; their title is what one clicks."""
+    from docutils import nodes
+
     for section in list(doctree.findall(nodes.section)):
         title = section.next_node(nodes.title)
         if title is None or not title.astext().startswith("Dig deeper"):

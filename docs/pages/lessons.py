@@ -95,17 +95,15 @@ def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
     for k, cell in enumerate(cells):
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
-            # They float to the right, the first one farthest.
             marks = "".join(
-                f'<a class="to-index" id="{a}" href="{depth}equations.html#{a}">{_label(a)} in the index</a>\n'
-                for a in reversed(found.get(k, []))
+                f'<a id="{a}" href="{depth}equations.html#{a}">{_label(a)} in the index</a>\n' for a in found.get(k, [])
             )
             text = linked(text).replace("](solutions)", "](solutions/index.md)")
             if depth:
                 text = re.sub(r"\A# ", "# Solution ", text)
             # A heading stays the first line of its cell.
             head, rest = re.match(r"(#[^\n]*\n?)?(.*)", text, re.DOTALL).groups()
-            cell["source"] = f"{head or ''}\n{marks}\n{rest}" if marks else text
+            cell["source"] = f'{head or ""}\n<div class="to-index">\n{marks}</div>\n\n{rest}' if marks else text
         else:
             _outputs(cell, _next_words(cells, k))
     return json.dumps(notebook, ensure_ascii=False)
