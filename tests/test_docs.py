@@ -1,6 +1,8 @@
 """The pages say what is so: their code runs, their links lead somewhere, the drawing is that of the imports."""
 
+import json
 import re
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -13,6 +15,7 @@ from rapkm_lite import explore, plotting
 matplotlib.use("agg")
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "notebooks").glob("*.md"))]
 NAMES = {"ids": lambda path: path.name}
 
@@ -65,3 +68,29 @@ PUBLIC = {
 @pytest.mark.parametrize("name", PUBLIC)
 def test_help_shows_an_example(name):
     assert ">>> " in (PUBLIC[name].__doc__ or "")
+
+
+@pytest.mark.parametrize(
+    ("written", "wanted"),
+    [
+        ("angles a_ and *case", r"angles a\_ and \*case"),
+        ("|x| < 1, C:\\n", r"\|x\| < 1, C:\\n"),
+        ("q_a with ``*`` and `a_`_", r"q_a with ``*`` and `a_`\_"),
+        ("the *measured* angles, A*B*C", r"the *measured* angles, A\*B\*C"),
+    ],
+)
+def test_reference_pages_print_characters_of_markup_as_they_are_and_stress_a_word(written, wanted):
+    from pages.hooks import escaped
+
+    assert escaped(written) == wanted
+
+
+@pytest.mark.parametrize("depth", ["", "../"])
+def test_links_to_the_index_stand_in_the_order_of_the_equations(depth):
+    from pages.lessons import lesson_page
+
+    path = next((ROOT / "notebooks").glob("05_*.ipynb"))
+    page = lesson_page(path, [f"eq-{k}" for k in range(19, 33)], depth)
+    cells = ["".join(cell["source"]) for cell in json.loads(page)["cells"] if cell["cell_type"] == "markdown"]
+    numbers = [list(map(int, re.findall(rf'href="{depth}equations.html#eq-(\d+)"', cell))) for cell in cells]
+    assert max(map(len, numbers)) > 2 and all(found == sorted(found) for found in numbers)

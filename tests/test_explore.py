@@ -322,6 +322,33 @@ def test_end_effector_stays_in_the_workspace():
                 assert abs(at[0] * y - at[1] * x) < 1e-3
 
 
+@pytest.mark.parametrize("name", ["machine", "steady_state"])
+def test_numbers_after_a_grab_beyond_the_workspace_are_those_of_the_sliders(name):
+    page = Page(made(name))
+    for x, y in ((150, -180), (-190, 40), (190, 190)):
+        answer = page.grab({"x": x, "y": y})
+        assert (answer["places"]["x"], answer["places"]["y"]) != (x, y)
+        fresh = getattr(explore, name)().set(**answer["places"])
+        assert dict(answer["numbers"]) == fresh.numbers and answer["sentence"] == fresh.sentence
+        assert drawn(page.explorer) == drawn(fresh)
+
+
+def test_number_of_a_line_stands_beside_no_other_line():
+    explorer = made("three_opinions")
+    half = explorer.picture.ylim("opinions")[1]
+    for offsets in [(5, -3, 8), *itertools.product((-12, -5, 1, 12), repeat=3)]:
+        explorer.set(**{f"offset_{i + 1}": offset for i, offset in enumerate(offsets)})
+        seen = [mark for mark in marks(explorer) if mark.panel == "opinions"]
+        start, end = np.moveaxis([m.data for m in seen if m.style.get("linewidth") == 2.4], 1, 0)
+        way = (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
+        for place, number in [(m.data[0], int(m.words)) for m in seen if m.kind == "label"]:
+            gaps = np.abs(way[:, 0] * (place - start)[:, 1] - way[:, 1] * (place - start)[:, 0])
+            assert gaps.min() > 0.9 * gaps[number - 1], (offsets, number)
+            knobs = np.array([handle["at"] for handle in explorer.picture.handles])
+            # On a telephone a knob is wider than an eighth of the panel.
+            assert np.linalg.norm(knobs - place, axis=1).min() > 0.19 * half and np.abs(place).max() < 0.95 * half
+
+
 def test_moving_a_slider_redraws_and_set_redraws_once():
     explorer, calls = light(), []
     inner = explorer.draw
