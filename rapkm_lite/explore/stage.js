@@ -475,8 +475,7 @@ export function mount(el, scene, link) {
       const name = (control.dataset.words ??= said(label) || said(control)); // a box has an empty label besides
       for (const part of control.querySelectorAll(".noUi-handle, .ui-slider-handle, .widget-readout, select, input"))
         Object.assign(part, { ariaLabel: name }).dataset.lmSuppressShortcuts = "true";
-      // At a key from nobody's hand JupyterLab would take the focus into the cell.
-      control.onkeydown = (event) => event.isTrusted || event.stopPropagation();
+      control.onkeydown = (event) => event.isTrusted || event.stopPropagation(); // JupyterLab would take the focus
       if (label?.textContent.includes("_")) rich(label, name);
     }
     for (const part of around()?.querySelectorAll(".widget-play button") ?? [])
@@ -489,7 +488,9 @@ export function mount(el, scene, link) {
     const words = () => target.textContent.replace("−", "-").trim(), before = words(), { drawn } = state;
     if (type === "focus") target.dataset.was = before;
     if (type === "blur" && before !== target.dataset.was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
-    if (key === "Enter") setTimeout(() => {
+    if (key !== "Enter") return;
+    target.textContent = before; // a slider writes a true minus, but does not read it
+    setTimeout(() => {
       const now = (target.dataset.was = words()), how = before && !isNaN(before) ? "rounded to" : "read as";
       if (state.drawn > drawn + 1 || around()?.querySelector(".noUi-active")) return; // the hand has moved on
       say(Number(before || NaN) === Number(now) ? "" : minus(`${before || "nothing"} was ${how} ${now}`));
@@ -508,8 +509,7 @@ export function mount(el, scene, link) {
   link.send({ kind: "hello" });
   return Object.assign(() => {
     gone.abort();
-    watch.disconnect();
-    root.remove();
+    watch.disconnect(), root.remove();
   }, { say });
 }
 
