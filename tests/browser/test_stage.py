@@ -37,15 +37,19 @@ NOTEBOOKS["twice"] = ["from rapkm_lite import explore\ne = explore.machine()\ndi
 
 SCRIPT = """
 window.stage = {
+  // What is seen of words: no space, nor one without width.
+  said: words => (words ?? '').replace(/[\\s\\p{Cf}]+/gu, ' ').trim(),
   box: (k = 0) => document.querySelectorAll('.rapkm-explorer')[k],
   root: (k = 0) => document.querySelectorAll('.rapkm')[k],
   drawn: (k = 0) => Number(stage.root(k)?.dataset.drawn ?? 0),
   places: (k = 0) => JSON.parse(stage.root(k).dataset.places),
   controls: () => [...stage.box().querySelectorAll('.rapkm-control')].map(c => ({
-    label: c.querySelector('.widget-label')?.textContent || c.textContent.trim(),
+    label: stage.said(c.querySelector('.widget-label')?.textContent) || stage.said(c.textContent),
     kind: c.querySelector('.noUi-handle') ? 'slider' : c.querySelector('select') ? 'choice' : 'switch',
     track: c.querySelector('.noUi-target')?.getBoundingClientRect().width ?? null,
     names: [...c.querySelectorAll('.noUi-handle, .widget-readout, select, input')].map(e => e.ariaLabel) })),
+  named: () => stage.controls().every(c => c.names.length && c.names.every(stage.said)),
+  note: () => stage.root().querySelector('.rapkm-note').textContent,
   part: (i, what) => stage.box().querySelectorAll('.rapkm-control')[i].querySelector(what),
   middle: e => { e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect();
                  return [b.left + b.width / 2, b.top + b.height / 2, b.width]; },
@@ -103,8 +107,7 @@ def shown(browser, site):
         else:
             notebook.ask("i => lab.runOnly(i)", list(CELLS).index(name))
         # Names for readers of the screen come when the picture rests.
-        named = "stage.controls().every(c => c.names.length && c.names.every(Boolean))"
-        notebook.wait(f"() => stage.drawn() > 0 && {named}", 60)
+        notebook.wait("() => stage.drawn() > 0 && stage.named()", 60)
         return notebook
 
     yield shown
@@ -160,6 +163,16 @@ def use(notebook, i, kind):
     still(notebook)
 
 
+def named(notebook, name):
+    """Labels, and names for readers of the screen, are the words that Python gave, to the letter."""
+    controls = notebook.ask("() => stage.controls()")
+    words = [widget.description for widget in getattr(explore, name)().controls.values()]
+    # A label has an index where its words have a line below.
+    assert [c["label"].replace("_", "") for c in controls] == [w.replace("_", "") for w in words]
+    for control, word in zip(controls, words, strict=True):
+        assert set(control["names"]) == {word}, control
+
+
 def obeys_everywhere(notebook):
     """Every control by key and mouse, at three widths."""
     for width in (1400, 1024, 390):
@@ -167,9 +180,6 @@ def obeys_everywhere(notebook):
         notebook.wait(f"() => innerWidth === {width}", 5)
         still(notebook)
         for i, control in enumerate(notebook.ask("() => stage.controls()")):
-            assert control["label"] and all(
-                n.replace("_", "") == control["label"].replace("_", "") for n in control["names"]
-            ), control
             assert control["kind"] != "slider" or control["track"] >= (160 if width == 1400 else 120), control
             use(notebook, i, control["kind"])
         wide, room = notebook.ask("() => [stage.root().scrollWidth, stage.root().clientWidth]")
@@ -179,6 +189,7 @@ def obeys_everywhere(notebook):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_control_and_handle_obeys_key_and_mouse(name, shown):
     notebook = shown(name)
+    named(notebook, name)
     obeys_everywhere(notebook)
     notebook.check()
     if name in HANDLED:
@@ -338,17 +349,100 @@ def test_restarted_kernel_leaves_the_picture_and_says_so(shown):
 
 def test_setting_is_copied_as_code_and_a_rounded_number_says_so(shown):
     notebook = shown("machine")
-    note = "() => stage.root().querySelector('.rapkm-note').textContent"
-    readout = notebook.page.locator(".widget-readout").first
-    readout.click()
-    notebook.page.keyboard.press("Control+A")
-    notebook.page.keyboard.type("31")
+    typed(notebook, "31")
     changed(notebook, lambda: notebook.page.keyboard.press("Enter"))
-    notebook.wait(f"() => /^31 was rounded to /.test(({note})())", 10)
+    notebook.wait("() => /^31 was rounded to /.test(stage.note())", 10)
     x = still(notebook)["x"]
     notebook.page.get_by_role("button", name="copy this setting").click()
-    assert f"explore.machine().set(x={x})" in notebook.ask(note)
+    assert f"explore.machine().set(x={x})" in notebook.ask("() => stage.note()")
     notebook.wait(f"() => stage.root().querySelector('[aria-live]').textContent.includes('({x}, 30) mm')", 10)
+
+
+def typed(notebook, text, i=0):
+    """Write a number beside a slider in place of the one that stands there."""
+    notebook.page.locator(".widget-readout").nth(i).click()
+    notebook.page.keyboard.press("Control+A")
+    notebook.page.keyboard.press("Delete")
+    notebook.page.keyboard.type(text)
+
+
+def leave(notebook):
+    """Click beside everything."""
+    notebook.page.locator(".jp-NotebookPanel-toolbar").click(position={"x": 600, "y": 5})
+
+
+@pytest.mark.parametrize("left", [False, True])
+def test_note_says_how_a_number_was_read_that_was_typed_or_left(left, shown):
+    notebook = shown("machine")
+    enter = (lambda: leave(notebook)) if left else (lambda: notebook.page.keyboard.press("Enter"))
+    written = [
+        ("31", 32, "31 was rounded to 32"), ("abc", 32, "abc was read as 32"), ("40", 40, ""),
+        ("3,5", 4, "3,5 was read as 4"), ("", 4, "nothing was read as 4"), ("−31", -30, "−31 was rounded to −30"),
+        ("999", 200, "999 was rounded to 200"), ("0", 0, ""),
+    ]  # fmt: skip
+    for text, x, note in written:
+        typed(notebook, text)
+        enter()
+        # A note comes when the kernel has had its time.
+        notebook.page.wait_for_timeout(600)
+        seen = notebook.page.locator(".widget-readout").first.inner_text()
+        assert (still(notebook)["x"], seen) == (x, str(x).replace("-", "−"))
+        assert notebook.ask("() => stage.note()") == note
+    # A right number, and then another control, wipe out what was said.
+    typed(notebook, "71")
+    enter()
+    notebook.wait("() => stage.note() === '71 was rounded to 72'", 10)
+    changed(notebook, lambda: notebook.page.locator(".rapkm-control select").first.select_option(index=1))
+    notebook.wait("() => stage.note() === ''", 10)
+
+
+def test_number_that_is_left_counts_and_the_focus_goes_where_the_hand_went(shown):
+    notebook = shown("machine")
+    keyboard, select = notebook.page.keyboard, notebook.page.locator(".rapkm-control select").first
+    typed(notebook, "81")
+    changed(notebook, select.focus)
+    assert notebook.ask("() => document.activeElement === stage.part(2, 'select')")
+    changed(notebook, lambda: keyboard.press("ArrowDown"))
+    places = still(notebook)
+    assert places["x"] == 82 and places["mode"] == "(+, +, −)"
+    # Back to the slider with a new number, and on by a key.
+    typed(notebook, "51")
+    changed(notebook, lambda: keyboard.press("Shift+Tab"))
+    assert notebook.ask("() => document.activeElement === stage.part(0, '.noUi-handle')")
+    notebook.wait("() => stage.places().x === 52", 10)
+    changed(notebook, lambda: keyboard.press("ArrowRight"))
+    notebook.page.wait_for_timeout(600)
+    assert still(notebook)["x"] == 54 and notebook.ask("() => stage.note()") == ""
+
+
+def test_no_note_where_nothing_was_typed_or_the_hand_has_moved_on(shown):
+    notebook = shown("machine")
+    for _ in range(3):
+        notebook.page.locator(".widget-readout").first.click()
+        notebook.page.keyboard.press("Shift+Tab")
+        changed(notebook, lambda: notebook.page.keyboard.press("ArrowRight"))
+        notebook.page.wait_for_timeout(600)
+        assert notebook.ask("() => stage.note()") == ""
+    typed(notebook, "81")
+    at = notebook.ask("() => stage.middle(stage.part(0, '.noUi-handle'))")
+    notebook.page.mouse.move(*at[:2])
+    notebook.page.mouse.down()
+    for k in range(12):
+        notebook.page.mouse.move(at[0] - 3 * k, at[1])
+        notebook.page.wait_for_timeout(60)
+        assert "81" not in notebook.ask("() => stage.note()") or k < 4
+    notebook.page.mouse.up()
+    assert still(notebook)["x"] < 20 and notebook.ask("() => stage.note()") == ""
+
+
+def test_numbers_after_a_drag_beyond_the_workspace_are_those_of_the_sliders(shown):
+    notebook = shown("machine")
+    drag(notebook, notebook.ask("() => stage.knob()"), (130, 210), steps=20)
+    places = still(notebook)
+    assert places["x"] > 100 and places["y"] < -100
+    numbers = "() => [...stage.root().querySelectorAll('.rapkm-numbers span')].map(e => e.textContent)"
+    wanted = [f"{name}: {text}" for name, text in explore.machine().set(**places).numbers.items()]
+    assert [n.replace("−", "-") for n in notebook.ask(numbers)] == [w.replace("_", "") for w in wanted]
 
 
 def test_wrong_setting_is_a_sentence_and_reset_goes_back(shown):
