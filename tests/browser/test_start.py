@@ -1,6 +1,7 @@
 """The start page from disk: taken by mouse and keys, its address, its numbers, nothing asked from elsewhere."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -27,8 +28,9 @@ def address(tmp_path_factory):
 class Page:
     """The start page in a context of its own; `requests` and `errors` must stay empty."""
 
-    def __init__(self, browser, address, width=1280, **settings):
+    def __init__(self, browser, address, width=1280, script="", **settings):
         self.page = browser.new_context(viewport={"width": width, "height": 900}, **settings).new_page()
+        self.page.add_init_script(script)
         self.requests, self.errors = [], []
         self.page.on("request", lambda r: None if r.url.startswith("file:") else self.requests.append(r.url))
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
@@ -99,6 +101,99 @@ def test_far_outside_it_stops_where_an_arm_is_nearly_stretched(browser, address)
     places = seen.places()
     assert rk.reachable(rk.load(), [1e-3 * places["x"], 1e-3 * places["y"]])
     assert seen.errors == []
+
+
+# x and y in mm, and the offsets in half mrad that push hardest.
+RIM = [(-150, 80, 8, -4, 10), (-149, 80, 16, -16, 16), (-145, 87, 16, -16, 16), (122, 122, -16, 16, -16)]
+RIM += [(142, 92, 16, 16, 16), (149, 80, -16, -16, -16), (-148, -140, 16, -16, 16), (0, -170, -16, 16, -16)]
+
+
+@pytest.mark.parametrize("place", RIM, ids=lambda place: f"{place[0]},{place[1]}")
+def test_a_link_to_the_rim_draws_and_the_next_link_brings_the_same(browser, address, place):
+    link = ",".join(map(str, [*place, 0, 0, 0]))
+    seen = Page(browser, f"{address}#{link}")
+    places = seen.places()
+    assert np.hypot(places["x"] - place[0], places["y"] - place[1]) < 30
+    assert [places[f"offset_{i}"] for i in (1, 2, 3)] == [0.5 * offset for offset in place[2:]]
+    # The page writes its own address when it is asked to move; that of the place where it stands is kept.
+    here = ",".join(map(str, [places["x"], places["y"], *place[2:], 0, 0, 0]))
+    seen.open(f"{address}#{here}")
+    assert seen.places() == places and seen.errors == []
+
+
+# All around, far outside, in steps of `step` degrees, for offsets that push either way; what was not drawn.
+AROUND = """async (step) => { const root = document.querySelector('.rapkm'), lost = [], at = new Set();
+  for (let a = 0; a < 360; a += step) for (const signs of [[1, -1, 1], [-1, 1, -1], [1, 1, 1]]) {
+    const before = root.dataset.drawn, to = [Math.cos, Math.sin].map(f => Math.round(230 * f(a * Math.PI / 180)));
+    location.hash = [...to, ...signs.map(s => 16 * s), 0, 0, 0].join();
+    for (let k = 0; k < 200 && root.dataset.drawn === before; k++) await new Promise(requestAnimationFrame);
+    const now = JSON.parse(root.dataset.places);
+    if (now.offset_1 !== 8 * signs[0] || now.offset_2 !== 8 * signs[1]) lost.push(location.hash);
+    at.add([now.x, now.y].join());
+  }
+  return [lost, at.size]; }"""
+
+
+def test_all_of_the_rim_can_be_walked(browser, address):
+    seen = Page(browser, address)
+    lost, count = seen.page.evaluate(AROUND, 2)
+    assert lost == [] and count > 100 and seen.errors == []
+
+
+def test_a_hand_goes_around_beyond_the_rim_and_its_address_brings_the_place_back(browser, address):
+    seen = Page(browser, f"{address}#20,50,16,-16,16,0,0,0")
+    box = seen.page.locator(".rapkm-knob").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    seen.page.mouse.move(x, y)
+    seen.page.mouse.down()
+    places = set()
+    for a in np.linspace(0, 2 * np.pi, 90):
+        seen.page.mouse.move(x + 190 * np.cos(a), y + 190 * np.sin(a))
+        seen.page.wait_for_timeout(20)
+        places.add((seen.places()["x"], seen.places()["y"]))
+    seen.page.mouse.up()
+    assert len(places) > 45 and seen.errors == []
+    # The hand that comes back finds the end-effector there.
+    seen.page.wait_for_timeout(400)
+    last = seen.places()
+    seen.open(seen.page.url)
+    assert seen.places() == last and seen.errors == []
+
+
+def test_no_elbow_is_cut():
+    page = (Path(__file__).parents[2] / "docs" / "start" / "page.js").read_text(encoding="utf-8")
+    left, right, low, high = map(int, re.search(r"machine: \[(-?\d+), (-?\d+), (-?\d+), (-?\d+)\]", page).groups())
+    robot = rk.load()
+    grid = 1e-3 * np.stack(np.meshgrid(np.arange(-150, 151, 2), np.arange(-150, 181, 2)), axis=-1).reshape(-1, 2)
+    q = rk.inverse_kinematics(robot, grid[rk.reachable(robot, grid)])
+    angle = q[:, : robot.n_arms]
+    elbow = 1e3 * (robot.base + robot.lengths[:, :1] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    assert len(elbow) > 20_000
+    # A ring of an elbow has a radius of some 10 mm.
+    assert left + 10 < elbow[..., 0].min() and elbow[..., 0].max() < right - 10
+    assert low + 10 < elbow[..., 1].min() and elbow[..., 1].max() < high - 10
+
+
+# Boxes of the words on each canvas since it was last wiped.
+WRITTEN = """window.wrote = new Map(); const kind = CanvasRenderingContext2D.prototype, { fillText, clearRect } = kind;
+kind.fillText = function (words, x, y) {
+  const size = parseFloat(this.font.match(/([\\d.]+)px/)[1]);
+  wrote.get(this.canvas)?.push([words, x, y - 0.75 * size, x + this.measureText(words).width, y]);
+  return fillText.call(this, words, x, y); };
+kind.clearRect = function (...box) { wrote.set(this.canvas, []); return clearRect.apply(this, box); };
+window.covered = () => [...document.querySelectorAll('.rapkm-knob.bare:not([hidden])')].flatMap(knob => {
+  const plot = knob.parentElement, { left, top } = plot.getBoundingClientRect(), box = knob.getBoundingClientRect();
+  return wrote.get(plot.querySelector('canvas')).filter(([, a, b, c, d]) => a < box.right - left && c > box.left - left
+    && b < box.bottom - top && d > box.top - top).map(([words]) => words); });"""
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+def test_the_handle_of_time_covers_no_number_of_an_axis(browser, address, width):
+    seen = Page(browser, address, width, script=WRITTEN)
+    for time in (0, 1, 100):
+        seen.open(f"{address}#20,50,8,-4,10,{time},0,1")
+        assert seen.page.evaluate("wrote.size") == 6
+        assert seen.page.evaluate("covered()") == []
 
 
 def test_the_numbers_are_those_of_the_package(browser, address):
