@@ -179,27 +179,33 @@ def rough_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
     """Least-squares pose of one run from a rough start, as `estimate_pose` finds it; and whether it converged."""
     N, W = len(drives), len(arms)
     most = 0.1 / w[at(MODEL + SCALE, 0, j, W, L)]
-    for _ in range(50):
-        m11 = m12 = m22 = h11 = h12 = h22 = fx = fy = -0.0
+    x0, y0, px, py, least = x, y, 0.0, 0.0, 1e299
+    for _ in range(100):
+        m11 = m12 = m22 = h11 = h12 = h22 = fx = fy = square = -0.0
         for i in range(N):
             links, area2 = placed(MODEL, w, i, j, W, L, x, y)
-            if not area2 > 0.0:
-                return x, y, False
             ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
             s, t = turned(links, ux, uy)
             r, bx, by = w[at(E, i, j, W, L)] - math.atan2(s, t), links[0], links[1]
             r -= 2.0 * math.pi * math.floor(r / (2.0 * math.pi) + 0.5)
             p11, p12, p22 = curvature(w[at(MODEL + L2SQ, i, j, W, L)], links, r)
             keep(w, i * L + j, W * L, links)
+            square += r * r if area2 > 0.0 else 1e300
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
             h11, h12, h22 = h11 + p11, h12 + p12, h22 + p22
+        # A step is halved where it leaves the workspace or the residuals grow.
+        if not square <= least + 1e-14:
+            px, py = 0.5 * px, 0.5 * py
+            x, y = x0 + px, y0 + py
+            continue
         if h11 > 0.0 and h11 * h22 - h12 * h12 > 1e-3 * (m11 * m22 - m12 * m12):
             m11, m12, m22 = h11, h12, h22
         sx, sy = solve2(m11, m12, m22, fx, fy)
         if abs(sx) < tolerance and abs(sy) < tolerance:
             return x, y, True
         part = min(1.0, most / max(abs(sx), abs(sy)))
-        x, y = x + part * sx, y + part * sy
+        x0, y0, px, py, least = x, y, part * sx, part * sy, square
+        x, y = x0 + px, y0 + py
     return x, y, False
 
 

@@ -17,7 +17,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
 from .cores import wrap
-from .kinematics import arm_vectors, constraint_jacobian, loop_constraints, reachable
+from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
 from .redundancy import base_angle_hessians
 
 
@@ -92,6 +92,15 @@ def _pose_hessian(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np
     return np.where(regular[..., None, None], hessian, square)
 
 
+def _misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q at x, the residuals of the base angles q_a there, and the sum of their squares, infinite out of reach."""
+    q, cosine = cores.joint_angles(robot, x, robot.mode)
+    residual = wrap(q_a - q[..., : robot.n_arms])
+    # Where an arm is as good as stretched or folded, A has no bounds.
+    out = (np.abs(cosine) > 1.0 - 1e-12).any(axis=-1)
+    return q, residual, np.where(out, np.inf, np.vecdot(residual, residual))
+
+
 def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 50) -> np.ndarray:
     """The configuration whose base angles are nearest to the measured ones, (..., 2N) in rad.
 
@@ -100,7 +109,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     end-effector position `guess` (..., 2) in m, of Gauss and Newton with the control matrix A = d q_a / d x where the
     exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
     kinematics of the five-bar.
-    Raises ConvergenceError with the residual and the pose, also where the iteration leaves the workspace.
+    Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.forward_kinematics(robot, rk.estimate_pose(robot, q[:3], guess=[0.0, 0.0])).round(12)
@@ -109,25 +118,31 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     q_a, guess = real_array("q_a", q_a, manipulator(robot).n_arms), real_array("guess", guess, 2)
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
-    step, limit = np.full(x.shape, np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
+    size, limit = np.full((*lead, 1), np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
+    q, residual, square = _misfit(robot, q_a, x)
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
-        q, cosine = cores.joint_angles(robot, x, robot.mode)
-        if np.abs(cosine).max(initial=0.0) > 1.0:
+        if np.isinf(square).any():
             break
         A = at(robot, q).A
-        residual = wrap(q_a - q[..., : robot.n_arms])
         hessian = _pose_hessian(robot, q, A, residual)
         step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
-        if np.abs(step).max(initial=0.0) < limit:
-            return q
-        # A tenth of a link at most: from farther away a step may miss the workspace.
         size = np.abs(step).max(axis=-1, keepdims=True)
-        x = x + step * np.minimum(1.0, 0.1 * robot.lengths[0, 0] / np.maximum(size, 1e-300))
-    bad = np.where(reachable(robot, x), np.abs(step).max(axis=-1), np.inf)
-    worst = np.unravel_index(np.argmax(bad), lead)
-    where = "inside" if reachable(robot, x[worst]) else "outside"
+        if size.max(initial=0.0) < limit:
+            return q
+        # A tenth of a link at most, and halved where it leaves the workspace or the residuals grow.
+        step = step * np.minimum(1.0, 0.1 * robot.lengths[0, 0] / np.maximum(size, 1e-300))
+        for k in range(40):
+            trial = _misfit(robot, q_a, x + step)
+            worse = trial[2] > square + 1e-14
+            if not worse.any():
+                break
+            step = np.where(worse[..., None], step / 2 if k < 38 else 0.0, step)
+        x, (q, residual, square) = x + step, trial
+    worst = np.unravel_index(np.argmax(np.where(np.isinf(square), np.inf, size[..., 0])), lead)
+    rim = np.abs(np.sin(q[worst][robot.n_arms :])).min() < 1e-3
+    where = "outside" if np.isinf(square[worst]) else "at the rim of" if rim else "inside"
     raise ConvergenceError(
         f"estimate_pose found no pose for q_a = {q_a[worst].round(6).tolist()} in working mode {robot.mode.tolist()}: "
-        f"a step of {np.abs(step[worst]).max():.3g} m led to x = {x[worst].round(6).tolist()} {where} the workspace; "
-        "allowed: angles near a closed pose, and a guess near it"
+        f"at x = {x[worst].round(6).tolist()}, {where} the workspace, the residuals are "
+        f"{residual[worst].round(6).tolist()} rad; allowed: angles near a closed pose, and a guess near it"
     )
