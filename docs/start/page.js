@@ -245,8 +245,8 @@ function address() {
   history.replaceState(null, "", `#${[...whole, filters.indexOf(state.filter), Number(state.moving)].join(",")}`);
 }
 
-function fromAddress() {
-  const whole = location.hash.slice(1).split(",").map(Number), names = Object.keys(controls);
+function fromAddress(url) {
+  const whole = new URL(url).hash.slice(1).split(",").map(Number), names = Object.keys(controls);
   if (whole.length !== names.length + 2 || !whole.every(Number.isInteger)) return;
   const value = (k) => whole[k] * (k < 2 ? 1 : controls[names[k]].step);
   // At the rim a place may lie between two steps.
@@ -338,9 +338,10 @@ for (const [name, c] of Object.entries(controls)) {
 }
 $("filter").onchange = () => ((state.filter = $("filter").value), update());
 $("play").onclick = play;
-addEventListener("hashchange", () => (fromAddress(), update()));
+// The address that was asked for: the page may have written its own in the meantime.
+addEventListener("hashchange", (event) => (fromAddress(event.newURL), update()));
 
-fromAddress();
+fromAddress(location.href);
 stop();
 mount($("stage"), {
   name: "machine", code: false,
