@@ -7,6 +7,7 @@
     python notebooks/build.py teaching       # nothing but the teachers' pages that follow from the lessons
     python notebooks/build.py new 13_title   # a new lesson from the skeleton: notebook, figures, exercises, answers
     python notebooks/build.py 13 teaching    # that lesson, and the teachers' pages
+    python notebooks/build.py mystery        # nothing but the logs of data/mystery_runs
 
 ``solutions/NN_name.ipynb`` is the source of a lesson with exercises; lines between ``### BEGIN SOLUTION`` and
 ``### END SOLUTION`` become one line ``raise NotImplementedError`` (in a function) or ``...`` (after an assignment) in
@@ -27,7 +28,7 @@ import nbformat
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-from workshop import nbgrader, teaching  # noqa: E402
+from workshop import mystery, nbgrader, teaching  # noqa: E402
 from workshop.layout import PACKAGE, SOLUTIONS, figure_list, new  # noqa: E402
 from workshop.storing import COVER, blank, student, tidy  # noqa: E402, F401
 
@@ -80,5 +81,7 @@ if __name__ == "__main__":
             sys.exit(str(error))
     elif sys.argv[1:2] == ["nbgrader"]:
         nbgrader.export(Path(sys.argv[2]), sys.argv[3:])
+    elif sys.argv[1:] == ["mystery"]:
+        mystery.write()
     else:
         main(sys.argv[1:])

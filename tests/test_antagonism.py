@@ -1,6 +1,6 @@
 """Rest under PD control with offsets and stepped angles, and the logs made for the exercises."""
 
-import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +13,9 @@ from rapkm_lite.mechanics.antagonism import null_direction
 
 ROOT = Path(__file__).parents[1]
 QUANTUM = 2 * np.pi / 2000
+sys.path.insert(0, str(ROOT / "notebooks"))
 
-_spec = importlib.util.spec_from_file_location("make_mystery_runs", ROOT / "data" / "make_mystery_runs.py")
-script = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(script)
+from workshop import mystery  # noqa: E402
 
 
 def random_rests(seed, count):
@@ -112,11 +111,11 @@ def test_runs_below_the_threshold_come_to_rest():
         assert np.count_nonzero(np.abs(np.diff(c, axis=0)) > 0.5 * gain * QUANTUM) <= 1  # one last count at most
 
 
-@pytest.mark.parametrize("name", script.SIDES)
-def test_log_in_the_repository_is_the_one_the_script_makes(name):
+@pytest.mark.parametrize("name", mystery.SIDES)
+def test_log_in_the_repository_is_the_one_build_makes(name):
     log = rk.mystery_run(name)
     stored = np.column_stack([log.t, log.q_a, log.q_a_desired, log.c])
-    np.testing.assert_allclose(stored, script.record(name), rtol=0.0, atol=6e-5)  # rounding of the last printed digit
+    np.testing.assert_allclose(stored, mystery.record(name), rtol=0.0, atol=6e-5)  # rounding of the last printed digit
     assert (ROOT / "data" / "mystery_runs" / f"{name}.csv").stat().st_size < 150_000
 
 
@@ -128,7 +127,7 @@ def test_rest_at_one_place_tells_the_offset_along_the_null_vector_only():
     assert abs(found - n @ offset) < 1e-4 and np.linalg.norm(offset - n * found) > 3e-3
 
 
-@pytest.mark.parametrize("name", script.SIDES)
+@pytest.mark.parametrize("name", mystery.SIDES)
 def test_no_log_begins_with_its_offsets(name):
     """A run starts at the desired point: there the measured error is the offset.  The logs begin later."""
     assert np.abs(rk.mystery_run(name).error[0] - hidden(name)[0]).max() > 5e-4

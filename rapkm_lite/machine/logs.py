@@ -152,7 +152,7 @@ def mystery_run(name: str) -> Log:
     """A log of ``data/mystery_runs``: "offset_a", "offset_b", "offset_c" or "gain".
 
     The testbed under PD control, K_P = 7.05 N m/rad and K_D = 0.225 N m s/rad, each with hidden offsets; in "gain" one
-    drive has another K_P.  Made by ``data/make_mystery_runs.py``.
+    drive has another K_P.  Made by ``notebooks/build.py mystery``.
     Raises ValueError for another name.
 
     >>> mystery_run("offset_a")

@@ -1,4 +1,4 @@
-"""Make the logs data/mystery_runs/*.csv: python data/make_mystery_runs.py
+"""Make the logs data/mystery_runs/*.csv: python notebooks/build.py mystery
 
 offset_a : rests in the three corners of the testbed's triangle.
 offset_b : the same with a triangle of a quarter of the side, where the three rests are nearly alike.
@@ -15,7 +15,7 @@ import numpy as np
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import K_D, hidden, random_numbers
 
-HERE = Path(__file__).resolve().parent / "mystery_runs"
+LOGS = Path(__file__).resolve().parents[2] / "data" / "mystery_runs"
 SIDES = {"offset_a": 0.24, "offset_b": 0.06, "offset_c": 0.0, "gain": 0.24}
 SETTLING = 1.5
 COLUMNS = ["t in s"] + [f"q{i} measured in rad" for i in (1, 2, 3)] + [f"q{i} desired in rad" for i in (1, 2, 3)]
@@ -39,11 +39,12 @@ def record(name: str) -> np.ndarray:
     return np.column_stack([run.t - SETTLING, run.q_a + offset, path.q_a, torque])[round(SETTLING / run.dt) :: 10]
 
 
-if __name__ == "__main__":
-    HERE.mkdir(exist_ok=True)
+def write(folder: Path = LOGS) -> None:
+    """Write the four logs."""
+    folder.mkdir(exist_ok=True)
     for name in SIDES:
         np.savetxt(
-            HERE / f"{name}.csv",
+            folder / f"{name}.csv",
             record(name),
             delimiter=",",
             header=",".join(COLUMNS),
