@@ -6,6 +6,7 @@ Needs no network.  --lessons takes the notebooks from another folder; --strict f
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import sys
 import tempfile
@@ -16,7 +17,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path.insert(0, str(HERE))
 
-from pages import lessons, reference, start  # noqa: E402
+from pages import drawing, lessons, reference, start  # noqa: E402
 from sphinx.cmd.build import build_main  # noqa: E402
 
 WORK, SITE = HERE / "_work", HERE / "_site"
@@ -134,10 +135,16 @@ def pages(folder: Path, name: str) -> list[str]:
     """Copy the pages of a folder; links to files that are no pages lose their link."""
     made = []
     for path in sorted(folder.glob("*.md")):
-        text = lessons.linked(path.read_text(encoding="utf-8")).replace("```mermaid", "```text")
+        text = lessons.linked(path.read_text(encoding="utf-8"))
+        text = re.sub(r"```mermaid\n(.*?)```", drawn, text, flags=re.S)
         write(WORK / f"{name}/{path.name}", lessons.without_dead_links(text, folder, WORK / name))
         made.append(f"{name}/{path.stem}")
     return [page for page in made if page != "develop/glossary"]
+
+
+def drawn(diagram: re.Match[str]) -> str:
+    """The block of a diagram as a picture in the page."""
+    return f"```{{raw}} html\n{drawing.svg(diagram[1])}\n```"
 
 
 def mathjax() -> Path:

@@ -4,8 +4,10 @@ import json
 import re
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib
+import numpy as np
 import pytest
 from test_rooms import ARROWS, DOORS, ROOMS, room
 
@@ -16,6 +18,9 @@ matplotlib.use("agg")
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
+
+from pages import drawing  # noqa: E402
+
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "notebooks").glob("*.md"))]
 NAMES = {"ids": lambda path: path.name}
 
@@ -49,6 +54,23 @@ def test_the_drawing_of_the_rooms_is_that_of_the_imports():
     for _ in ROOMS + DOORS:
         reach |= {(a, d) for a, b in reach for c, d in drawn if b == c}
     assert real <= reach, f"imported, but not to be seen in the drawing: {real - reach}"
+
+
+def test_the_picture_of_the_rooms_has_them_all_and_no_arrow_runs_through_one():
+    diagram = re.search(r"```mermaid\n(.*?)```", text(ROOT / "docs" / "architecture.md"), re.S)[1]
+    picture = ElementTree.fromstring(drawing.svg(diagram))
+    boxes = [[float(box.get(side)) for side in ("x", "y", "width", "height")] for box in picture.iter("rect")]
+    arrows = [path.get("d") for path in picture.iter("path") if path.get("marker-end")]
+    assert {word.text for word in picture.iter("text")} >= {*re.findall(r"^ *(\w+)[\[(]", diagram, re.M)}
+    assert len(arrows) == diagram.count("-->")
+    touched = []
+    for arrow in arrows:
+        points = np.array([[float(v) for v in point.split(",")] for point in arrow[1:].split("L")])
+        along = points[:-1, None] + np.linspace(0, 1, 200)[:, None] * np.diff(points, axis=0)[:, None]
+        for x, y, width, height in boxes:
+            inside = np.all(np.abs(along - [x + width / 2, y + height / 2]) < [width / 2 - 1, height / 2 - 1], axis=-1)
+            touched += [arrow] if inside.any() else []
+    assert touched == []
 
 
 def test_how_to_add_pages_are_linked_from_the_front_door():
