@@ -437,6 +437,14 @@ def test_code_names_the_machine_that_was_given():
     assert light().set(slope=0.5).code == "explorer.set(slope=0.5)"
 
 
+def test_reset_stops_what_plays():
+    explorer = explore.animation()
+    (play,) = [part for box in explorer.widget.children[0].children for part in getattr(box, "children", [])[:1]]
+    play.playing = True
+    explorer.reset()
+    assert isinstance(play, widgets.Play) and play.playing is False
+
+
 def test_reset_goes_back_to_what_was_shown_first(capsys):
     explorer = light().set(slope=0.5)
     explorer._ipython_display_()

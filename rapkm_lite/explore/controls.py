@@ -112,7 +112,7 @@ def parts(draw, controls, play, live, about) -> None:
     of_kind("about", about, str, "text")
 
 
-def player(widget) -> widgets.Widget:
+def player(widget) -> widgets.Box:
     """A play button for a slider, with its speed."""
     ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
     play = widgets.Play(widget.value, **ends, layout={"width": "120px"})

@@ -102,13 +102,13 @@ class Explorer:
         named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
         self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, **named})
         self.canvas.on_msg(lambda _, content, buffers: self._message(content))
-        cells = []
+        cells, self._player = [], player(controls[play]) if play else None
         for name, widget in self.controls.items():
             if hasattr(widget, "continuous_update"):
                 widget.continuous_update = live and _CONTINUOUS
             widget.observe(self._changed, "value")
             widget.add_class("rapkm-control")
-            cells += [player(widget), widget] if name == play else [widget]
+            cells += [self._player, widget] if name == play else [widget]
         button = widgets.Button(description="Reset", tooltip="back to the first setting", layout={"width": "90px"})
         button.on_click(lambda _: self.reset())
         grid = {"display": "grid", "grid_template_columns": "repeat(auto-fill, minmax(250px, 1fr))"}
@@ -168,7 +168,9 @@ class Explorer:
         return self
 
     def reset(self) -> None:
-        """Back to the first setting, as it was shown first."""
+        """Back to the first setting, as it was shown first; what plays stops."""
+        if self._player is not None:
+            self._player.children[0].playing = False
         self.set(**self._first)
 
     def update(self) -> None:
