@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 # "name : what it is" begins a paragraph about an argument; longer ones go on with an indent.
 ARGUMENT = re.compile(r"([A-Za-z_]\w*(?:, [A-Za-z_]\w*)*) : (.*)")
@@ -58,7 +59,25 @@ def _fold(app, doctree, docname):
         section.append(nodes.raw("", "</details>", format="html"))
 
 
+def _widen(app, doctree, docname):
+    """Pictures of several panels side by side in a box of their own, which a narrow screen moves sideways."""
+    from docutils import nodes
+    from PIL import Image
+
+    for image in list(doctree.findall(nodes.image)):
+        path = Path(app.srcdir, image["uri"])
+        if path.suffix not in (".png", ".webp") or not path.is_file():
+            continue
+        with Image.open(path) as picture:
+            width, height = picture.size
+        if width > 1.8 * height:
+            box = nodes.container(classes=["wide-picture"])
+            image.replace_self(box)
+            box.append(image)
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", _docstring)
     app.connect("doctree-resolved", _fold)
+    app.connect("doctree-resolved", _widen)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
