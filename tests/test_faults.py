@@ -71,6 +71,12 @@ def test_torque_limit(limit):
     )
 
 
+def test_a_limit_is_felt_where_a_torque_of_any_drive_reaches_it():
+    assert not rk.TorqueLimit(0.3).felt(np.array([0.1, -0.29, 0.0]))
+    assert rk.TorqueLimit(0.3).felt(np.array([0.1, -0.3, 0.0]))
+    assert not rk.TorqueLimit([0.3, 0.3, 0.5]).felt(np.array([0.1, 0.0, -0.4]))
+
+
 def test_dead_drive():
     run, q, qd = observed([rk.DeadDrive(1, 0.1)])
     wanted = commanded(q, qd)

@@ -254,6 +254,7 @@ def test_the_measured_pose_is_the_least_squares_pose_of_the_model(name, offset, 
     law = rk.simulate(robot, Watch(), path, signs, encoder, model).law
     assert len(law.rows) == len(path)
     for q_a, q, qd in law.rows:
+        assert not q.flags.writeable and not qd.flags.writeable
         x = rk.forward_kinematics(model, q)
         A, N = rk.control_matrix(model, q), robot.n_arms
         assert np.abs(rk.loop_constraints(model, q)).max() < 1e-14

@@ -70,6 +70,20 @@ def test_numbers_out_of_reason(call, words):
         call()
 
 
+@pytest.mark.parametrize(("turns", "fits"), [(0.99, True), (1.01, False)])
+def test_a_circle_turns_by_a_right_angle_per_sample_at_most(turns, fits):
+    """The quintic is fastest half way, where its rate 30 / 16 makes pi / 2 of 2 pi turns / samples."""
+    samples = 30
+    turns = turns * samples / 7.5
+    if fits:
+        path = rk.circle(TESTBED, 0.01, 1e-3 * samples, turns=turns)
+        chord = np.linalg.norm(np.diff(path.x, axis=0), axis=-1).max()
+        assert 2 * np.arcsin(chord / 0.02) == pytest.approx(0.99 * np.pi / 2, rel=0.01)
+    else:
+        with pytest.raises(ValueError, match=r"are up to 1\.59 rad per sample; allowed: up to pi / 2"):
+            rk.circle(TESTBED, 0.01, 1e-3 * samples, turns=turns)
+
+
 @pytest.mark.parametrize("times", [1.0, 1e2, 1e4])
 def test_a_large_prestress_is_cut_along_the_null_vector(times):
     """With one null vector n the nearest torques are best + t n, t between the limits of all drives."""
