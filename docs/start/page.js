@@ -118,13 +118,13 @@ function drawForces({ pose, torque }) {
 const limit = (values, levels) => levels.find((level) => values.every((v) => Math.abs(v) < 0.93 * level)) ?? levels.at(-1);
 
 function drawBars(at, unit) {
-  const marks = [["line", "offset", line("#555555", 1), [0.4, 0, N + 0.6, 0]], ["line", "torque", line("#555555", 1), [0.4, 0, N + 0.6, 0]]];
+  const marks = [["line", "offset", line("#555555", 1), [0.4, 0, N + 1.3, 0]], ["line", "torque", line("#555555", 1), [0.4, 0, N + 0.6, 0]]];
   for (let i = 0; i < N; i++) {
     const value = state[`offset_${i + 1}`], torque = 1e3 * at.torque[i];
     marks.push(bar("offset", i + 1, value, area(colours[i]), 0.5), bar("torque", i + 1, torque, area(colours[i]), 0.5));
     const place = (v) => text("#222222", { va: v < 0 ? "top" : "bottom" });
     marks.push(["label", "torque", place(torque), [i + 1, torque + (torque < 0 ? -unit : unit)], number(torque, 1)]);
-    marks.push(["label", "offset", text("#222222", { ha: "left", va: "center" }), [i + 1.3, value], number(value, 1)]);
+    marks.push(["label", "offset", text("#222222", { ha: "left", va: "center" }), [i + 1.45, value], number(value, 1)]);
   }
   return marks;
 }
@@ -138,8 +138,6 @@ function drawEnergy(here) {
     marks.push(bar("energy", x, joules, area(k ? FILTERED : "#999999")));
     marks.push(["label", "energy", text(), [x, joules + 0.1], number(joules)]);
   }));
-  marks.push(["words", "energy", text("#222222", { va: "top", bold: true }), [0.28, 0.99], "Table 1"]);
-  marks.push(["words", "energy", text("#222222", { va: "top", bold: true }), [0.74, 0.99], "here"]);
   marks.push(["legend", "energy", {}, [], [["without", line("#999999", 6)], ["with filter", line(FILTERED, 6)]]]);
   return [marks, Math.max(...rows.flat())];
 }
@@ -164,7 +162,7 @@ function picture(dt) {
   const [bars, highest] = drawEnergy(here), [chain, size] = drawForces(at);
   const scale = limit(at.torque.map((c) => 1e3 * c), [30, 60, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
   const frames = {
-    machine: [-275, 365, -332, 376], offset: [0.4, N + 0.8, -8.8, 8.8], torque: [0.4, N + 0.6, -1.08 * scale, 1.08 * scale],
+    machine: [-275, 365, -332, 376], offset: [0.4, N + 1.3, -8.8, 8.8], torque: [0.4, N + 0.6, -1.25 * scale, 1.25 * scale],
     forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
   };
   const saved = 1 - total(here.on) / total(here.off), measured = 1 - total(table1[1]) / total(table1[0]);
@@ -173,12 +171,15 @@ function picture(dt) {
   const torques = at.torque.map((c) => number(1e3 * c, 1)).join(", "), eta = at.pose.nullVector();
   const where = state.moving ? `at ${number(state.time)} s on the path` : "at rest here";
   const lost = [off, on].find((r) => r.lost !== null);
+  const places = { ...state, time: Number(state.time.toFixed(2)) };
+  if (state.moving) [places.x, places.y] = [at.pose.x, at.pose.y].map((v) => Math.round(1e3 * v));
   // The words follow the numbers, whatever the setting.
-  $("said").textContent = lost
+  const words = lost
     ? `With these offsets the machine is lost after ${number(lost.lost)} s.`
     : `One lap costs ${number(total(here.off))} J without the filter and ${number(total(here.on))} J with it, ` +
-      (saved > 0.005 ? `${number(100 * saved, 0)} % less` : "no less") +
+      (saved > 0.005 ? `${number(100 * saved, 0)} % less` : number(total(here.on)) < number(total(here.off)) ? "hardly less" : "no less") +
       ` (the chapter measured ${number(100 * measured, 0)} % less), and the two motions are never more than ${number(1e3 * apart)} mm apart.`;
+  if ($("said").textContent !== words) $("said").textContent = words;
   return {
     kind: "picture", styles: {}, frames,
     marks: [
@@ -191,8 +192,8 @@ function picture(dt) {
       { panel: "run", at: [state.time, null], set: { time: [1, 0, 0] } },
     ],
     numbers: [[`torques ${where}`, `${torques} mN m`], ["null vector η", `(${eta.map((n) => number(n)).join(", ")})`]],
-    places: { ...state }, code: "", problem: "",
-    sentence: `The machine ${where}, filter ${state.filter}: drive torques ${torques} mN m. ${$("said").textContent}`,
+    places, code: "", problem: "",
+    sentence: `The machine ${where}, filter ${state.filter}: drive torques ${torques} mN m. ${words}`,
   };
 }
 
@@ -215,26 +216,28 @@ function reachable(x, y) {
 }
 
 function change(to, by = {}) {
+  const taken = ["x", "y"].some((name) => name in to || name in by);
+  if (taken && state.moving) {
+    // A hand takes the machine from where it is on its path.
+    const { pose } = now(lap(state.filter, 1e-3), 1e-3);
+    [state.x, state.y] = [1e3 * pose.x, 1e3 * pose.y];
+  }
   const wish = { ...to };
   for (const [name, count] of Object.entries(by)) wish[name] = state[name] + count * controls[name].step;
-  if ("x" in wish || "y" in wish) {
-    if (state.moving) {
-      const { pose } = now(lap(state.filter, 1e-3), 1e-3);
-      [state.x, state.y] = [1e3 * pose.x, 1e3 * pose.y];
-    }
-    const [x, y] = [snap("x", wish.x ?? state.x), snap("y", wish.y ?? state.y)];
-    [state.x, state.y] = reachable(x, y);
+  if (taken) {
+    [state.x, state.y] = reachable(snap("x", wish.x ?? state.x), snap("y", wish.y ?? state.y));
     state.moving = false;
-    stop();
   }
+  // A hand on the machine or on its time ends the play.
+  if (taken || "time" in wish) stop();
   for (const name of Object.keys(wish)) if (name !== "x" && name !== "y") state[name] = snap(name, wish[name]);
   if ("time" in wish) state.moving = true;
 }
 
-function inputs() {
+function inputs(places) {
   for (const [name, c] of Object.entries(controls)) {
-    $(name).value = state[name];
-    $(`${name}-value`).textContent = number(state[name], c.step < 0.1 ? 2 : c.step < 1 ? 1 : 0);
+    $(name).value = places[name];
+    $(`${name}-value`).textContent = number(places[name], c.step < 0.1 ? 2 : c.step < 1 ? 1 : 0);
   }
   $("filter").value = state.filter;
 }
@@ -263,8 +266,9 @@ let show = () => {}, fine = 0;
 
 /** Draw, roughly while a hand moves, and once more finely when it rests. */
 function update(answered = {}, rough = false) {
-  show({ ...picture(rough ? 2e-3 : 1e-3), ...answered });
-  inputs();
+  const made = picture(rough ? 2e-3 : 1e-3);
+  show({ ...made, ...answered });
+  inputs(made.places);
   clearTimeout(fine);
   fine = setTimeout(() => {
     address();
@@ -303,12 +307,13 @@ let playing = 0;
 function stop() {
   cancelAnimationFrame(playing);
   playing = 0;
+  state.time = snap("time", state.time); // as the address will have it
   $("play").textContent = still.matches ? "Step" : "Play the run";
 }
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
 function play() {
-  if (playing) return stop();
+  if (playing) return stop(), update();
   if (!state.moving || state.time >= duration) state.time = 0;
   state.moving = true;
   if (still.matches) {
@@ -318,8 +323,8 @@ function play() {
   $("play").textContent = "Pause";
   let last = performance.now();
   const tick = (time) => {
-    state.time = Math.min(state.time + (time - last) / 1000, duration);
-    last = time;
+    state.time = Math.min(state.time + Math.max(0, time - last) / 1000, duration);
+    last = time; // a frame may have begun before the click
     update();
     if (state.time < duration) playing = requestAnimationFrame(tick);
     else stop();
@@ -347,12 +352,13 @@ mount($("stage"), {
   name: "machine", code: false,
   about: "The machine with the forces its drives can make, encoder offsets, drive torques, their forces one after the other, energies beside Table 1, and torques along the path",
   labels: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, c.words])),
+  ranges: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, [c.low, c.high]])),
   panels: {
     machine: { title: "Take the end-effector", aspect: "equal", xticks: [], yticks: [], xlabel: "mm; grey: all forces of drives with at most 40 mN m" },
     offset: { title: "Encoder errors, mrad", xticks: [1, 2, 3] },
     torque: { xticks: [1, 2, 3] },
     forces: { title: "Forces in a chain, mN", aspect: "equal" },
-    energy: { title: "Energy of a lap, J", xticks: [] },
+    energy: { title: "Energy of a lap, J", xticks: [], xlabel: "left Table 1, right here" },
     run: { title: "Torques along the path, mN m", xlabel: "time in s" },
   },
   layout: [["machine", "offset", "torque"], ["machine", "forces", "energy"], ["run", "run", "run"]], widths: [1.7, 1, 1], size: [12, 9.6],

@@ -228,7 +228,55 @@ def test_the_numbers_are_those_of_the_package(browser, address):
     for i in (1, 2, 3):
         seen.page.evaluate(f"(e => (e.value = 0, e.oninput()))(document.getElementById('offset_{i}'))")
     seen.page.wait_for_timeout(500)
-    assert "no less" in seen.page.inner_text("#said")
+    # Friction alone: 2.06 and 2.05 J.
+    assert "hardly less" in seen.page.inner_text("#said")
+
+
+def test_on_its_path_the_machine_is_taken_from_where_it_is(browser, address):
+    """A key moves it by one step, also where the setting at rest is far away; sliders say where it is."""
+    seen = Page(browser, f"{address}#20,50,8,-4,10,30,0,1")
+    robot = rk.load()
+    path = rk.triangle(robot)
+    x = 1e3 * rk.simulate(robot, rk.PD(7.05, 0.225), path, OFFSET).x[1500]
+    before = seen.places()
+    assert np.allclose([before["x"], before["y"]], x, atol=0.6) and before["moving"]
+    assert seen.page.evaluate("+document.getElementById('x').value") == before["x"]
+    seen.page.locator(".rapkm-knob").first.focus()
+    seen.page.keyboard.press("ArrowRight")
+    seen.page.wait_for_function("!JSON.parse(document.querySelector('.rapkm').dataset.places).moving")
+    after = seen.places()
+    assert 0 < after["x"] - before["x"] <= 3 and abs(after["y"] - before["y"]) <= 1
+
+
+# Frames whose time stamp is that of the frame before, and all numbers that were ever shown.
+EARLY = """const next = requestAnimationFrame; window.all = [];
+requestAnimationFrame = window.requestAnimationFrame = f => next(t => f(t - 20));
+addEventListener('DOMContentLoaded', () => new MutationObserver(() => all.push(
+    document.querySelector('.rapkm-numbers')?.textContent ?? '')).observe(document, { childList: true, subtree: true }));"""
+
+
+def test_playing_shows_numbers_from_the_first_frame_on_and_a_hand_stops_it(browser, address):
+    seen = Page(browser, address, script=EARLY)
+    seen.page.click("#play")
+    seen.page.wait_for_function("JSON.parse(document.querySelector('.rapkm').dataset.places).time > 0.3")
+    assert not [words for words in seen.page.evaluate("all") if "NaN" in words] and seen.page.evaluate("all.length") > 5
+    knob = seen.page.locator(".rapkm-knob.bare")
+    knob.focus()
+    seen.page.keyboard.press("ArrowRight")
+    seen.page.wait_for_function("document.getElementById('play').textContent === 'Play the run'")
+    assert seen.errors == []
+
+
+def test_the_address_after_a_pause_is_what_is_seen(browser, address):
+    seen = Page(browser, address)
+    seen.page.click("#play")
+    seen.page.wait_for_timeout(730)
+    seen.page.click("#play")
+    seen.page.wait_for_function("location.hash.endsWith(',1')")
+    said, places = seen.page.inner_text(".rapkm-numbers"), seen.places()
+    assert seen.page.locator(".rapkm-knob.bare").get_attribute("aria-valuenow") == f"{places['time']:g}"
+    seen.open(seen.page.url)
+    assert seen.page.inner_text(".rapkm-numbers") == said and seen.places()["time"] == places["time"]
 
 
 def test_reduced_motion_steps_instead_of_playing(browser, address):
