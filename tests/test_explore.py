@@ -437,6 +437,34 @@ def test_code_names_the_machine_that_was_given():
     assert light().set(slope=0.5).code == "explorer.set(slope=0.5)"
 
 
+def test_a_machine_with_weight_rests_where_its_run_ends():
+    """(14) with the force of gravity is of first order; with stiff drives that is near."""
+    stiff = explore.steady_state(rk.load("asymmetric")).set(K_P_1=49.0, K_P_2=49.0, K_P_3=49.0)
+    theory, run = (
+        np.array([float(part) for part in stiff.numbers[name].removesuffix(" mrad").split(" / ")])
+        for name in ("error at rest, theory", "simulated")
+    )
+    assert np.abs(run).max() > 5.0
+    np.testing.assert_allclose(theory, run, atol=0.1)
+    stiff = explore.three_opinions(rk.load("asymmetric")).set(K_P=49.0, offset_1=0, offset_2=0, offset_3=0)
+    assert stiff.numbers["torque at rest"] != "0.0 / 0.0 / 0.0 mN m"
+
+
+def test_the_edge_of_via_points_has_the_length_of_its_machine():
+    explorer = explore.via_points(rk.load("asymmetric").replace(base=2 * rk.load().base, lengths=0.4))
+    assert explorer.controls["legs"].options[0] == ("480 mm", 1)
+    assert explorer.picture.xlim("way") == (0, 480)
+
+
+def test_a_place_beyond_reach_is_told_and_a_hand_elsewhere_leaves_it():
+    explorer = explore.allocation().set(x=150, y=150, f_y=0.3)
+    assert re.fullmatch(r"\(12\d, 12\d\) mm: an arm reaches no further", explorer.numbers["end-effector"])
+    explorer._message({"kind": "grab", "to": {"f_x": 0.2, "f_y": 0.1}, "from": 1, "seq": 1})
+    assert explorer.values | {"f_x": 0.2, "f_y": 0.1} == explorer.values
+    assert (explorer.values["x"], explorer.values["y"]) == (150, 150)
+    assert "end-effector" not in explore.allocation().numbers
+
+
 def test_reset_stops_what_plays():
     explorer = explore.animation()
     (play,) = [part for box in explorer.widget.children[0].children for part in getattr(box, "children", [])[:1]]

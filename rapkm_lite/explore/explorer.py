@@ -240,7 +240,8 @@ class Explorer:
                     for name, value in wishes.items():
                         self.controls[name].value = value
                     self._step()
-                    if follow(self.picture.handles, self.controls):
+                    taken = [handle for handle in self.picture.handles if wishes.keys() & handle["set"].keys()]
+                    if follow(taken, self.controls):
                         self._step()
                 self._send(**question)
             except Exception:

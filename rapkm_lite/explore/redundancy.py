@@ -19,7 +19,7 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders, ready_made
+from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders, ready_made, stopped
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -39,7 +39,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
 
     def draw(picture, x, y, f_x, f_y, limit, rule):
-        _, q = held_machine(picture, "machine", robot, x, y)
+        point, q = held_machine(picture, "machine", robot, x, y)
         A, f = control_matrix(robot, q), np.array([f_x, f_y])
         draw_forces(picture, A, limit)
         inner = shortest_reach(A, 1e-3 * limit, 181)
@@ -55,7 +55,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
             "torques": marks.per_drive(1e3 * torques, 1) + " mN m",
             "of least size": marks.per_drive(1e3 * plain, 1) + " mN m",
             "largest": f"{np.abs(torques).max() / limit * 1e5:.0f} % of the limit",
-        }
+        } | stopped(point, x, y)
 
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {

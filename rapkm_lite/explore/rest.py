@@ -19,7 +19,7 @@ from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, held_machine, over_time, place_sliders, ready_made
+from .shared import curves, frictionless, held_machine, over_time, place_sliders, ready_made, stopped
 
 
 @ready_made
@@ -40,8 +40,9 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         K_D = 0.225 * np.sqrt(K_P / 7.05)
         point, q = held_machine(picture, "plane", robot, x, y)
         A = act.control_matrix(robot, q)
-        theory = 1e3 * steady_state_error(A, K_P, offset)
-        torque = 1e3 * steady_state_torque(A, K_P, offset)
+        weight = act.required_wrench(robot, q, 0 * q, 0 * q)
+        theory = 1e3 * steady_state_error(A, K_P, offset, weight)
+        torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error = 1e3 * run.error
         curves(picture, "error", run.t, error, 1.0)
@@ -58,7 +59,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
             "rest torque": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
-        }
+        } | stopped(point, x, y)
 
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
     wide = {"color": NEUTRAL, "linewidth": 7}
@@ -70,7 +71,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
-    controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
+    controls |= {f"K_P_{i + 1}": log_slider(f"gain {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     middle = np.round(500 * robot.base.mean(axis=0)).astype(int) * 2
     controls |= place_sliders(int(middle[0]), int(middle[1]))
     layout = [["plane", "error"], ["rest", "torque"]]
@@ -89,10 +90,11 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
 
     def draw(picture, x, y, K_P, **offsets):
         offset = marks.offset_values(offsets, N)
-        A = act.control_matrix(robot, inverse_kinematics(robot, marks.clamped(robot, 1e-3 * np.array([x, y]))))
-        torque = 1e3 * steady_state_torque(A, K_P, offset)
+        q = inverse_kinematics(robot, marks.clamped(robot, 1e-3 * np.array([x, y])))
+        A, weight = act.control_matrix(robot, q), act.required_wrench(robot, q, 0 * q, 0 * q)
+        torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
         # Drive i is content on the line A_i p = -offset_i of points p about the desired one; all lengths in mm.
-        rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset), rcond=None)[0]
+        rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset, weight), rcond=None)[0]
         size, half = np.linalg.norm(A, axis=1), picture.ylim("opinions")[1]
         normal, level = A / size[:, None], -1e3 * offset / size
         along, seen = np.stack([-normal[:, 1], normal[:, 0]], axis=-1), [rest]
@@ -136,7 +138,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
     controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
+        "K_P": log_slider("gain in N m/rad", 1.0, 50.0, 7.05),
         "x": slider("desired x in mm", -100, 100, 5, 20),
         "y": slider("desired y in mm", -100, 100, 5, 30),
     }
@@ -221,7 +223,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
+        "K_P": log_slider("gain in N m/rad", 1.0, 30.0, 7.05),
         "side": slider("side of the triangle in mm", 20, 240, 10, 120),
         "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
     }

@@ -71,7 +71,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
+        "K_P": log_slider("gain in N m/rad", 1.0, 50.0, 7.05),
         "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
         "filter": choice("antagonism filter", LAWS.keys()),
         "friction": switch("friction", True),
@@ -164,7 +164,8 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     middle = robot.base.mean(axis=0)
     ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
-    share = np.linalg.norm(path.x - ends[0], axis=-1) / np.linalg.norm(ends[1] - ends[0])
+    edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
+    way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
     between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1)))
 
     @lru_cache(maxsize=128)
@@ -180,7 +181,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         off = 1e3 * (done.x - path.x)[:there]
         pressing = 1e3 * null
         for axis in (0, 1):
-            picture.trace("way", 240 * share[:there], off[:, axis], **WAYS[axis][1])
+            picture.trace("way", way[:there], off[:, axis], **WAYS[axis][1])
         picture.fit("way", off, least=1.0)
         curves(picture, "torque", done.t, pressing, 5.0)
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
@@ -191,9 +192,9 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
             "at the end": marks.per_drive(pressing[-1], 1) + " mN m",
         }
 
-    way = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, 240)}
-    panels = {"way": way | {"legend": WAYS}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
-    counts = [(f"{240 / legs:g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
+    along = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, edge)}
+    panels = {"way": along | {"legend": WAYS}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
+    counts = [(f"{edge / legs:.4g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
     controls = {
         "legs": choice("distance of the via points", counts, 8),
         "late": slider("drive 1 late in ms", 0, 10, 2, 0),

@@ -49,6 +49,13 @@ def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mo
     return point, q
 
 
+def stopped(point, x: float, y: float) -> dict[str, str]:
+    """Where the end-effector is, in words, when the arms do not reach (x, y) in mm."""
+    there = 1e3 * point
+    short = np.abs(there - [x, y]).max() > 0.5
+    return {"end-effector": f"({there[0]:z.0f}, {there[1]:z.0f}) mm: an arm reaches no further"} if short else {}
+
+
 def force_panel(limit: float) -> dict:
     """Keywords of a panel of forces at the end-effector, up to `limit` in N."""
     square = {"aspect": "equal", "xlim": (-limit, limit), "ylim": (-limit, limit)}

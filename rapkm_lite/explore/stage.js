@@ -39,9 +39,8 @@ export function ticks(low, high, most = 6, log = false) {
 export function decode(message, buffers, known) {
   Object.assign(known.styles, message.styles);
   const floats = buffers.map((b) => new Float32Array(b.buffer?.slice(b.byteOffset, b.byteOffset + b.byteLength) ?? b));
-  Object.entries(message.images ?? {}).forEach(([key, [rows, columns, ...extent]], k) => {
+  for (const [k, [key, [rows, columns, ...extent]]] of Object.entries(message.images ?? {}).entries())
     known.images[key] = { rows, columns, extent, values: floats[k + 1] };
-  });
   let at = 0;
   const style = (s) => (typeof s === "object" ? s : known.styles[s]) ?? {};
   return message.marks.map(([kind, panel, s, count, words]) => {
@@ -321,10 +320,8 @@ export function steps({ along, set, at }, key, shift) {
   return Object.fromEntries(Object.entries(remade(set, (v) => (shift ? 10 : 1) * count(v))).filter(([, n]) => n));
 }
 
-function make(tag, properties = {}, parent = null) {
-  const el = Object.assign(document.createElement(tag), properties);
-  return parent ? parent.appendChild(el) : el;
-}
+const make = (tag, properties = {}, parent = new DocumentFragment()) =>
+  parent.appendChild(Object.assign(document.createElement(tag), properties));
 
 /** Put words into an element, with true subscripts. */
 function rich(el, words = "") {
@@ -485,15 +482,16 @@ export function mount(el, scene, link) {
   // A number typed beside a slider may lie between two of its steps; one that is left counts as entered.
   function typed({ type, target, key }) {
     if (!target.matches?.(".widget-readout") || !around()?.contains(target)) return;
-    const words = () => target.textContent.replace("−", "-").trim(), before = words(), { drawn } = state;
+    const words = () => target.textContent.replace("−", "-").trim(), before = words(), { was } = target.dataset;
     if (type === "focus") target.dataset.was = before;
-    if (type === "blur" && before !== target.dataset.was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
+    if (type === "blur" && before !== was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
     if (key !== "Enter") return;
-    target.textContent = before; // a slider writes a true minus, but does not read it
+    const { drawn } = state, meant = before ? Number(before) : NaN, whole = isFinite(meant);
+    target.textContent = whole ? meant : before; // a slider reads neither a true minus nor, in whole numbers, 1e3
     setTimeout(() => {
-      const now = (target.dataset.was = words()), how = before && !isNaN(before) ? "rounded to" : "read as";
+      const now = (target.dataset.was = words()), how = now === was ? "not read, it stays" : "read as";
       if (state.drawn > drawn + 1 || around()?.querySelector(".noUi-active")) return; // the hand has moved on
-      say(Number(before || NaN) === Number(now) ? "" : minus(`${before || "nothing"} was ${how} ${now}`));
+      say(meant === Number(now) ? "" : minus(`${before || "an empty field"} was ${whole ? "rounded to" : how} ${now}`));
     }, 400);
   }
 
@@ -502,19 +500,21 @@ export function mount(el, scene, link) {
   for (const node of [document.documentElement, document.body]) watch.observe(node, { attributes: true });
   const sizes = new ResizeObserver(paint), gone = new AbortController(), { signal } = gone;
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint, { signal });
-  document.addEventListener("keydown", page, { signal, capture: true });
+  for (const media of ["(prefers-color-scheme: dark)", "print"])
+    matchMedia(media).addEventListener("change", paint, { signal });
+  window.addEventListener("keydown", page, { signal, capture: true }); // JupyterLab listens on the document
   for (const name of ["focus", "blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
   link.receive(receive);
   link.send({ kind: "hello" });
-  return Object.assign(() => {
-    gone.abort();
-    watch.disconnect(), root.remove();
-  }, { say });
+  return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove()), { say });
 }
 
-/** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts. */
+/** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts.
+    Saving and other shortcuts with a letter go on to JupyterLab, but for those that edit a text. */
 function page(event) {
+  const letter = (event.ctrlKey || event.metaKey) && /^[bd-uw]$/i.test(event.key);
+  const shut = letter && event.target.closest?.(".rapkm-explorer [data-lm-suppress-shortcuts]");
+  if (shut) delete shut.dataset.lmSuppressShortcuts, setTimeout(() => (shut.dataset.lmSuppressShortcuts = "true"));
   const screens = [...document.querySelectorAll(".rapkm-screen")], way = { PageDown: 1, PageUp: -1 }[event.key];
   if (!way || !screens.length) return;
   event.preventDefault(), event.stopImmediatePropagation();

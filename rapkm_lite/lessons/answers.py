@@ -75,7 +75,7 @@ def _words(error: BaseException) -> str:
         text = " ".join(str(error).split())
     except Exception:
         text = "a message that cannot be shown"
-    return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__
+    return f"{type(error).__name__}: {text[:200].rstrip('.')}" if text else type(error).__name__
 
 
 def _unfinished(error: BaseException | None) -> bool:

@@ -358,6 +358,23 @@ def test_setting_is_copied_as_code_and_a_rounded_number_says_so(shown):
     notebook.wait(f"() => stage.root().querySelector('[aria-live]').textContent.includes('({x}, 30) mm')", 10)
 
 
+@pytest.mark.parametrize("part", [".noUi-handle", ".widget-readout", "select", ".rapkm-knob"])
+def test_saving_is_saving_wherever_the_focus_is(part, shown):
+    """Arrow keys are the explorer's; Ctrl+S is JupyterLab's."""
+    notebook = shown("machine")
+    dirty = "document.querySelector('.lm-TabBar-tab.lm-mod-current.jp-mod-dirty')"
+    changed(notebook, lambda: notebook.page.locator(".rapkm-control select").first.select_option(index=1))
+    notebook.wait(f"() => {dirty}", 10)
+    place = notebook.page.locator(part).first
+    place.focus()
+    notebook.page.keyboard.press("Control+s")
+    notebook.wait(f"() => !{dirty}", 20)
+    if part in (".noUi-handle", ".rapkm-knob"):
+        x = still(notebook)["x"]
+        changed(notebook, lambda: notebook.page.keyboard.press("ArrowRight"))
+        assert still(notebook)["x"] == x + 2
+
+
 def typed(notebook, text, i=0):
     """Write a number beside a slider in place of the one that stands there."""
     notebook.page.locator(".widget-readout").nth(i).click()
@@ -376,9 +393,9 @@ def test_note_says_how_a_number_was_read_that_was_typed_or_left(left, shown):
     notebook = shown("machine")
     enter = (lambda: leave(notebook)) if left else (lambda: notebook.page.keyboard.press("Enter"))
     written = [
-        ("31", 32, "31 was rounded to 32"), ("abc", 32, "abc was read as 32"), ("40", 40, ""),
-        ("3,5", 4, "3,5 was read as 4"), ("", 4, "nothing was read as 4"), ("−31", -30, "−31 was rounded to −30"),
-        ("999", 200, "999 was rounded to 200"), ("0", 0, ""),
+        ("31", 32, "31 was rounded to 32"), ("abc", 32, "abc was not read, it stays 32"), ("40", 40, ""),
+        ("3,5", 4, "3,5 was read as 4"), ("", 4, "an empty field was not read, it stays 4"), ("−31", -30, "−31 was rounded to −30"),
+        ("999", 200, "999 was rounded to 200"), ("1e2", 100, ""), ("0", 0, ""),
     ]  # fmt: skip
     for text, x, note in written:
         typed(notebook, text)

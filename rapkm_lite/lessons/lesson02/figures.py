@@ -99,7 +99,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
         ax.set_title(f"drive {i + 1};  line: pair {pair_name(pair)}")
         ax.label_outer()
-    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label="share |η_i| of the prestress", shrink=0.85)
+    axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label=r"share $|\eta_i|$ of the prestress", shrink=0.85)
     return axes
 
 

@@ -23,7 +23,7 @@ def plot_landscape(values, cube, theory, axes=None):
     for ax, k in zip(axes, (0, len(values) // 2, len(values) - 1), strict=True):
         filled = ax.contourf(values, values, cube[:, :, k].T, levels=levels)
         ax.contour(values, values, theory[:, :, k].T, levels=levels[1:], colors="white", linestyles="--", linewidths=1)
-        ax.set(title=f"offset 3 = {values[k]:.1f} mrad", xlabel="offset 1 in mrad", aspect="equal")
+        ax.set(title=f"offset 3 = {values[k]:.1f} mrad".replace("-", "−"), xlabel="offset 1 in mrad", aspect="equal")
         ax.grid(False)
     axes[0].set_ylabel("offset 2 in mrad")
     axes[0].figure.colorbar(filled, ax=axes, label="antagonistic energy in J", format="%.1f")
@@ -113,7 +113,7 @@ def plot_readings(names, low, high, readings, reference=None, ax=None):
             label="the reading of the data file",
         )
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]" for n, a, b in zip(names, low, high, strict=True)])
+    ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]".replace("-", "−") for n, a, b in zip(names, low, high, strict=True)])
     ax.set(xlim=(-0.02, 1.02), xlabel="position in the search range, 0 … 1")
     ax.invert_yaxis()
     return ax
