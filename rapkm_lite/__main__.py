@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,9 +24,11 @@ def _summary(options) -> None:
 def _lessons(options) -> None:
     from .lessons.copies import copy_lessons
 
+    if not options.folder.strip():
+        raise ValueError(f"folder = {options.folder!r}; allowed: the name of a folder, . for the present one")
     files = copy_lessons(options.folder)
     print(f"{len(files)} files in {options.folder}; open the first lesson with")
-    print(f"    python -m jupyter lab {files[0]}")
+    print(f"    python -m jupyter lab {shlex.quote(str(files[0]))}")
 
 
 def _grade(options) -> None:
@@ -43,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m rapkm_lite", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print the summary for scripts")
     parser.set_defaults(run=_summary)
-    commands = parser.add_subparsers(title="commands", metavar="")
+    commands = parser.add_subparsers(title="commands", metavar="command")
     lessons = commands.add_parser("lessons", help="copy the lessons into a folder")
     lessons.add_argument("folder")
     lessons.set_defaults(run=_lessons)

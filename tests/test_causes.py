@@ -113,6 +113,7 @@ SETS += [
     (UNSTABLE, FOUR, rk.PID(7.0, 1e5, 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, FOUR, rk.PID(7.0, [1e3, 2e3, 1e3, 1e3], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
+    (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2))), TRIANGLE, {"offset": OFFSET}),
     ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
     (

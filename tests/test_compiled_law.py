@@ -75,6 +75,7 @@ def test_every_matrix_of_at(name):
             at.F,
             at.F_dot,
             at.A,
+            at.A_T_pinv,
             at.J,
             at.J_dot,
             at.N,
@@ -92,7 +93,7 @@ def test_every_matrix_of_at(name):
                 for j in range(M.shape[1]):
                     k += 1
                     total += M[i, j] * np.cos(0.37 * k)
-        for v in (at.Q, at.minimal[2], at.redundant[2]):
+        for v in (at.x, at.xd, at.Q, at.minimal[2], at.redundant[2]):
             for i in range(v.shape[0]):
                 k += 1
                 total += v[i] * np.cos(0.37 * k)
@@ -101,6 +102,13 @@ def test_every_matrix_of_at(name):
     fast, slow = rk.simulate(robot, weigh, path), rk.simulate(robot, InPython(weigh), path)
     assert np.abs(fast.c).max() > 1e-4
     assert_allclose(fast.c, slow.c, rtol=0, atol=1e-13)
+
+
+def test_what_a_compiled_pose_has_not_is_told_with_what_it_has():
+    law = rk.compiled(lambda t, q_a, qd_a, d, at: at.tip_columns[0], at="desired")
+    if COMPILED:
+        with pytest.raises(ValueError, match=r"at has no tip_columns here, but x, xd, F, .*in Python a rk\.Law"):
+            rk.simulate(ROBOT, law, PATH)
 
 
 def test_inside_a_filter_and_in_a_study():

@@ -467,6 +467,15 @@ def test_energies_of_a_run_by_their_definitions():
     assert_allclose(rk.mechanical_work(run).sum(), gained, atol=1e-9)
 
 
+def test_antagonism_form_is_that_of_the_machine_not_of_the_one_that_the_path_was_made_for():
+    """In another working mode the same path has other matrices; a run tells."""
+    path, offset = rk.circle(FRICTIONLESS, 0.05, 5.0, centre=(0.0, 0.02)), np.array([0.004, -0.002, 0.005])
+    for mode in ([1, 1, -1], [-1, 1, 1], [-1, -1, -1]):
+        other = FRICTIONLESS.replace(mode=mode)
+        run = rk.simulate(other, rk.PD(7.05, 0.225), path, offset)
+        assert_allclose(offset @ rk.antagonism_form(other, path, 7.05) @ offset, rk.antagonistic_energy(run), rtol=0.05)
+
+
 def test_antagonistic_energy_is_quadratic_in_the_offsets():
     path, offset = rk.triangle(FRICTIONLESS, dt=5e-3), np.array([0.004, -0.002, 0.005])
     S = rk.antagonism_form(FRICTIONLESS, path, 7.05)

@@ -32,7 +32,7 @@ PURE_NUMBERS = {
     "share that still fights",
     "all links too long by the share ε",
     "condition number of A",
-    "share |η_i| of the prestress",
+    r"share $|\eta_i|$ of the prestress",
     "component of drive 1",
     "component of drive 2",
 }

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -69,6 +70,13 @@ def test_a_lesson_is_never_overwritten(tmp_path):
     done = command("lessons", str(tmp_path))
     assert done.returncode == 2 and "00_start_here.ipynb" in done.stderr and "Traceback" not in done.stderr
     assert (tmp_path / "00_start_here.ipynb").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_folder_without_a_name_is_refused_and_one_with_a_space_is_quoted(tmp_path):
+    done = command("lessons", "")
+    assert done.returncode == 2 and "folder = ''; allowed: the name of a folder" in done.stderr
+    target = tmp_path / "my lessons"
+    assert shlex.quote(str(target / "00_start_here.ipynb")) in command("lessons", str(target)).stdout
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):

@@ -160,3 +160,23 @@ def test_stiffness_is_the_second_derivative_of_the_servo_energy(name):
 def test_bad_arguments(call, sentence):
     with pytest.raises(ValueError, match=sentence):
         call()
+
+
+def test_two_motors_on_each_axis_share_a_force_within_their_limits():
+    """A gantry: what one motor cannot, the other one of its axis does."""
+    c = rk.allocate_torques([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]], [1.0, 1.0], [0.2, 1.0, 1.0, 1.0])
+    assert_allclose(c, [0.2, 0.8, 0.5, 0.5], atol=1e-12)
+
+
+def test_numbers_of_poses_that_do_not_fit_are_named():
+    robot = rk.load()
+    q = rk.inverse_kinematics(robot, [[0.0, 0.0], [0.01, 0.0], [0.02, 0.0]])
+    with pytest.raises(ValueError, match=r"leading axes do not fit together: q \(3,\), .*c \(2,\)"):
+        rk.endeffector_stiffness(robot, q, 7.0, np.ones((2, 3)))
+    with pytest.raises(ValueError, match=r"leading axes do not fit together: q \(3,\), .*K_P \(2,\)"):
+        rk.lyapunov_function(robot, q, np.ones((3, 6)), np.ones((3, 6)), np.stack([np.eye(6)] * 2))
+
+
+def test_a_machine_without_moments_of_inertia_is_refused_for_mujoco():
+    with pytest.raises(ValueError, match=r"inertias of arm 1 are 0 and .*; allowed: 1e-14"):
+        rk.to_mjcf(rk.load().replace(inertias=0.0, load=0.0))

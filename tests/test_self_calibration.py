@@ -178,3 +178,29 @@ def test_afterwards_the_filter_has_nothing_left_to_save():
     # n . offset decides, squared: the same size costs sixteen times as much with other signs.
     assert share[0] == pytest.approx(100 * fighting.antagonistic_energy[0] / calm[0], rel=0.05)
     assert_allclose(share[1:], [1.4, 21.8], rtol=0.05)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_places_close_together_end_at_the_rounding_that_their_condition_leaves(seed):
+    """With readings of 1 urad at 30 places within 2 cm the unknowns are wrong by what the covariance says."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-0.02, 0.02, (30, 2))
+    machine = TESTBED.replace(lengths=TESTBED.lengths + 1e-3 * rng.normal(size=(3, 2)))
+    offset = 5e-3 * rng.normal(size=3)
+    readings = rk.inverse_kinematics(machine, x)[:, :3] + offset + 1e-6 * rng.normal(size=(30, 3))
+    try:
+        found = rk.calibrate(TESTBED, readings, "offsets+lengths")
+    except rk.CalibrationError:
+        return
+    assert np.all(np.abs(found.offset - offset) < 6 * np.sqrt(np.diagonal(found.covariance))[:3])
+
+
+@pytest.mark.parametrize("unknowns", ["offsets", "offsets+lengths", "all"])
+def test_what_is_known_of_too_few_places_are_orthonormal_combinations(unknowns):
+    x = np.random.default_rng(0).uniform(-0.05, 0.05, (1 if unknowns == "offsets" else 4, 2))
+    offset = np.array([1e-4, -2e-4, 3e-4])
+    with pytest.raises(rk.CalibrationError, match=r"= \S+ ± \S+") as refused:
+        rk.calibrate(TESTBED, rk.inverse_kinematics(TESTBED, x)[:, :3] + offset, unknowns)
+    known = refused.value.known
+    assert_allclose(known @ known.T, np.eye(refused.value.rank), atol=1e-12)
+    assert_allclose(refused.value.value, known[:, :3] @ offset, atol=2e-6)

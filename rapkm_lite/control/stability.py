@@ -73,6 +73,7 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     eps = float(bounded("eps", exact_array("eps", eps), 0.0, strict=False))
     Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
     K = joint_gain("K_P", K_P, robot.n_arms)
+    check_leading(q=q.shape[:-1], e=e.shape[:-1], ed=ed.shape[:-1], K_P=K.shape[:-2])
     form = lambda u, M, v: np.einsum("...i,...ij,...j->...", u, M, v)  # noqa: E731
     return (form(ed, Gt, ed) + form(e, K, e) + eps * form(e, Gt, ed)) / 2
 
@@ -97,7 +98,8 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
         A = control_matrix(robot, q)
         a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
         det = a * d - b * c
-        det = np.where(np.abs(det) < 1e-9, 1e-9, det)
+        least = 1e-12 * np.linalg.norm(A, axis=(-2, -1)) ** 2
+        det = np.where(np.abs(det) < least, least, det)
         to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
         M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
     return np.linalg.norm(M, 2, axis=(-2, -1))

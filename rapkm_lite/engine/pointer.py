@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from .refusal import refusal
+from .refusal import MATRICES, refusal
 
 Wanted = namedtuple("Wanted", "x xd xdd q qd qdd q_a qd_a qdd_a")
-Matrices = namedtuple("Matrices", "F F_dot A J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv")
+Matrices = namedtuple("Matrices", MATRICES)
 
 
 def matrix_room(N: int) -> int:
     """How many numbers the matrices of `engine.user` take, and the intermediate ones after them."""
     n, r = 2 * N, 2 * N - 2
-    return 4 * n + 2 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 14 * n
+    return 4 + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 14 * n
 
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
@@ -63,9 +63,12 @@ def pointer(function, N: int, matrices: bool, memory: int):
 
     @inner
     def matrices_of(buffer):
-        F, o = take(buffer, 7 + 2 * N + 3 * n, n, 2)
+        o = 7 + 2 * N + 3 * n
+        x, xd = buffer[o : o + 2], buffer[o + 2 : o + 4]
+        F, o = take(buffer, o + 4, n, 2)
         F_dot, o = take(buffer, o, n, 2)
         A, o = take(buffer, o, N, 2)
+        A_T_pinv, o = take(buffer, o, N, 2)
         J, o = take(buffer, o, r, n)
         J_dot, o = take(buffer, o, r, n)
         P, o = take(buffer, o, n, n)
@@ -81,7 +84,9 @@ def pointer(function, N: int, matrices: bool, memory: int):
         Qn = buffer[o : o + n]
         A_tilde, o = take(buffer, o + n, N, n)
         pinv, o = take(buffer, o, N, n)
-        return Matrices(F, F_dot, A, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv)
+        return Matrices(
+            x, xd, F, F_dot, A, A_T_pinv, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv
+        )
 
     @inner
     def nothing(buffer):
@@ -116,5 +121,5 @@ def pointer(function, N: int, matrices: bool, memory: int):
         name = getattr(function, "__name__", type(function).__name__)
         raise ValueError(
             f"the law {name} cannot be compiled ({words}); allowed: a function of numbers and NumPy arrays that "
-            f"returns c ({N},), or the same function without @compiled, which runs in Python"
+            f"returns c ({N},), or in Python a rk.Law whose step calls it"
         ) from error

@@ -7,11 +7,15 @@ import linecache
 import re
 from pathlib import Path
 
+# What a compiled law finds in `at`.
+MATRICES = "x xd F F_dot A A_T_pinv J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv".split()
+
 # What Numba says, what is said instead; the first that fits.
 _WORDS = (
     (r"name '(\w+)': Cannot determine Numba type of <class 'function'>", r"\1 is a function that is not compiled"),
     (r"name '(\w+)': Cannot determine Numba type of <class '(?:\w+\.)*(\w+)'>", r"\1 is of type \2"),
     (r"NameError: (name '\w+' is not defined)", r"\1"),
+    (r"Unknown attribute '(\w+)' of type Matrices.+", rf"at has no \1 here, but {', '.join(MATRICES)}"),
     (r"Unknown attribute '(\w+)' of type (.+)", r"\2 has no \1"),
     (r"Cannot unify (.+) and (.+) for '([^.'$]+)(?:\.\d+)?'", r"\3 is once \1 and once \2"),
     (r"unsupported NumPy function '([\w.]+)'", r"\1 is not known here"),

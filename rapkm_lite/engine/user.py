@@ -86,9 +86,11 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     """All matrices of `rapkm_lite.at` at the desired, measured or true pose."""
     N, W = len(drives), len(arms)
     n, r = 2 * N, 2 * N - 2
-    F, p = matrix(room, 0, n, 2)
+    x, p = matrix(room, 0, 2, 2)
+    F, p = matrix(room, p, n, 2)
     F_dot, p = matrix(room, p, n, 2)
     A, p = matrix(room, p, N, 2)
+    A_T_pinv, p = matrix(room, p, N, 2)
     J, p = matrix(room, p, r, n)
     J_dot, p = matrix(room, p, r, n)
     P, p = matrix(room, p, n, n)
@@ -125,6 +127,9 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             ax, ay, dx, dy = den * lx, den * ly, den * bx, den * by
             vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
             base, link = bx * vx + by * vy, -(lx * vx + ly * vy)
+        if i == 0:
+            x[0, 0], x[0, 1] = w[m + BX * W] + ax + dx, w[m + BY * W] + ay + dy
+            x[1, 0], x[1, 1] = -(base * ay + link * dy), base * ax + link * dx
         ad, tip = ax * dx + ay * dy, w[m + TIP * W]
         den_dot = (link - base) * ad
         F[i, 0], F[i, 1], F[N + i, 0], F[N + i, 1] = dx / den, dy / den, -(ax + dx) / den, -(ay + dy) / den
@@ -181,6 +186,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         m11, m12, m22 = m11 + A[i, 0] * A[i, 0], m12 + A[i, 0] * A[i, 1], m22 + A[i, 1] * A[i, 1]
     for i in range(N):
         u, v = solve2(m11, m12, m22, A[i, 0], A[i, 1])
+        A_T_pinv[i, 0], A_T_pinv[i, 1] = u, v
         for j in range(n):
             pinv[i, j] = u * F[j, 0] + v * F[j, 1]
 

@@ -30,7 +30,7 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
     """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`.
 
-    >>> round(log_slider("gain in N m/rad", 0.1, 100.0, 7.05).value, 2)
+    >>> round(log_slider("K_P in N m/rad", 0.1, 100.0, 7.05).value, 2)
     7.05
     """
     positive_number("low", low)

@@ -63,7 +63,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
     controls = {
         "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
-        "K_P": log_slider("gain in N m/rad", 2.0, 50.0, 7.05),
+        "K_P": log_slider("K_P in N m/rad", 2.0, 50.0, 7.05),
         "limit": slider("torque limit in mN m", 40, 400, 10, 150),
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),

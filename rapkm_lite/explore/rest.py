@@ -71,7 +71,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
-    controls |= {f"K_P_{i + 1}": log_slider(f"gain {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
+    controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
     middle = np.round(500 * robot.base.mean(axis=0)).astype(int) * 2
     controls |= place_sliders(int(middle[0]), int(middle[1]))
     layout = [["plane", "error"], ["rest", "torque"]]
@@ -138,7 +138,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
     controls |= {
-        "K_P": log_slider("gain in N m/rad", 1.0, 50.0, 7.05),
+        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
         "x": slider("desired x in mm", -100, 100, 5, 20),
         "y": slider("desired y in mm", -100, 100, 5, 30),
     }
@@ -223,7 +223,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
-        "K_P": log_slider("gain in N m/rad", 1.0, 30.0, 7.05),
+        "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
         "side": slider("side of the triangle in mm", 20, 240, 10, 120),
         "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
     }

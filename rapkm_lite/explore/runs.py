@@ -71,7 +71,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {
-        "K_P": log_slider("gain in N m/rad", 1.0, 50.0, 7.05),
+        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
         "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
         "filter": choice("antagonism filter", LAWS.keys()),
         "friction": switch("friction", True),

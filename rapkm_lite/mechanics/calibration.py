@@ -221,11 +221,13 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         unexplained = math.sqrt(max(left @ left - explained @ explained, 0.0))
         rank = int(np.sum(sigma > max(1e-8, 10 * max(step, noise or 0.0, unexplained)) * sigma[0]))
         if rank < basis.shape[1]:
-            raise _refusal(unknown_names(N)[:count], basis, sigma, Vt, explained, rank)
+            spread = max(step, noise or 0.0, unexplained) / math.sqrt(len(angles)) / sigma[:rank]
+            raise _refusal(robot, basis, Vt[:rank], explained[:rank] / sigma[:rank], spread, p - nominal[:count])
         move = -Vt.T @ (explained / sigma)
         p = p + basis @ move
         machine = changed(robot, p)
-        if np.abs(move).max() < 1e-13:
+        # No step gets smaller than its rounding.
+        if np.abs(move).max() < 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]:
             break
     else:
         raise ConvergenceError(
@@ -261,20 +263,18 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     )
 
 
-def _refusal(names, basis, sigma, Vt, explained, rank: int) -> CalibrationError:
-    needed = basis.shape[1]
-    known = Vt[:rank] @ np.linalg.pinv(basis)
-    size = np.linalg.norm(known, axis=-1)
-    known, value = known / size[:, None], -explained[:rank] / sigma[:rank] / size
-    sums = []
-    for row, number in zip(known[:3], value, strict=False):
-        terms = " ".join(f"{c:+.3f} {name}" for c, name in zip(row, names, strict=True) if abs(c) > 5e-4)
-        sums.append(f"{terms} = {number:.4g}")
-    return CalibrationError(
+def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
+    """What is known: combinations `rows` of the last step in `basis`, after all that was `moved` before."""
+    rank, needed = len(rows), basis.shape[1]
+    known = rows @ np.linalg.pinv(basis)
+    value = known @ moved - step
+    Q, R = np.linalg.qr(known.T)  # orthonormal in radians and metres, too
+    sign = np.where(np.diagonal(R) < 0.0, -1.0, 1.0)
+    known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value), unknown_names(robot.n_arms)
+    spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
+    terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])
+    words = (
         f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so more places and "
-        f"further apart, or fewer unknowns. Known to first order, in rad and m: {'; '.join(sums)}",
-        rank,
-        needed,
-        known,
-        value,
-    )
+        f"further apart, or fewer unknowns. Known to first order, in rad and m: "
+    ) + "; ".join(f"{sum_} = {number:.4g} ± {s:.2g}" for sum_, number, s in zip(terms, value, spread, strict=False))
+    return CalibrationError(words, rank, needed, known, value)

@@ -13,7 +13,6 @@ import numpy as np
 from ..machine.arguments import ConvergenceError
 from ..machine.manipulator import Manipulator
 from . import cores
-from .antagonism import null_basis
 from .at import At
 from .closure import estimate_pose
 from .kinematics import cross, unit_vector
@@ -93,7 +92,7 @@ def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
     columns[:, i, N + 2 * i + 1] = -l2 / lever
     for axis in (0, 1):
         columns[:, i, 3 * N + 2 * i + axis] = -d[..., axis] / lever
-    n = null_basis(pose.A)
+    n = np.linalg.qr(pose.A, mode="complete")[0][..., 2:]
     left = np.einsum("kij,ki->kj", n, cores.wrap(angles - pose.q[:, :N])).ravel()
     return left, -(n.mT @ columns[..., :count]).reshape(len(left), count)
 

@@ -83,6 +83,11 @@ def _arm(robot: Manipulator, i: int, pose: np.ndarray) -> str:
     load = robot.load if i == 1 else 0.0
     mass, centre = m2 + load, (m2 * c2 + load * l2) / (m2 + load)
     inertia = i2 + m2 * (c2 - centre) ** 2 + load * (l2 - centre) ** 2
+    if min(i1, inertia) < 1e-14:
+        raise ValueError(
+            f"inertias of arm {i + 1} are {i1:g} and {inertia:g} kg m^2 about the centres of its links; allowed: 1e-14 "
+            "or more, MuJoCo knows no thin mass"
+        )
     tip = f'        <site name="tip{i + 1}" pos="{l2:.17g} 0 0"/>\n'
     base, elbow = pose.reshape(2, -1)[:, i]
     distal = _link(f"elbow{i + 1}", elbow, [l1, 0.0, 0.0], l2, mass, centre, inertia, 0.0, tip)

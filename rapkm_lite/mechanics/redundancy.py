@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, tall_matrix
+from ..machine.arguments import bounded, check_leading, exact_array, matvec, positive_definite, real_array, tall_matrix
 from ..machine.manipulator import Manipulator
 from .actuation import prestress_projector, weighted_pseudoinverse
-from .antagonism import null_basis
 from .at import at
 
 
@@ -44,7 +43,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
             "inside the force polygon of the limits"
         )
     # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.
-    n = null_basis(A)
+    n = np.linalg.qr(A, mode="complete")[0][:, A.shape[1] :]
     n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ W @ n)).T
     G, h = np.concatenate([-n, n]), np.concatenate([best - limit, -best - limit])
     size = np.abs(h).max()
@@ -117,9 +116,10 @@ def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
     """
     pose = at(robot, q)
     A, N = pose.A, robot.n_arms
-    K = A.mT @ positive_definite("K_P", K_P, N) @ A
+    gain, c = positive_definite("K_P", K_P, N), None if c is None else real_array("c", c, N)
+    check_leading(q=A.shape[:-2], K_P=gain.shape[:-2], c=() if c is None else c.shape[:-1])
+    K = A.mT @ gain @ A
     if c is not None:
-        c = real_array("c", c, N)
         K = K - np.einsum("...i,...ikl->...kl", c, base_angle_hessians(robot, pose.q))
     return K
 

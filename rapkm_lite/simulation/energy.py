@@ -106,7 +106,7 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     trajectory = of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
     if trajectory.n_arms != manipulator(robot).n_arms:
         raise ValueError(f"trajectory has {trajectory.n_arms} arms, robot has {robot.n_arms}; allowed: the same number")
-    A = control_matrix(robot, trajectory.q)
+    A = control_matrix(robot, trajectory.for_robot(robot).q)
     K_0 = -np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
     weight = robot.resistance / robot.torque_constant**2
     return np.einsum("kij,i,kil->jl", K_0[:-1], weight, K_0[:-1]) * trajectory.dt

@@ -273,5 +273,6 @@ def _name(law) -> str:
 
 def _replaced(law, **changes):
     """A law with changes to the law within its filter, or to itself."""
-    inner = dataclasses.replace(inner_law(law), **changes)
-    return inner if law is inner_law(law) else dataclasses.replace(law, law=inner)
+    if law is inner_law(law):
+        return dataclasses.replace(law, **changes)
+    return dataclasses.replace(law, law=_replaced(law.law, **changes))

@@ -72,5 +72,5 @@ def swinging(c: np.ndarray) -> float:
 
 
 def inner_law(law):
-    """The law within a filter, or the law itself."""
-    return getattr(law, "law", law)
+    """The law within all filters, or the law itself."""
+    return inner_law(law.law) if hasattr(law, "law") else law

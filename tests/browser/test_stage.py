@@ -394,7 +394,8 @@ def test_note_says_how_a_number_was_read_that_was_typed_or_left(left, shown):
     enter = (lambda: leave(notebook)) if left else (lambda: notebook.page.keyboard.press("Enter"))
     written = [
         ("31", 32, "31 was rounded to 32"), ("abc", 32, "abc was not read, it stays 32"), ("40", 40, ""),
-        ("3,5", 4, "3,5 was read as 4"), ("", 4, "an empty field was not read, it stays 4"), ("−31", -30, "−31 was rounded to −30"),
+        ("3,5", 4, "3,5 was read as 4"),
+        ("", 4, "an empty field was not read, it stays 4"), ("−31", -30, "−31 was rounded to −30"),
         ("999", 200, "999 was rounded to 200"), ("1e2", 100, ""), ("0", 0, ""),
     ]  # fmt: skip
     for text, x, note in written:

@@ -251,8 +251,9 @@ def test_on_its_path_the_machine_is_taken_from_where_it_is(browser, address):
 # Frames whose time stamp is that of the frame before, and all numbers that were ever shown.
 EARLY = """const next = requestAnimationFrame; window.all = [];
 requestAnimationFrame = window.requestAnimationFrame = f => next(t => f(t - 20));
-addEventListener('DOMContentLoaded', () => new MutationObserver(() => all.push(
-    document.querySelector('.rapkm-numbers')?.textContent ?? '')).observe(document, { childList: true, subtree: true }));"""
+const see = () => all.push(document.querySelector('.rapkm-numbers')?.textContent ?? '');
+addEventListener('DOMContentLoaded', () =>
+    new MutationObserver(see).observe(document, { childList: true, subtree: true }));"""
 
 
 def test_playing_shows_numbers_from_the_first_frame_on_and_a_hand_stops_it(browser, address):
