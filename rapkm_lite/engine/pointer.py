@@ -119,7 +119,8 @@ def pointer(function, N: int, matrices: bool, memory: int):
         found = [signature.return_type for signature in getattr(law, "nopython_signatures", ())]
         words = refusal(function, error, found[0] if found else None)
         name = getattr(function, "__name__", type(function).__name__)
+        plain = "a rk.Law whose step calls it" if matrices or memory else "the same function without @compiled"
         raise ValueError(
             f"the law {name} cannot be compiled ({words}); allowed: a function of numbers and NumPy arrays that "
-            f"returns c ({N},), or in Python a rk.Law whose step calls it"
+            f"returns c ({N},), or {plain}, which runs in Python"
         ) from error
