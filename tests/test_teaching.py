@@ -35,6 +35,18 @@ def test_generated_pages_are_up_to_date(name):
     assert kept == teaching.PAGES[name]().rstrip() + "\n", "run: python notebooks/build.py teaching"
 
 
+def test_the_answer_to_a_question_inside_a_lesson_stands_behind_it():
+    """No question takes the answer of the one before it: in the lesson it comes later than the question."""
+    page = teaching.predictions_page()
+    for notebook in teaching.lessons().values():
+        told = page.split(f"## {teaching.title(notebook)}\n")[1].split("\n## ")[0]
+        lesson = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+        for question, answer in re.findall(r"^(\*\*(?:Predict|Before).*?)\n\n((?:>.*\n?)+)", told, re.M | re.S):
+            first = answer.lstrip("> ").split("\n")[0]
+            if "](" not in first and not first.startswith("The cell that follows"):
+                assert lesson.index(question.split("\n")[0]) < lesson.index(first), question
+
+
 def test_exam_has_39_items_with_answers_and_marks():
     assert list(ITEMS) == list(range(1, 40))
     marks = [int(re.search(r"\((\d+) marks\)", body)[1]) for body in ITEMS.values()]

@@ -42,14 +42,19 @@ def headings(notebook) -> list[tuple[str, str, str]]:
 
 def sections_of_exercises(notebook) -> dict[str, str]:
     """Exercise -> the heading it stands under, of a section or a folded part."""
-    here, found = "", {}
+    here, section, found = "", "", {}
     for cell in notebook.cells:
         if cell.cell_type == "code":
             for name in _CHECK.findall(cell.source):
                 found.setdefault(name, here)
             continue
         for level, heading, _ in _HEADING.findall(cell.source):
-            here = heading if level == "##" or heading.startswith("Dig deeper") else here
+            section = heading if level == "##" else section
+            # A folded part ends where an exercise has a heading of the same level.
+            if heading.startswith("Dig deeper"):
+                here = heading
+            elif level == "##" or (level == "###" and heading.startswith("Exercise")):
+                here = section
     return found
 
 
@@ -124,9 +129,14 @@ def predictions_page() -> str:
             if not asked:
                 continue
             behind = [c.source for c in cells[k : k + 5] if c.cell_type == "markdown"]
-            found = _DETAILS.search("\n".join(behind))
-            answer = found[1].strip() if found else "The cell that follows prints or draws the answer."
-            text += [*asked, "", "> " + answer.replace("\n", "\n> "), ""]
+            # Each question has the next answer behind it; questions in a row share theirs.
+            found = [_DETAILS.search("\n".join(behind), cell.source.find(block)) for block in asked]
+            for j, (block, one) in enumerate(zip(asked, found, strict=True)):
+                text.append(block)
+                if j + 1 < len(asked) and one and found[j + 1] and one.start() == found[j + 1].start():
+                    continue
+                answer = one[1].strip() if one else "The cell that follows prints or draws the answer."
+                text += ["", "> " + answer.replace("\n", "\n> "), ""]
     return re.sub(r"\]\((?![a-z]+:|#)", "](../../notebooks/", "\n".join(text))
 
 

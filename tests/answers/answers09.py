@@ -73,6 +73,12 @@ ANSWERS = {
         ("right", "middle and half, a list", with_absolute_values),
         ("close", "steps of a tenth of a mN m", by_samples),
         ("wrong", "n taken as positive", lambda c, n, m: np.array([((-m - c) / n).max(), ((m - c) / n).min()]), "sign"),
+        (
+            "wrong",
+            "over the size of n",
+            lambda c, n, m: np.array([((-m - c) / abs(n)).max(), ((m - c) / abs(n)).min()]),
+            "absolute value",
+        ),
         ("wrong", "any drive", lambda c, n, m: np.array([tasks.ends(c, n, m).min(), tasks.ends(c, n, m).max()]), "any"),
         ("wrong", "sorted", lambda c, n, m: np.sort(tasks.room(c, n, m)), "nothing fits"),
         ("wrong", "reversed", lambda c, n, m: tasks.room(c, n, m)[::-1], "order"),
@@ -105,6 +111,7 @@ ANSWERS = {
     ],
     "09.quiet_gears": [
         ("right", "the least prestress that does it", tasks.quiet_gears),
+        ("right", "a constant one of the other sign", lambda A, f: tasks.smallest(A, f) - 0.05 * rk.null_basis(A)[:, 0]),
         ("right", "linear programme between both limits", both_ends),
         ("right", "all negative, as a list", lambda A, f: list(all_negative(A, f))),
         ("close", "a shade too little", little(3.9e-3)),

@@ -27,6 +27,9 @@ EXERCISES = {
             "for a negative n_i the inequality turns around: the sign of n_i decides which end is the lower one": (
                 lambda c, n, limit: np.array([tasks.ends(c, n, limit)[0].max(), tasks.ends(c, n, limit)[1].min()])
             ),
+            "divided by |n_i|: for a negative n_i the inequality turns around, which its absolute value hides": (
+                lambda c, n, limit: np.array([((-limit - c) / np.abs(n)).max(), ((limit - c) / np.abs(n)).min()])
+            ),
             "this is where any one drive is within its limit; all have to be: the largest of the lower ends, the "
             "smallest of the upper ones": (
                 lambda c, n, limit: np.array([tasks.ends(c, n, limit).min(), tasks.ends(c, n, limit).max()])
@@ -90,7 +93,7 @@ EXERCISES = {
         hints=(
             "Which of your two earlier functions looks at the lower limit, and which at the upper one?",
             "On top of the torques of least size, c + mu n: the smallest mu that lifts every drive to 5 mN m, anew at "
-            "every pose, is the cheapest. A constant one must serve the worst moment all the time.",
+            "every pose, is the cheapest of its sign. A constant one must serve the worst moment all the time.",
             "return one_sign(A, f, 5e-3)",
         ),
         unit="",

@@ -111,7 +111,11 @@ def plot_accelerations(robot, places, limit: float, axes=None):
                 label=f"pair {pair_name(pair)}",
             )
         size = max(size, 1.1 * np.abs(whole).max())
-        ax.set(title=f"at ({1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}) mm", xlabel="acceleration in x in m/s²", aspect="equal")
+        ax.set(
+            title=f"at ({1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}) mm".replace("-", "−"),
+            xlabel="acceleration in x in m/s²",
+            aspect="equal",
+        )
     for ax in axes:
         ax.set(xlim=(-size, size), ylim=(-size, size))
     axes[0].set_ylabel("acceleration in y in m/s²")

@@ -38,7 +38,7 @@ def room_cases(rng) -> list[tuple]:
     cases, limit = [], np.array([0.08, 0.1, 0.05])
     for label, name, x, size in (
         ("the centre", "testbed", [0.0, 0.0], 0.04),
-        ("a pose where n has both signs", "testbed", [0.09, 0.07], 0.04),
+        ("a pose where n has both signs", "testbed", [0.05, 0.14], 0.04),
         ("a load that no prestress fits", "testbed", [0.02, -0.01], 0.3),
         ("three different arms", "asymmetric", [0.01, 0.02], 0.04),
     ):
@@ -155,9 +155,9 @@ def without_prestress(answer) -> bool:
 
 
 def with_a_constant_one(answer) -> bool:
-    """The share along n is the same all the way."""
+    """The share along n is the same all the way, and pulls to the dear side, where the worst moment is too much."""
     share = [null_basis(A)[:, 0] @ chosen(answer, A, f) for A, f in probes()]
-    return not without_prestress(answer) and float(np.ptp(share)) < 1e-5
+    return not without_prestress(answer) and float(np.ptp(share)) < 1e-5 and share[0] > 0.0
 
 
 def another_force(answer) -> bool:
