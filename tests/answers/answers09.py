@@ -111,7 +111,7 @@ ANSWERS = {
     ],
     "09.quiet_gears": [
         ("right", "the least prestress that does it", tasks.quiet_gears),
-        ("right", "a constant one of the other sign", lambda A, f: tasks.smallest(A, f) - 0.05 * rk.null_basis(A)[:, 0]),
+        ("right", "a constant negative one", lambda A, f: tasks.smallest(A, f) - 0.05 * rk.null_basis(A)[:, 0]),
         ("right", "linear programme between both limits", both_ends),
         ("right", "all negative, as a list", lambda A, f: list(all_negative(A, f))),
         ("close", "a shade too little", little(3.9e-3)),

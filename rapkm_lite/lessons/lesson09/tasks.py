@@ -38,7 +38,7 @@ def room_cases(rng) -> list[tuple]:
     cases, limit = [], np.array([0.08, 0.1, 0.05])
     for label, name, x, size in (
         ("the centre", "testbed", [0.0, 0.0], 0.04),
-        ("a pose where n has both signs", "testbed", [0.05, 0.14], 0.04),
+        ("a pose where n has both signs", "testbed", [0.05, 0.17], 0.04),
         ("a load that no prestress fits", "testbed", [0.02, -0.01], 0.3),
         ("three different arms", "asymmetric", [0.01, 0.02], 0.04),
     ):
