@@ -157,7 +157,7 @@ def without_prestress(answer) -> bool:
 def with_a_constant_one(answer) -> bool:
     """The share along n is the same all the way, and pulls to the dear side, where the worst moment is too much."""
     share = [null_basis(A)[:, 0] @ chosen(answer, A, f) for A, f in probes()]
-    return not without_prestress(answer) and float(np.ptp(share)) < 1e-5 and share[0] > 0.0
+    return not without_prestress(answer) and float(np.ptp(share)) < 1e-5 and float(share[0]) > 0.0
 
 
 def another_force(answer) -> bool:
