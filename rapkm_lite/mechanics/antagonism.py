@@ -72,7 +72,7 @@ def null_basis(A) -> np.ndarray:
     A = tall_matrix("A", A)
     m, delta = A.shape[-2:]
     cores.full_rank("A", A)
-    anywhere = np.linalg.qr(A, mode="complete")[0][..., delta:]
+    anywhere = cores.null_space(A)
     if m > delta:
         # Any orthonormal basis, turned by U: the columns of U but the last from its components along the references.
         # With @ one pose takes the steps of many; `product` would round otherwise.

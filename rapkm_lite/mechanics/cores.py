@@ -170,6 +170,11 @@ def generalized_forces(tree: Tree, v: np.ndarray, qd: np.ndarray, v0: float) -> 
     return linear(v, tree.weight) + tree.friction * np.tanh(qd / v0)
 
 
+def null_space(A: np.ndarray) -> np.ndarray:
+    """Some orthonormal basis of the torques that move nothing, (..., m, m - delta) for A (..., m, delta)."""
+    return np.linalg.qr(A, mode="complete")[0][..., A.shape[-1] :]
+
+
 def row_space(J: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Q1 (..., n, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
 

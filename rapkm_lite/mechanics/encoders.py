@@ -92,7 +92,7 @@ def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
     columns[:, i, N + 2 * i + 1] = -l2 / lever
     for axis in (0, 1):
         columns[:, i, 3 * N + 2 * i + axis] = -d[..., axis] / lever
-    n = np.linalg.qr(pose.A, mode="complete")[0][..., 2:]
+    n = cores.null_space(pose.A)
     left = np.einsum("kij,ki->kj", n, cores.wrap(angles - pose.q[:, :N])).ravel()
     return left, -(n.mT @ columns[..., :count]).reshape(len(left), count)
 

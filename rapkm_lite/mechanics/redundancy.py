@@ -10,6 +10,7 @@ import numpy as np
 
 from ..machine.arguments import bounded, check_leading, exact_array, matvec, positive_definite, real_array, tall_matrix
 from ..machine.manipulator import Manipulator
+from . import cores
 from .actuation import prestress_projector, weighted_pseudoinverse
 from .at import at
 
@@ -43,7 +44,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
             "inside the force polygon of the limits"
         )
     # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.
-    n = np.linalg.qr(A, mode="complete")[0][:, A.shape[1] :]
+    n = cores.null_space(A)
     n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ W @ n)).T
     G, h = np.concatenate([-n, n]), np.concatenate([best - limit, -best - limit])
     size = np.abs(h).max()
