@@ -3,9 +3,9 @@
     python notebooks/slides.py 04                # writes slides_04.html
     python notebooks/slides.py 04 talk.html
 
-Made from the stored headings, formulas, pictures, questions and exercises; folded parts are left out, answers stay
-closed until somebody clicks.  Arrow keys turn the pages, the browser prints one page per slide.  Formulas need
-``latex2mathml`` (in ``docs/requirements.txt``).
+Made from the stored headings, formulas, pictures, questions and exercises; folded parts are left out.  Each question
+keeps its answers, closed until somebody clicks or presses A, which opens the next one and then closes all.  Arrow keys
+turn the pages, the browser prints one page per slide.  Formulas need ``latex2mathml`` (in ``docs/requirements.txt``).
 """
 
 from __future__ import annotations

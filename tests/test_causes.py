@@ -346,6 +346,13 @@ def test_a_right_model_and_right_encoders_are_not_blamed():
     assert "controller's model" not in said and "offset =" not in said
 
 
+@pytest.mark.parametrize("offset", [None, OFFSET], ids=["none", "some"])
+def test_offsets_are_to_be_looked_at_where_there_are_any(offset):
+    """Gains that throw the machine out within the first sample, so that no loop near the desired state is left."""
+    said = lost(law=rk.PD(1e99, 1e99), path=HOLD, **({} if offset is None else {"offset": offset}))
+    assert "look at gains" in said and ("offsets" in said) == (offset is not None)
+
+
 @pytest.mark.parametrize(
     ("options", "words", "named"),
     [

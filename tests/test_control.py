@@ -7,7 +7,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, norm, random_motion, random
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
-from rapkm_lite.control.computed_torque import joint_gain
+from rapkm_lite.control.grammar import joint_gain
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
@@ -503,6 +503,12 @@ def test_gains_of_driven_joints_are_positive_each(gains):
     with pytest.raises(ValueError, match=r"K_P\[1\] = (0|-1); allowed: > 0"):
         joint_gain("K_P", gains, 3)
     assert np.array_equal(joint_gain("K_P", [1.0, 2.0, 3.0], 3), np.diag([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]))
+
+
+def test_a_gain_of_no_known_shape_is_told_all_of_them():
+    law, path = rk.RedundantCTC([400.0, 400.0], 40.0), rk.hold(FRICTIONLESS, [0.0, 0.0], 0.01)
+    with pytest.raises(ValueError, match=r"K_P has shape \(2,\); allowed: one number, \(3,\) on the drives, \(6,\)"):
+        rk.simulate(FRICTIONLESS, law, path)
 
 
 class Slowly(rk.AntagonismFilter):

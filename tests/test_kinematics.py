@@ -132,6 +132,17 @@ def test_close_loops_finds_the_nearest_configuration(robot):
         assert_allclose(found, peer.x, atol=1e-6)
 
 
+@pytest.mark.parametrize("far", [1e2, 1e5])
+def test_loops_close_far_from_the_origin(far):
+    """A machine that is moved has the same nearest configuration, to what its coordinates are rounded to."""
+    moved = TESTBED.replace(base=TESTBED.base + [far, -far])
+    rough = rk.inverse_kinematics(TESTBED, [0.03, -0.02]) + 0.1 * np.cos(np.arange(6))
+    closed = rk.close_loops(moved, rough)
+    assert_allclose(closed, rk.close_loops(TESTBED, rough), atol=20 * np.spacing(far) / TESTBED.lengths.min())
+    assert np.abs(rk.loop_constraints(moved, closed)).max() < 4 * np.spacing(far)
+
+
+
 def test_close_loops_squares_its_error():
     """Newton's method: 0.1 rad, then about 1e-2, 1e-4, 1e-8, and below the tolerance, in five steps."""
     rng = np.random.default_rng(0)

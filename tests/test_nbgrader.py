@@ -1,6 +1,7 @@
 """The export for nbgrader, and nbgrader itself on a lesson where it is installed (the extra `nbgrader`)."""
 
 import importlib.util
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 from rapkm_lite.checks import exercises
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+sys.path.insert(0, str(NOTEBOOKS))
 SOLVED = sorted((NOTEBOOKS / "solutions").glob("*.ipynb"))
 LESSON = "04_antagonism_filter_energy"
 INSTALLED = importlib.util.find_spec("nbgrader") is not None
@@ -40,6 +42,38 @@ def test_every_exercise_has_a_locked_cell_with_its_points(path, course):
             assert cell.metadata.nbgrader.locked and 'check("' in cell.source
 
 
+def links(folder):
+    """(page, target) of the links in the notebooks and pages of an assignment."""
+    for path in folder.iterdir():
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".ipynb":
+            text = "\n".join(c.source for c in nbformat.reads(text, as_version=4).cells if c.cell_type == "markdown")
+        yield from ((path, target) for target in re.findall(r"\]\(([^)\s]+)\)", text))
+
+
+def assert_links_hold(folder):
+    found = [(path, target) for path, target in links(folder) if not re.match("[a-z]+:", target)]
+    assert found
+    for path, target in found:
+        name, _, anchor = target.partition("#")
+        assert "/" not in name and (folder / name).is_file(), f"{path}: {target}"
+        assert not anchor or f'<a id="{anchor}"></a>' in (folder / name).read_text(encoding="utf-8"), target
+
+
+@pytest.mark.parametrize("path", SOLVED, ids=lambda path: path.stem)
+def test_links_hold_inside_the_folder_of_an_assignment(path, course):
+    assert_links_hold(course / "source" / path.stem)
+
+
+def test_a_link_that_leads_out_of_an_assignment_becomes_its_words():
+    from workshop.nbgrader import linked
+
+    assert linked("in [lesson 07](07_x.ipynb), the [overview](../00_x.ipynb)") == "in lesson 07, the overview"
+    assert linked("[errata](../errata.md#eq-14), [a](https://b.c), ![d](e.png)") == (
+        "[errata](errata.md#eq-14), [a](https://b.c), ![d](e.png)"
+    )
+
+
 def nbgrader(course, *words):
     done = subprocess.run([sys.executable, "-m", "nbgrader", *words], cwd=course, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
@@ -50,6 +84,7 @@ def test_nbgrader_makes_the_assignment_and_grades_it(course):
     nbgrader(course, "generate_assignment", LESSON)
     released = (course / "release" / LESSON / f"{LESSON}.ipynb").read_text(encoding="utf-8")
     assert "SOLUTION" not in released and "RAPKM_LITE_STRICT" not in released
+    assert_links_hold(course / "release" / LESSON)
     solved = nbformat.read(course / "source" / LESSON / f"{LESSON}.ipynb", as_version=4)
     for student in ("blank", "mixed"):
         place = course / "submitted" / student / LESSON

@@ -11,8 +11,9 @@ NUMBERS = {(n.lesson, n.name): n for n in published.numbers()}
 
 
 def lesson(number):
-    """All that the authors wrote in a lesson, its outputs aside."""
-    file = next((Path(__file__).parents[1] / "notebooks").glob(f"{number}_*.ipynb"))
+    """All that the authors wrote in a lesson with its solutions, outputs aside."""
+    notebooks = Path(__file__).parents[1] / "notebooks"
+    file = next((notebooks / "solutions").glob(f"{number}_*.ipynb"), None) or next(notebooks.glob(f"{number}_*.ipynb"))
     return "\n".join("".join(cell["source"]) for cell in json.loads(file.read_text(encoding="utf-8"))["cells"])
 
 

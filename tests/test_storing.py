@@ -110,6 +110,23 @@ def test_comparison_of_outputs_ignores_the_neutral_line():
     assert re.sub(rule["regex"], rule["replace"], storing.COVER + "42\n") == "42\n"
 
 
+HIDDEN_CHECK = """for x in (6, 7):
+    n = 6 * x
+    np.testing.assert_allclose(n, twice(x + x + x), atol=1e-9)
+assert n == 42, (
+    "the answer"
+)
+np.testing.assert_allclose(n / 2, 21)
+print(n)"""
+
+
+def test_the_code_of_a_hidden_answer_does_not_tell_it_to_the_student():
+    copy = storing.student(lesson(code(HIDDEN_CHECK, tags=["hide-output"]), code(HIDDEN_CHECK)).notebook)
+    assert copy.cells[0].source == "\n".join([*HIDDEN_CHECK.splitlines()[:3], "print(n)"])
+    assert storing.unchecked("plotting.plot_n(n)\nassert n == 42") == "plotting.plot_n(n);"
+    assert copy.cells[1].source == HIDDEN_CHECK
+
+
 ANSWER = code("print(42)", tags=["hide-output"])
 ASK = "**Predict.** How many?"
 GOOD_QUESTIONS = {

@@ -54,6 +54,17 @@ def test_exam_has_39_items_with_answers_and_marks():
     assert all("**Answer.**" in body for body in ITEMS.values())
 
 
+def test_exam_says_which_lessons_its_items_go_with():
+    """Each item is asked for by a lesson of its half of the collection, but for those that the first lines name."""
+    lessons = {item: set() for item in ITEMS}
+    for row in teaching.course()["objective"]:
+        for item in row["exam"]:
+            lessons[item].add(row["lesson"])
+    strangers = {item for item, where in lessons.items() if not any((n <= "06") == (item <= 24) for n in where)}
+    named = re.search(r"except (\d+), which belongs to a folded part of lesson\s+(\d+)", EXAM)
+    assert strangers == {int(named[1])} and lessons[int(named[1])] == {named[2]}
+
+
 def test_map_names_every_item_exercise_and_lesson():
     course = teaching.course()
     rows = course["objective"]
@@ -203,12 +214,16 @@ def test_answers_before_the_slider():
         np.testing.assert_allclose(rk.steady_state_torque(A, 7.05, [5e-3, *others]), 0.0, atol=1e-12)
     path = rk.triangle(robot)
 
-    def waste(offsets, K_P=7.05):
-        return rk.antagonistic_energy(rk.simulate(robot, rk.PD(K_P, 0.225), path, offsets))
+    def run(offsets, K_P=7.05):
+        return rk.simulate(robot, rk.PD(K_P, 0.225), path, offsets)
 
-    alike = waste([5e-3, 5e-3, 5e-3])
-    assert alike > 5 * waste([5e-3, -5e-3, 0.0])
-    assert waste([5e-3, 5e-3, 5e-3], 14.1) / alike == pytest.approx(4, rel=0.05)
+    def waste(*told):
+        return rk.antagonistic_energy(run(*told))
+
+    alike, opposed = [5e-3, 5e-3, 5e-3], [5e-3, -5e-3, 0.0]
+    assert 4 < run(alike).energy.sum() / run(opposed).energy.sum() < 5
+    assert waste(alike) / waste(opposed) == pytest.approx(8, rel=0.05)
+    assert waste(alike, 14.1) / waste(alike) == pytest.approx(4, rel=0.05)
 
 
 def test_concept_test_has_ten_items_with_one_answer_each():
@@ -282,6 +297,70 @@ def test_slides_hold_questions_pictures_and_formulas_and_ask_for_nothing():
     question = page[page.index('class="question"') : page.index('class="picture"')]
     assert question.index("<details") < question.index("42") and "How many?" in question and "<details open" not in page
     assert not re.search(r"(?:src|href)=[\"'](?!data:)|url\(|@import|fetch\(", page), "a request to somewhere else"
+
+
+def test_the_answer_to_a_question_about_an_explorer_stands_closed_behind_it():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    def remark(text):
+        return f"<details><summary>Why</summary>\n\n{text}\n\n</details>"
+
+    still = nbformat.v4.new_output("display_data", {"text/html": '<img alt="A panel." src="data:,">'})
+    notebook = lesson_with(
+        nbformat.v4.new_markdown_cell("# 42 · Why?\n\n" + remark("A table of letters.")),
+        nbformat.v4.new_markdown_cell("## Try it (3 min)\n\n**Before you move it.** Which way?"),
+        nbformat.v4.new_code_cell("explore.panel()", outputs=[still]),
+        nbformat.v4.new_markdown_cell(remark("To the left, $x < 0$,\n\nand <b>down</b>.") + "\n\nSaid beside it."),
+        nbformat.v4.new_markdown_cell(
+            "### Exercise 1: turn\n\nTurn it so that\n\n- it stands\n\nor falls. " + 3 * "Long. "
+        ),
+        nbformat.v4.new_code_cell("film()", outputs=[still]),
+        nbformat.v4.new_markdown_cell(remark("What the film shows.")),
+    )
+    made = deck.slides(notebook)
+    assert [slide.kind for slide in made] == ["title", "question", "picture", "answer", "exercise", "picture"]
+    told = made[3].page()
+    assert told.index("Which way?") < told.index("<details") < told.index("To the left") < told.index("down")
+    assert "To the left" not in made[1].page() + made[2].page()
+    assert "<strong>Exercise 1: turn</strong></p>" in made[4].page() and "or falls." in made[4].page()
+    assert "What the film shows." in made[5].page()
+    page = deck.page(notebook)
+    assert "A table of letters" not in page and "Said beside it" not in page and "<details open" not in page
+
+
+@pytest.mark.parametrize("number", sorted(teaching.lessons()))
+def test_every_question_of_a_lesson_keeps_its_answer_on_the_slides(number):
+    """Closed, behind the question and before the next one."""
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    notebook = teaching.lessons()[number]
+    lesson = "\n\n".join(c.source for c in deck.core(notebook.cells) if c.cell_type == "markdown")
+    asked = re.split(r"^(?=\*\*(?:Predict|Before you)\b)", lesson, flags=re.M)[1:]
+    made = deck.slides(notebook)
+    places = [k for k, slide in enumerate(made) if slide.kind == "question"]
+    assert len(places) == len(asked)
+    for place, text in zip(places, asked, strict=True):
+        behind = itertools.takewhile(lambda slide: slide.kind in ("picture", "answer"), made[place + 1 :])
+        page = "".join(slide.page() for slide in [made[place], *behind])
+        folded = " ".join("".join(re.findall(r"<details>.*?</details>", page, re.S)).split())
+        assert folded, text.splitlines()[0]
+        # Up to the next heading or exercise each folded remark answers this question.
+        here = re.split(r"^##|^\*\*Exercise", text, flags=re.M)[0]
+        for answer in re.findall(r"</summary>(.*?)</details>", here, re.S):
+            words = max(re.findall(r"[a-z ,]+", " ".join(answer.split())), key=len).strip()
+            assert len(words) > 20 and words in folded, text.splitlines()[0]
+
+
+def test_every_exercise_of_the_slides_says_what_to_do():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    for notebook in teaching.lessons().values():
+        for slide in deck.slides(notebook):
+            if slide.kind == "exercise":
+                assert len(re.sub("<[^>]*>", "", "".join(slide.parts))) > 80, slide.parts
 
 
 @pytest.mark.parametrize("number", sorted(teaching.lessons()))

@@ -1,6 +1,7 @@
 """Slides of a lesson: one HTML file from its headings, formulas, pictures, questions and exercises; nothing is loaded.
 
-Formulas become MathML, which browsers show by themselves.  Folded parts are left out; answers stay closed.
+Formulas become MathML, which browsers show by themselves.  Folded parts are left out.  Each question keeps its answers,
+closed: on its own slide, or on one behind it where the picture of an explorer comes first.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _MATH = re.compile(r"\$\$(.+?)\$\$|(?<![\\$])\$([^$\n]+(?:\n[^$\n]+)?)\$", re.S)
 _HEADING = re.compile(r"^(#+) +(.*?)(?: *\(\d+ min\))? *$")
 _QUESTION = re.compile(r"\*\*(?:Predict|Before you)\b")
 _EXERCISE = re.compile(r"(?:### |\*\*)Exercise\b")
-_DETAILS = re.compile(r"<details>.*?</details>", re.S)
+_DETAILS = re.compile(r"(<details>.*?</details>)", re.S)
 _PAGE = Path(__file__).with_name("deck.html")
 _markdown = mistune.create_markdown(escape=False, plugins=["table", "strikethrough"])
 
@@ -48,7 +49,7 @@ def rendered(source: str) -> str:
 
 @dataclass
 class Slide:
-    """One slide: its kind (title, section, question, picture, exercise, list), heading and parts as HTML."""
+    """One slide: its kind (title, section, question, answer, picture, exercise), heading and parts as HTML."""
 
     kind: str
     heading: str
@@ -98,6 +99,13 @@ def core(cells: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
     return kept
 
 
+def blocks(source: str) -> list[str]:
+    """Paragraphs, lists and formulas of a Markdown cell, each folded remark in one piece."""
+    pieces = _DETAILS.split(source)
+    cut = [[piece] if k % 2 else re.split(r"\n\s*\n", piece) for k, piece in enumerate(pieces)]
+    return [block.strip() for piece in cut for block in piece if block.strip()]
+
+
 class _Deck:
     """Slides as they grow from cell to cell."""
 
@@ -105,14 +113,35 @@ class _Deck:
         self.slides: list[Slide] = []
         self.section = ""
         self.fresh = False  # nothing but the heading stands on the slide of the section so far
+        self.task = False  # the rest of the cell belongs to an exercise
+        self.asked: Slide | None = None  # the question that an answer belongs to
 
     def add(self, kind: str, heading: str, *parts: str) -> None:
+        # The next slide has the heading, too.
+        if self.slides and self.slides[-1].kind == "section" and not self.slides[-1].parts:
+            self.slides.pop()
         self.slides.append(Slide(kind, heading, [part for part in parts if part]))
-        self.fresh = False
+        self.fresh, self.task = False, kind == "exercise"
+        if kind not in ("picture", "answer"):
+            self.asked = self.slides[-1] if kind == "question" else None
+
+    def answer(self, part: str, behind: bool = False) -> None:
+        """Something closed for the question asked last in this section, or `behind` a picture for that picture."""
+        last = self.slides[-1] if self.slides else None
+        if last is None or not (self.asked or (behind and last.kind == "picture")):
+            return
+        if self.asked and last.kind == "picture":
+            self.add("answer", self.section, f'<div class="asked">{self.asked.parts[0]}</div>', part)
+        else:
+            last.parts.append(part)
 
     def prose(self, source: str) -> None:
-        for block in re.split(r"\n\s*\n(?![^<]*</details>)", source.strip()):
-            self.block(block.strip())
+        for number, block in enumerate(blocks(source)):
+            if block.startswith("<details"):
+                self.answer(rendered(block), behind=number == 0)
+            else:
+                self.block(block)
+        self.task = False
 
     def block(self, block: str) -> None:
         head = _HEADING.match(block.partition("\n")[0])
@@ -121,13 +150,10 @@ class _Deck:
             self.add("title" if len(head[1]) == 1 else "section", head[2])
             self.fresh = True
         elif _EXERCISE.match(block):
-            self.add("exercise", self.section, rendered(block.lstrip("# ")))
+            self.add("exercise", self.section, rendered(re.sub(r"^#+ (.*)\n?", r"**\1**\n\n", block)))
         elif _QUESTION.match(block):
             self.add("question", self.section, rendered(block))
-        elif block.startswith("<details"):
-            if self.slides and self.slides[-1].kind == "question":
-                self.slides[-1].parts.append(rendered(block))
-        elif self.slides and (self.fresh or self._belongs(block)):
+        elif self.slides and (self.fresh or self.task or self._belongs(block)):
             self.slides[-1].parts.append(rendered(block))
             self.fresh = False
 
@@ -138,8 +164,8 @@ class _Deck:
 
     def code(self, cell: nbformat.NotebookNode) -> None:
         if HIDDEN in cell.metadata.get("tags", []):
-            if self.slides and self.slides[-1].kind == "question":
-                self.slides[-1].parts.append(closed(cell))
+            if self.asked and (part := closed(cell)):
+                self.answer(part)
             return
         for output in pictures(cell):
             self.add("picture", self.section, shown(output))

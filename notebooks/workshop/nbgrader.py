@@ -1,5 +1,6 @@
 """The lessons as nbgrader's source: exercises as solution cells, each check in a locked cell of its own with points.
 
+An assignment is a folder of its own, and nbgrader hands out all of it: the pages that a lesson links to lie beside it.
 ``nbgrader generate_assignment`` and ``nbgrader autograde`` run on what ``export`` writes.
 """
 
@@ -13,7 +14,8 @@ import nbformat
 
 from rapkm_lite.checks import exercises
 
-from .layout import SOLUTIONS
+from .layout import NOTEBOOKS, SOLUTIONS
+from .storing import HIDDEN, unchecked
 
 # Comes back when nbgrader grades: a wrong answer raises, and the check is the package's own.
 _HIDDEN = """### BEGIN HIDDEN TESTS
@@ -23,6 +25,8 @@ from rapkm_lite.checks import check
 ### END HIDDEN TESTS
 """
 _REGION = re.compile(r"^### BEGIN SOLUTION *\n(.*?)^### END SOLUTION", re.M | re.S)
+_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\(([^)\s]+)\)")
+PAGES = ("equations.md", "errata.md")
 CONFIG = """c = get_config()
 c.CourseDirectory.course_id = "rapkm_lite"
 c.ExecutePreprocessor.timeout = 120
@@ -70,6 +74,18 @@ def blanks(source: str) -> str:
     return _REGION.sub(with_blanks, source)
 
 
+def linked(source: str) -> str:
+    """Links to the pages beside the lesson hold; those to other lessons, which may not be handed out, become words."""
+
+    def keep(link: re.Match) -> str:
+        target = link[2].removeprefix("../")
+        if target.partition("#")[0] in PAGES:
+            return f"[{link[1]}]({target})"
+        return link[0] if re.match("[a-z]+:|#", target) else link[1]
+
+    return _LINK.sub(keep, source)
+
+
 def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
     """The solved lesson as nbgrader's instructor version, without outputs."""
     copy = nbformat.reads(nbformat.writes(lesson), as_version=4)
@@ -77,9 +93,12 @@ def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
     cells = []
     for cell in copy.cells:
         if cell.cell_type != "code":
+            cell.source = linked(cell.source)
             cells.append(cell)
             continue
         cell.outputs, cell.execution_count = [], None
+        if HIDDEN in cell.metadata.get("tags", []):
+            cell.source = unchecked(cell.source)
         body, checks, rest = split(cell.source)
         if not checks and "### BEGIN SOLUTION" not in cell.source:
             cells.append(cell)
@@ -98,7 +117,10 @@ def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 
 def export(folder: Path, wanted: list[str]) -> list[Path]:
-    """Write FOLDER/source/04_title/04_title.ipynb for the lessons whose names begin so, and nbgrader's settings."""
+    """Write FOLDER/source/04_title/04_title.ipynb for the lessons whose names begin so, and nbgrader's settings.
+
+    Returns the notebooks.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
     made = []
@@ -107,5 +129,8 @@ def export(folder: Path, wanted: list[str]) -> list[Path]:
             place = folder / "source" / path.stem
             place.mkdir(parents=True, exist_ok=True)
             nbformat.write(assignment(nbformat.read(path, as_version=4)), place / path.name)
+            for page in PAGES:
+                text = (NOTEBOOKS / page).read_text(encoding="utf-8")
+                (place / page).write_text(linked(text), encoding="utf-8")
             made.append(place / path.name)
     return made

@@ -60,7 +60,15 @@ def sections_of_exercises(notebook) -> dict[str, str]:
 
 def minutes_page() -> str:
     """Minutes per section as the headings state them."""
-    text = [WRITTEN, "# Minutes per section\n"]
+    text = [
+        WRITTEN,
+        "# Minutes per section\n",
+        "The minutes are an estimate, not taken in a class: `python -m tests.minutes` counts 130 words of prose or 8",
+        "lines of code a minute, 0.7 minutes for a displayed formula, 1.5 for a figure and 10 for an exercise; a",
+        "heading may differ from its count by a minute or by 15 %. The core is what everybody reads. It is not the sum",
+        "of its sections, because the opening, which has no heading, takes two to six minutes more, and every number",
+        "is rounded by itself. Folded parts, in italics, and folded answers are not in the core.\n",
+    ]
     for notebook in lessons().values():
         core = re.search(r"\*\*Minutes:?\*\*:? *(\d+)", notebook.cells[0].source)
         text += [
@@ -105,7 +113,8 @@ def mistakes_page() -> str:
         "For each exercise the mistakes that its check calls by their name. Besides these every check knows the",
         "opposite sign, transposed answers, wrong units (factors 1000 and 180/π), rows or entries in another order, a",
         "forgotten factor, another frame, and the complement of the right answer. Which of them a class makes most",
-        "often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says.\n",
+        "often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says. The sentences stand",
+        "here as students read them in the notebook, in plain letters: A^T is the transpose, Gbar is $\\bar G$.\n",
     ]
     for name, exercise in sorted(exercises().items()):
         points = f"{exercise.points:g} points"

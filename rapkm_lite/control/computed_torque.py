@@ -37,7 +37,7 @@ from ..mechanics.dynamics import (
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .grammar import UNASKED, LawValue, gain, measured, seen
+from .grammar import UNASKED, LawValue, gain, joint_gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -270,11 +270,3 @@ def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarr
     lead = check_leading(**{name: part.shape[:-1] for name, part in parts.items()})
     elbows, rates, q_a, qd_a = (np.broadcast_to(part, (*lead, N)) for part in parts.values())
     return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)
-
-
-def joint_gain(name: str, K, N: int) -> np.ndarray:
-    """A gain in redundant coordinates as (2N, 2N); (N,) acts on the driven joints only."""
-    K = real_array(name, K)
-    if K.shape == (N,):
-        return np.diag(np.concatenate([bounded(name, K, 0.0, strict=True), np.zeros(N)]))
-    return positive_definite(name, K, 2 * N)

@@ -213,6 +213,16 @@ def gain(name: str, value, zero: bool = False) -> np.ndarray:
     return bounded(name, K, 0.0, strict=not zero) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
 
 
+def joint_gain(name: str, K, N: int) -> np.ndarray:
+    """A gain in redundant coordinates as (2N, 2N); (N,) acts on the driven joints only, as in (29)."""
+    K, n = real_array(name, K), 2 * N
+    if K.shape == (N,):
+        return np.diag(np.concatenate([bounded(name, K, 0.0, strict=True), np.zeros(N)]))
+    if K.shape not in ((), (n,)) and K.shape[-2:] != (n, n):
+        raise ValueError(f"{name} has shape {K.shape}; allowed: one number, ({N},) on the drives, ({n},) or ({n}, {n})")
+    return positive_definite(name, K, n)
+
+
 def measured(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
     """The measured base angles and rates, after a check that they fit the model and the desired motion."""
     q_a, qd_a = joint_vectors(manipulator(model, "model").n_arms, q_a=q_a, qd_a=qd_a)

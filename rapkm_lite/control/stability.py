@@ -19,7 +19,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
 from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
-from .computed_torque import joint_gain
+from .grammar import joint_gain
 
 
 def closed_loop_projector(A_tilde, delta: int = 2) -> np.ndarray:

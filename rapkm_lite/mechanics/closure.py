@@ -28,7 +28,8 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
     a local one: from a q more than half a radian off, another configuration may be nearer.
 
-    tolerance : largest closure error relative to the link length, and largest tangential remainder in rad.
+    tolerance : largest closure error relative to the link length, and largest tangential remainder in rad; where the
+        base is so far from the origin that its coordinates are rounded more coarsely, that rounding.
     Raises ConvergenceError with the residual and the pose.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
@@ -38,6 +39,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     q0 = real_array("q", q, manipulator(robot).n_joints)
     q, n, r = q0.copy(), robot.n_joints, robot.n_constraints
     scale, tolerance = robot.lengths.max(), small_number("tolerance", tolerance)
+    gap = max(tolerance * scale, 4.0 * np.spacing(np.abs(robot.base).max()))
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
         Q, R = np.linalg.qr(J.mT, mode="complete")
@@ -53,7 +55,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
         reduced = np.where(convex[..., None, None], reduced, np.eye(2))
         remainder = matvec(tangent.mT, gradient)
         rhs = remainder + np.where(convex[..., None], matvec(tangent.mT, matvec(hessian, back)), 0.0)
-        if max(np.abs(h).max(initial=0.0) / scale, np.abs(remainder).max(initial=0.0)) < tolerance:
+        if np.abs(h).max(initial=0.0) < gap and np.abs(remainder).max(initial=0.0) < tolerance:
             return q
         step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
         size = np.linalg.norm(step, axis=-1, keepdims=True)

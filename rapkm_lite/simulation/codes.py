@@ -9,6 +9,7 @@ import numpy as np
 
 from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
+from ..control.grammar import joint_gain
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
 
 
@@ -106,8 +107,6 @@ def _per(name: str, value, size: int) -> np.ndarray:
 
 
 def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gains of drives and elbows; (N,) acts on the driven joints only, as in (29)."""
-    if K.shape == (N,):
-        return K, np.zeros(N)
-    K = _per(name, K, 2 * N)
-    return K[:N], K[N:]
+    """Gains of drives and elbows."""
+    diagonal = np.diagonal(joint_gain(name, K, N))
+    return diagonal[:N], diagonal[N:]

@@ -50,7 +50,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         # In Python it did neither; what a compiled function raises does not leave it.
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
-    words = next(_causes(setup, law, k, written is None, c), "look at gains, offsets and the path")
+    words = next(_causes(setup, law, k, written is None, c), f"look at gains{_too(setup)} and the path")
     return f"{REASONS[status]} ({words})"
 
 
@@ -115,10 +115,8 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
     if factor is not None and factor > 1.001:
         yield f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
     if factor is not None:
-        yield (
-            f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at "
-            "offsets, a weak gain, or a path too near the boundary"
-        )
+        words = f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at a weak"
+        yield f"{words} gain{_too(setup)}, or a path too near the boundary"
 
 
 def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
@@ -195,6 +193,10 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
         yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
     if sensors.offset.any() and without(offset=0.0 * sensors.offset):
         yield f"{_offsets(setup)}, is too large here; with right encoders it is not lost"
+
+
+def _too(setup: Setup) -> str:
+    return ", offsets" if setup.sensors.offset.any() else ""
 
 
 def _offsets(setup: Setup) -> str:

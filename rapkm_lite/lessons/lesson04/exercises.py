@@ -77,7 +77,7 @@ def _command_cases(rng):
 def _command_law(got, A, K_P, q_measured, q_desired):
     force = A.T @ (K_P * (q_measured - got))
     wanted = A.T @ (K_P * (q_measured - q_desired))
-    return np.max(np.abs(force - wanted)), "the force at the end-effector is not the one of the plain PD drives (N)"
+    return np.max(np.abs(force - wanted)), "force at the end-effector less that of the plain PD drives (N)"
 
 
 def _command_with(change):

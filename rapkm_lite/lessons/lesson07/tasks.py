@@ -48,7 +48,7 @@ def off_the_normal(got, robot, q_a, guess) -> tuple[float, str]:
     q = estimate_pose(robot, q_a, guess)
     n = null_basis(control_matrix(robot, q))
     along = matvec(n.mT, q_a - q[..., : robot.n_arms])
-    return float(np.abs(np.linalg.norm(along, axis=-1) - got).max()), "it is not the part along the null space, in rad"
+    return float(np.abs(np.linalg.norm(along, axis=-1) - got).max()), "off the part along the null space, in rad"
 
 
 def delay_torque(A, xd, delay, K_P) -> np.ndarray:

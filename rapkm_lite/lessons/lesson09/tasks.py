@@ -52,7 +52,7 @@ def room_cases(rng) -> list[tuple]:
 def off_the_limits(got, c, n, limit) -> tuple[float, str]:
     """At either end of the room some drive stands exactly at its limit."""
     off = np.abs(np.abs(c + np.reshape(got, (2, 1)) * n) - limit)
-    return float(off.min(axis=1).max()), "at an end of the room no drive stands at its limit, by N m"
+    return float(off.min(axis=1).max()), "at the ends of the room the nearest limit of a drive is off by N m"
 
 
 def one_sign(A, f, least) -> np.ndarray:

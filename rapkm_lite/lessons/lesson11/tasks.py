@@ -49,7 +49,7 @@ def no_determinant(got, robot, q, K_P) -> tuple[float, str]:
     G, _, _ = minimal_dynamics(robot, q, 0 * q, None)
     stiffness = A.T @ (K_P[:, None] * A)
     left = [np.linalg.det(stiffness - (2 * np.pi * f) ** 2 * G) for f in np.ravel(got)]
-    return float(np.max(np.abs(left)) / np.linalg.det(stiffness)), "the characteristic polynomial does not vanish there"
+    return float(np.max(np.abs(left)) / np.linalg.det(stiffness)), "characteristic polynomial there, over its last term"
 
 
 def model_error(robot, model, q, qd, xd, xdd, K_P) -> np.ndarray:

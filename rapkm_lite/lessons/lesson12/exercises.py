@@ -51,7 +51,7 @@ EXERCISES = {
             "J' = J S^-1, N' = rk.projector(J'); a rate of yours goes to the colleague (S), through N', and back.",
             "S = np.diag(scale); np.linalg.inv(S) @ rk.projector(J @ np.linalg.inv(S)) @ S",
         ),
-        unit="",
+        unit="(without unit)",
         cases=tasks.unit_cases,
         invariant=tasks.no_projector,
         tolerance=1e-9,
