@@ -38,6 +38,7 @@ def execute(path: Path, strict: bool) -> None:
     from nbclient import NotebookClient
 
     os.environ["RAPKM_LITE_STRICT"] = "1" if strict else "0"
+    os.environ.pop("MPLBACKEND", None)  # with another backend than the notebook's no picture would be stored
     notebook = nbformat.read(path, as_version=4)
     for cell in notebook.cells:
         if cell.cell_type == "code":
@@ -80,6 +81,8 @@ if __name__ == "__main__":
         except ValueError as error:
             sys.exit(str(error))
     elif sys.argv[1:2] == ["nbgrader"]:
+        if len(sys.argv) < 3:
+            sys.exit("nbgrader needs a folder: python notebooks/build.py nbgrader FOLDER 04")
         nbgrader.export(Path(sys.argv[2]), sys.argv[3:])
     elif sys.argv[1:] == ["mystery"]:
         mystery.write()

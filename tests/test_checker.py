@@ -86,6 +86,23 @@ def test_what_fails_beyond_the_idea_is_close_and_the_label_is_said():
     assert judged(Exercise(scaled, ("a", "b", "c"), "N m", more), scaled).word == "ok"
 
 
+def test_what_stops_for_one_kind_of_case_only_says_for_which():
+    def kinds(rng):
+        return [Case("three entries", *case) for case in cases(rng)] + [Case("four", np.ones(4), np.arange(4.0), 2.0)]
+
+    known = Exercise(scaled, ("a", "b", "c"), "N m", kinds)
+    for answer in (lambda K, v, m: (K * v)[:3] / m, lambda K, v, m: np.cross(K, v) * m):
+        said = judged(known, answer)
+        assert said.word == "wrong" and said.sentence.endswith("; for four, while it goes through for three entries")
+    # What stops everywhere stops for no kind in particular.
+    assert "while it goes through" not in judged(known, lambda K, v, m: K[:2]).sentence
+
+
+@pytest.mark.parametrize("name", ["04.lean_law", "10.spare_law", "11.one_law"])
+def test_a_design_that_returns_nothing_is_not_tried_yet(name):
+    assert judged(exercises()[name], lambda robot: None).word == "todo"
+
+
 def test_a_design_is_judged_by_its_numbers_beside_their_limits():
     def judge(gain):
         return [Measured("error", 2.0 / gain, "mm", 1.0), Measured("margin", 10.0 - gain, "dB", 5.0, at_most=False)]

@@ -142,7 +142,6 @@ def test_loops_close_far_from_the_origin(far):
     assert np.abs(rk.loop_constraints(moved, closed)).max() < 4 * np.spacing(far)
 
 
-
 def test_close_loops_squares_its_error():
     """Newton's method: 0.1 rad, then about 1e-2, 1e-4, 1e-8, and below the tolerance, in five steps."""
     rng = np.random.default_rng(0)
@@ -280,3 +279,30 @@ def test_pose_of_readings_that_contradict_each_other_is_that_of_an_independent_s
         other = least_squares(apart, found, xtol=1e-15, ftol=1e-15, gtol=1e-15)
         assert_allclose(found, other.x, atol=1e-7)
         assert np.abs(rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, found)).T @ apart(found)).max() < 1e-10
+
+
+def test_the_pose_does_not_depend_on_which_arm_is_the_first():
+    """A permutation of the arms renames the drives, also where one proximal link is much shorter than the others."""
+    base, lengths = [[-0.3, -0.05], [0.25, -0.15], [0.0, 0.3]], [[0.02, 0.35], [0.3, 0.3], [0.3, 0.3]]
+    order, place, guess = [1, 2, 0], [-0.0439, 0.2149], [0.0273, 0.1098]
+    one = rk.Manipulator(base=base, lengths=lengths, masses=0.1)
+    other = rk.Manipulator(base=np.array(base)[order], lengths=np.array(lengths)[order], masses=0.1)
+    for robot in (one, other):
+        q = rk.inverse_kinematics(robot, place)
+        assert_allclose(rk.estimate_pose(robot, q[:3], guess), q, atol=1e-12)
+
+
+@pytest.mark.parametrize("far", [12.0, 1e3])
+def test_the_pose_is_found_far_from_the_origin(far):
+    """A machine with links of 2 mm that is moved by kilometres of its own size has the same pose and the same run."""
+    size, shift, offset = 0.01, np.array([far, 0.7 * far]), np.array([4e-3, -2e-3, 5e-3])
+    near = TESTBED.replace(base=size * TESTBED.base, lengths=size * TESTBED.lengths, masses=0.134 / size**2)
+    moved = near.replace(base=near.base + shift)
+    coarse = 100 * np.spacing(far) / near.lengths.min()
+    for x in size * np.random.default_rng(4).uniform(-0.05, 0.05, (20, 2)):
+        q_a = rk.inverse_kinematics(near, x)[:3] + offset
+        found = rk.estimate_pose(moved, q_a, shift)
+        assert_allclose(found, rk.estimate_pose(near, q_a, [0.0, 0.0]), atol=coarse)
+    law = rk.AntagonismFilter(rk.PD(7.0, 0.2))
+    run = rk.simulate(moved, law, rk.circle(moved, 0.05 * size, 0.2, centre=shift), offset)
+    assert_allclose(run.c, rk.simulate(near, law, rk.circle(near, 0.05 * size, 0.2), offset).c, atol=1e2 * coarse)

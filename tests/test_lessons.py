@@ -183,15 +183,25 @@ def test_readme_asks_the_question_of_the_lesson(path):
     number, question = title.removeprefix("# ").split(" · ", 1)
     assert number == path.stem[:2]
     readme = (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8")
-    assert f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
+    asked = f"[{path.stem}](notebooks/{path.name}) | {question} |" in readme
+    assert asked, f"README.md, row of {path.stem}: the question is {question!r}"
 
 
-def test_the_first_lesson_says_how_long_the_others_take():
+def said_by_the_first_lesson():
     start = nbformat.read(NOTEBOOKS / "00_start_here.ipynb", as_version=4)
     text = "\n".join(cell.source for cell in start.cells)
-    said = dict(re.findall(r"^\| \[.+\]\((\w+\.ipynb)\) \|.+\| (\d+) \|$", text, re.M))
-    lessons = {path.name: path for path in NUMBERED[1:]}
-    assert said == {name: str(shape.minutes.stated(nbformat.read(path, 4))) for name, path in lessons.items()}
+    return dict(re.findall(r"^\| \[.+\]\((\w+\.ipynb)\) \|.+\| (\d+) \|$", text, re.M))
+
+
+@pytest.mark.parametrize("path", NUMBERED[1:], **NAMES)
+def test_the_first_lesson_says_how_long_the_others_take(path):
+    minutes = str(shape.minutes.stated(nbformat.read(path, 4)))
+    said = said_by_the_first_lesson().get(path.name)
+    assert said == minutes, f"00_start_here.ipynb, table of lessons, row of {path.name}: {minutes} minutes"
+
+
+def test_the_first_lesson_names_no_lesson_that_is_not_there():
+    assert set(said_by_the_first_lesson()) == {path.name for path in NUMBERED[1:]}
 
 
 @pytest.mark.parametrize("path", NUMBERED, **NAMES)
@@ -203,6 +213,6 @@ def test_tables_agree_with_the_lesson(path):
         for line in (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8").splitlines()
         if line.startswith(f"| [{path.stem}]")
     ).split("|")
-    assert minutes and row[3].strip() == minutes[1]
+    assert minutes and row[3].strip() == minutes[1], f"README.md, row of {path.stem}: the lesson has other minutes"
     for name in re.findall(r"`([\w.]+)`", row[5]):
         assert re.search(rf"\b{re.escape(name)}\b", text), f"the README says that the lesson uses {name}"

@@ -72,16 +72,23 @@ def cells(text: str) -> list[nbformat.NotebookNode]:
     return made
 
 
+def with_row(text: str, rows: str, row: str) -> str:
+    """A text with one more row behind the last one that begins like `rows`; without such rows it stays as it is."""
+    lines = text.split("\n")
+    last = [k for k, line in enumerate(lines) if re.match(rows, line)][-1:]
+    return "\n".join(lines[: last[0] + 1] + [row] + lines[last[0] + 1 :]) if last else text
+
+
 def new(name: str) -> None:
     """Lay out a lesson: its source in ``solutions/``, its room in ``rapkm_lite/lessons/``, answers to its exercises in
-    ``tests/answers/``, its line in the README.
+    ``tests/answers/``, its lines in the README and in the first notebook.
 
     Raises ValueError when the name is not like 13_title or its number is taken.
     """
     number, _, words = name.partition("_")
     room = PACKAGE / "lessons" / f"lesson{number}"
     if not re.fullmatch(r"\d\d_[a-z0-9_]+", name):
-        raise ValueError(f"name = {name!r}; allowed: a number of two digits and words, like 13_title")
+        raise ValueError(f"name = {name!r}; allowed: a number of two digits and words in small letters, like 13_title")
     if room.exists():
         raise ValueError(f"name = {name!r}, but there is a lesson {number}; allowed: a number that no lesson has")
 
@@ -98,11 +105,15 @@ def new(name: str) -> None:
     notebook = nbformat.v4.new_notebook(cells=cells(filled(skeleton / "lesson.py")))
     tidy(notebook)
     nbformat.write(notebook, SOLUTIONS / f"{name}.ipynb")
-    readme = NOTEBOOKS.parent / "README.md"
     question = notebook.cells[0].source.splitlines()[0].removeprefix("# ").partition(" · ")[2]
-    lines = readme.read_text(encoding="utf-8").splitlines(keepends=True)
-    last = max(k for k, line in enumerate(lines) if re.match(r"\| \[\d\d_", line))
-    lines.insert(last + 1, f"| [{name}](notebooks/{name}.ipynb) | {question} | 46 | – | – |\n")
-    readme.write_text("".join(lines), encoding="utf-8")
+    readme, start = NOTEBOOKS.parent / "README.md", NOTEBOOKS / "00_start_here.ipynb"
+    text = readme.read_text(encoding="utf-8")
+    row = f"| [{name}](notebooks/{name}.ipynb) | {question} | 46 | – | – |"
+    readme.write_text(with_row(text, r"\| \[\d\d_", row), encoding="utf-8")
+    first = nbformat.read(start, as_version=4)
+    for cell in first.cells:
+        row = f"| [{number} {words.replace('_', ' ')}]({name}.ipynb) | {question} | 46 |"
+        cell.source = with_row(cell.source, r"\| \[\d\d [^]]+\]\(\d\d_", row)
+    nbformat.write(first, start)
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
     print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number} teaching")

@@ -175,10 +175,13 @@ def nearest(drives, arms, w, q_a, x, y):
 
 
 @outlined
-def rough_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
+def rough_newton(drives, arms, table, o, w, j, L, x, y):
     """Least-squares pose of one run from a rough start, as `estimate_pose` finds it; and whether it converged."""
     N, W = len(drives), len(arms)
-    most = 0.1 / w[at(MODEL + SCALE, 0, j, W, L)]
+    longest = 0.0
+    for i in range(N):
+        longest = max(longest, 1.0 / w[at(MODEL + SCALE, i, j, W, L)])
+    most, tolerance = 0.1 * longest, 1e-13 * longest + 2e-15 * (abs(x) + abs(y))
     x0, y0, px, py, least = x, y, 0.0, 0.0, 1e299
     for _ in range(100):
         m11 = m12 = m22 = h11 = h12 = h22 = fx = fy = square = -0.0
@@ -213,7 +216,6 @@ def rough_newton(drives, arms, table, o, w, j, L, x, y, tolerance):
 def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
     """Least-squares pose of the measured base angles, and A there (`estimate_pose`)."""
     L, W = len(lanes), len(arms)
-    tolerance = 1e-13 / w[at(MODEL + SCALE, 0, 0, W, L)]
     for j in range(L):
         x, y = w[of(PX, j, W, L)], w[of(PY, j, W, L)]
         x1, y1 = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
@@ -236,9 +238,8 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
     if rough > 0:
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
-                px, py, found = rough_newton(
-                    drives, arms, table, o, w, j, L, w[of(PX1, j, W, L)], w[of(PY1, j, W, L)], tolerance
-                )
+                x, y = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
+                px, py, found = rough_newton(drives, arms, table, o, w, j, L, x, y)
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
                     w[of(STATUS, j, W, L)], w[of(SAMPLE, j, W, L)] = NO_POSE, k

@@ -24,7 +24,7 @@ def judged(exercise: Exercise, answer: Any) -> Result:
             return _behaviour(exercise, answer)
         return _near_and_far(exercise, answer)
     except Ended as end:
-        return end.result
+        return end.result._replace(sentence=end.result.sentence + "".join(getattr(end, "__notes__", ())))
 
 
 def _unwrapped(answer: Any) -> Any:
@@ -60,13 +60,26 @@ def _near_and_far(exercise: Exercise, answer: Any) -> Result:
 
 def _seen(exercise: Exercise, answer: Any, cases: list[tuple]) -> Seen:
     """Given and right answers of all cases, in one shape; ends where they show a mistake that has a name."""
-    read = [numbers(given(answer, case)) for case in cases]
+    read = _each(cases, lambda k: numbers(given(answer, cases[k])))
     reference = exercise.reference
     assert callable(reference)
     want = [np.asarray(reference(*map(copied, case)), dtype=float) for case in cases]
     names = tuple(inspect.signature(reference).parameters)
     _known_mistake(exercise, Seen(read, want, cases, names))
-    return Seen([fitting(g, w.shape) for g, w in zip(read, want, strict=True)], want, cases, names)
+    return Seen(_each(cases, lambda k: fitting(read[k], want[k].shape)), want, cases, names)
+
+
+def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
+    """What `ask` gives for each case; where it ends, a note says for which kind, if another kind went through."""
+    labels, got = [getattr(case, "label", "") for case in cases], []
+    for k, label in enumerate(labels):
+        try:
+            got.append(ask(k))
+        except Ended as end:
+            if all(labels[: k + 1]) and label not in labels[:k] and k > 0:
+                end.add_note(f"; for {label}, while it goes through for {labels[0]}")
+            raise
+    return got
 
 
 def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:

@@ -121,6 +121,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     size, limit = np.full((*lead, 1), np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
+    limit += 8.0 * np.spacing(np.abs(robot.base).max() + robot.lengths.max())  # the rounding of x far from the origin
     q, residual, square = _misfit(robot, q_a, x)
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         if np.isinf(square).any():
@@ -131,8 +132,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         size = np.abs(step).max(axis=-1, keepdims=True)
         if size.max(initial=0.0) < limit:
             return q
-        # A tenth of a link at most, and halved where it leaves the workspace or the residuals grow.
-        step = step * np.minimum(1.0, 0.1 * robot.lengths[0, 0] / np.maximum(size, 1e-300))
+        # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
+        step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))
         for k in range(40):
             trial = _misfit(robot, q_a, x + step)
             worse = trial[2] > square + 1e-14

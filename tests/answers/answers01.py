@@ -334,6 +334,18 @@ def in_steps(robot, q, qd, c, independent):
     return list(F @ np.linalg.inv(F.T @ G @ F) @ (-F.T @ Q) + Fd @ qd_2)
 
 
+def in_coordinates(drives, motion):
+    """(6) with A and the equations of motion in coordinates of whatever is given, None the end-effector."""
+
+    def answer(robot, q, qd, c, pair):
+        A = rk.control_matrix(robot, q, drives and pair)
+        G, C, Q = rk.minimal_dynamics(robot, q, qd, motion and pair)
+        back = rk.orthogonal_complement_dot(robot, q, qd, pair) @ qd[pair]
+        return rk.orthogonal_complement(robot, q, pair) @ np.linalg.solve(G, A.T @ c - C @ qd[pair] - Q) + back
+
+    return answer
+
+
 ACCELERATIONS = [
     ("right", "as in the lesson", projected()),
     ("right", "with multipliers", with_multipliers),
@@ -378,6 +390,8 @@ ACCELERATIONS = [
         lambda robot, *case: projected()(robot.replace(friction=0.0), *case),
         "friction",
     ),
+    ("wrong", "A of the end-effector", in_coordinates(None, [0, 1]), "passed to it"),
+    ("wrong", "all of the end-effector", in_coordinates(None, None), "passed to them"),
     ("wrong", "degrees", lambda *case: np.rad2deg(projected()(*case)), "degrees"),
     ("wrong", "the base joints only", lambda *case: projected()(*case)[: case[0].n_arms], "shape"),
     ("wrong", "velocities", lambda robot, q, qd, c, pair: qd, "qd itself"),

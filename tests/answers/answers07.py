@@ -51,6 +51,11 @@ def spare(A, xd, delay, K_P):
     return c - A @ np.linalg.lstsq(A, c, rcond=None)[0]
 
 
+def by_the_cross_product(A, xd, delay, K_P):
+    eta = np.cross(A[:, 0], A[:, 1])
+    return -K_P * eta * (eta @ (delay * (A @ xd))) / (eta @ eta)
+
+
 def scaled(factor):
     return lambda A, xd, delay, K_P: factor * tasks.delay_torque(A, xd, delay, K_P)
 
@@ -102,6 +107,7 @@ ANSWERS = {
         ("right", "steady state with an offset", at_rest),
         ("right", "what least squares leaves", spare),
         ("right", "a list", lambda A, xd, d, K: list(tasks.delay_torque(A, xd, d, K))),
+        ("close", "three drives only", by_the_cross_product),
         ("wrong", "sign", scaled(-1), "sign"),
         ("wrong", "half", scaled(0.5), "factor"),
         ("wrong", "mN m", scaled(1e3), "1000"),
@@ -126,9 +132,10 @@ ANSWERS = {
         ("wrong", "the wrong end", fixed(1 - EXAMPLE), "torque"),
         ("wrong", "too many", fixed(np.linspace(0, 1, 33)[1:-1]), "equal"),
         ("wrong", "too many, well placed", fixed(np.sort([*EXAMPLE, *(EXAMPLE + 0.02)])), "via points"),
-        ("wrong", "ends included", fixed(np.linspace(0, 1, 9)), "between 0 and 1"),
+        ("wrong", "ends included", fixed(np.linspace(0, 1, 9)), "ends of the way"),
+        ("wrong", "one", fixed([0.3]), "via points 1 in all"),
         ("wrong", "in millimetres", fixed(240 * EXAMPLE), "between 0 and 1"),
         ("wrong", "too few", fixed(EXAMPLE[::2]), "torque"),
-        ("wrong", "none", fixed([]), "equal"),
+        ("wrong", "none", fixed([]), "via points 0 in all"),
     ],
 }

@@ -106,7 +106,7 @@ ANSWERS = {
         ("right", "row by row", row_by_row),
         ("right", "roots of a diagonal", lambda A, c, top: np.min((top - abs(c)) / shares(A))),
         ("close", "a circle of 100 directions", around(100)),
-        ("wrong", "four directions", around(5), ""),
+        ("wrong", "four directions", around(5), "along x and y"),
         ("wrong", "no fight", lambda A, c, top: np.min(top / shares(A)), "fight is left out"),
         ("wrong", "max for min", lambda A, c, top: np.max((top - abs(c)) / shares(A)), "max for min"),
         ("wrong", "fight with its sign", lambda A, c, top: np.min((top - c) / shares(A)), "absolute"),
@@ -131,7 +131,6 @@ ANSWERS = {
         ("wrong", "far too stiff", law(rk.AntagonismFilter(rk.PD(60.0, 1.0))), "ripple"),
         ("wrong", "no damping", law(rk.AntagonismFilter(rk.PD(19.0, 0.001))), ""),
         ("wrong", "gains instead of a law", law((19.0, 0.55)), "law"),
-        ("wrong", "no law", law(None), ""),
         ("wrong", "no torques", law(lambda t, q_a, qd_a, desired: np.zeros(3)), ""),
     ],
 }

@@ -112,7 +112,7 @@ def projected_accelerations(robot: Manipulator, q, qd, c, independent) -> np.nda
 
 def _loops_stay_closed(qdd, robot, q, qd, c, independent) -> tuple[float, str]:
     gap = constraint_jacobian(robot, q) @ qdd + constraint_jacobian_dot(robot, q, qd) @ qd
-    return np.abs(gap).max(), "the gaps accelerate, J qdd + Jdot qd (m/s^2)"
+    return np.abs(gap).max(), "acceleration of the gaps, J qdd + Jdot qd (m/s^2)"
 
 
 def pin_forces(robot: Manipulator, q, qd, c) -> np.ndarray:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...mechanics.actuation import control_matrix
 from ...mechanics.dynamics import (
     coriolis_matrix,
     forward_dynamics,
     generalized_forces,
     mass_matrix,
+    minimal_dynamics,
     orthogonal_complement,
     orthogonal_complement_dot,
 )
@@ -99,11 +101,21 @@ def _projected(**kept):
     return accelerations
 
 
+def _of_the_end_effector(dynamics):
+    """Wrong accelerations: A, and with `dynamics` all of (6), in coordinates of the end-effector."""
+
+    def accelerations(robot, q, qd, c, independent):
+        A, q2d = control_matrix(robot, q), qd[independent]
+        G, C, Q = minimal_dynamics(robot, q, qd, None if dynamics else independent)
+        q2dd, F = np.linalg.solve(G, A.T @ c - C @ q2d - Q), orthogonal_complement(robot, q, independent)
+        return F @ q2dd + orthogonal_complement_dot(robot, q, qd, independent) @ q2d
+
+    return accelerations
+
+
 def _free_tree(robot, q, qd, c, independent):
-    u = np.concatenate([c, 0 * c])
-    return np.linalg.solve(
-        mass_matrix(robot, q), u - coriolis_matrix(robot, q, qd) @ qd - generalized_forces(robot, q, qd)
-    )
+    rest = coriolis_matrix(robot, q, qd) @ qd + generalized_forces(robot, q, qd)
+    return np.linalg.solve(mass_matrix(robot, q), np.concatenate([c, 0 * c]) - rest)
 
 
 def _multipliers(robot, q, qd, c) -> np.ndarray:
@@ -221,6 +233,8 @@ ACCELERATIONS = {
     "C and Q are missing": _projected(C=0.0, Q=0.0),
     "the drive torques c are missing": (lambda robot, q, qd, c, independent: forward_dynamics(robot, q, qd, 0 * c)[0]),
     "everything that depends on the velocity is missing": _projected(C=0.0, Q=0.0, GFdot=0.0, back=0.0),
+    "A is that of the end-effector: `independent` was not passed to it": _of_the_end_effector(False),
+    "all matrices are those of the end-effector: `independent` was not passed to them": _of_the_end_effector(True),
     "the sign of Q is opposite: it stands on the left of (2)": _projected(Q=-1.0),
     "the sign of the velocity terms is opposite: they stand on the left of (2)": _projected(C=-1.0, Q=-1.0, GFdot=-1.0),
     "the sign of C is opposite": _projected(C=-1.0),

@@ -49,7 +49,7 @@ def _torque_cases(rng):
 
 def _torque_law(got, A, c):
     number = max(np.max(np.abs(A.T @ (got - c))), abs(_null(A) @ got))
-    return number, "the end-effector force changed (N), or torque is left along the null vector of A^T (N m)"
+    return number, "change of the end-effector force (N), or torque left along the null vector of A^T (N m)"
 
 
 def _scaled_up(A, c):
@@ -108,7 +108,7 @@ def _pythagoras(got, robot, A, c, dt):
     """For equal motors the total is that of the antagonism; for unequal ones only drive by drive."""
     removed = c - _null(A) * np.sum(_null(A) * c, axis=-1, keepdims=True)
     each = robot.resistance / robot.torque_constant**2 * dt * np.sum(c**2 - removed**2, axis=0)
-    return np.max(np.abs(got - each)), "the sums of R_el/k_t^2 (c^2 - c_eff^2) dt, with the null vector, differ by (J)"
+    return np.max(np.abs(got - each)), "difference from the sums of R_el/k_t^2 (c^2 - c_eff^2) dt (J)"
 
 
 def _kept(A, c):

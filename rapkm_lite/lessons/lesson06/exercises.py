@@ -40,7 +40,7 @@ def _trace(S, robot, trajectory, K_P):
     # The projector N_{A^T} has the trace m - delta at every instant.
     spare = robot.n_arms - 2
     expected = (K_P / robot.torque_constant[0]) ** 2 * robot.resistance[0] * spare * trajectory.t[-1]
-    return abs(np.trace(S) / expected - 1), "the trace of S differs from (R_el/k_t²) k_P² (m - δ) T, relatively by"
+    return abs(np.trace(S) / expected - 1), "relative difference of the trace of S from (R_el/k_t²) k_P² (m - δ) T"
 
 
 def expected_cost(S, sigma_dq) -> float:

@@ -16,7 +16,7 @@ from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import polygon
 from ...simulation.energy import antagonistic_torque
 from ...simulation.runs import simulate
-from ..answers import given, numbers
+from ..answers import Ended, given, numbers
 from ..checker import Case, Measured
 
 START, END = np.array([-0.12, -0.12 / np.sqrt(3)]), np.array([0.12, -0.12 / np.sqrt(3)])
@@ -63,13 +63,14 @@ def delay_cases(rng) -> list[tuple]:
         for x in rng.uniform(-0.05, 0.05, (3, 2)):
             A = control_matrix(robot, inverse_kinematics(robot, x))
             delay = rng.uniform(0, 3e-3, robot.n_arms)
-            cases.append(Case(label, A, rng.uniform(-0.3, 0.3, 2), delay, rng.uniform(3, 12)))
+            xd, K_P = rng.uniform(-0.3, 0.3, 2), rng.uniform(3, 12)
+            cases.append(Case(label, A, xd, delay, K_P, beyond=name == "four_arms"))
     A = control_matrix(load(), inverse_kinematics(load(), [0.02, 0.03]))
     return [*cases, Case("one late drive", A, np.array([0.2, 0.1]), np.array([1e-3, 0.0, 0.0]), 7.05)]
 
 
 def pushes(got, A, xd, delay, K_P) -> tuple[float, str]:
-    return float(np.abs(A.T @ got).max()), "these torques push the end-effector, by N"
+    return float(np.abs(A.T @ got).max()), "push on the end-effector (N)"
 
 
 @functools.cache
@@ -103,9 +104,11 @@ def edge_demand() -> tuple[np.ndarray, np.ndarray]:
 
 def chosen(answer) -> np.ndarray:
     """The via points that a student's function chooses."""
-    shares = numbers(given(answer, edge_demand()))
-    if shares.ndim != 1 or not np.all((shares > 0) & (shares < 1)):
-        raise ValueError("the via points are shares of the way, numbers between 0 and 1, in one row")
+    shares = np.atleast_1d(numbers(given(answer, edge_demand())))
+    if shares.ndim != 1 or not np.all((shares >= 0) & (shares <= 1)):
+        raise Ended("wrong", "the via points are shares of the way, numbers between 0 and 1, in one row", "no shares")
+    if np.any((shares == 0) | (shares == 1)):
+        raise Ended("wrong", "the shares 0 and 1 are the ends of the way, which are given: leave them out", "ends")
     return np.unique(shares)
 
 

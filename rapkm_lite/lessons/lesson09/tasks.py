@@ -52,7 +52,7 @@ def room_cases(rng) -> list[tuple]:
 def off_the_limits(got, c, n, limit) -> tuple[float, str]:
     """At either end of the room some drive stands exactly at its limit."""
     off = np.abs(np.abs(c + np.reshape(got, (2, 1)) * n) - limit)
-    return float(off.min(axis=1).max()), "at the ends of the room the nearest limit of a drive is off by N m"
+    return float(off.min(axis=1).max()), "distance of the nearest limit of a drive at the ends of the room (N m)"
 
 
 def one_sign(A, f, least) -> np.ndarray:
@@ -79,7 +79,7 @@ def one_sign_cases(rng) -> list[tuple]:
 
 
 def off_the_force(got, A, f, least) -> tuple[float, str]:
-    return float(np.abs(A.T @ got - f).max()), "these torques miss the force f, by N"
+    return float(np.abs(A.T @ got - f).max()), "difference from the force f (N)"
 
 
 def smallest(A, f) -> np.ndarray:

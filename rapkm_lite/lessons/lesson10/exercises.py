@@ -88,6 +88,11 @@ EXERCISES = {
             "the largest fight is set beside the largest share, though they may belong to two drives": (
                 lambda A, fight, limit: float((limit - np.abs(fight).max()) / tasks.shares(A).max())
             ),
+            "only forces along x and y are tried; the worst direction lies between": (
+                lambda A, fight, limit: float(
+                    np.min((limit - np.abs(fight)) / np.abs(A @ np.linalg.inv(A.T @ A)).max(axis=1))
+                )
+            ),
             "this is one force for each drive; the smallest is left in every direction": (
                 lambda A, fight, limit: (limit - np.abs(fight)) / tasks.shares(A)
             ),

@@ -13,6 +13,7 @@ from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import hold, triangle
 from ...simulation.faults import DeadDrive, TorqueLimit
 from ...simulation.runs import SimulationError, simulate
+from ..answers import given
 from ..checker import Case, Measured
 
 TOO_LONG, COUNTS, WEAK = 5e-3, 2000, 0.15
@@ -51,7 +52,7 @@ def wrong_models(rng) -> list[tuple]:
 def pushes(got, robot, model, x, K_P) -> tuple[float, str]:
     """At rest the torques move nothing: A^T c = 0 at the pose where the drives have come to stand."""
     q = estimate_pose(robot, demanded(model, x), x)
-    return float(np.abs(control_matrix(robot, q).T @ got).max()), "these torques push the end-effector, by N"
+    return float(np.abs(control_matrix(robot, q).T @ got).max()), "push on the end-effector (N)"
 
 
 def force_left(A, fight, limit) -> float:
@@ -82,7 +83,7 @@ def touches(got, A, fight, limit) -> tuple[float, str]:
     turn = np.linspace(0, 2 * np.pi, 20_001)
     force = got * np.stack([np.cos(turn), np.sin(turn)])
     most = np.abs(fight[:, None] + A @ np.linalg.solve(A.T @ A, force)).max()
-    return float(abs(most - limit)), "the largest torque all around differs from the limit, by N m"
+    return float(abs(most - limit)), "largest torque all around less the limit (N m)"
 
 
 def machine() -> tuple[Manipulator, Manipulator]:
@@ -104,7 +105,7 @@ def gains_of_the_chapter(law) -> bool:
 def survives(make) -> list[Measured]:
     """The law that `make(drawing)` returns, on the small triangle with each drive dead in turn, and healthy."""
     built, drawing = machine()
-    law, path = make(drawing), triangle(drawing, side=0.12, duration=2.5, dt=2e-3)
+    law, path = given(make, (drawing,)), triangle(drawing, side=0.12, duration=2.5, dt=2e-3)
 
     def run(path, *broken):
         faults = [TorqueLimit(WEAK), *broken]

@@ -47,7 +47,7 @@ def fight_cases(rng) -> list[Case]:
 
 
 def moves(got, J, m, K_P, offset) -> tuple[float, str]:
-    return float(np.abs(projector(J)[:m].T @ got).max()), "these torques move the machine, by N m"
+    return float(np.abs(projector(J)[:m].T @ got).max()), "part of these torques that moves the machine (N m)"
 
 
 def in_units(J, scale) -> np.ndarray:
@@ -70,7 +70,7 @@ def unit_cases(rng) -> list[Case]:
 
 def no_projector(got, J, scale) -> tuple[float, str]:
     """J N = 0 in any units, and N N = N."""
-    return float(max(np.abs(J @ got).max(), np.abs(got @ got - got).max())), "J N = 0 and N N = N are missed by"
+    return float(max(np.abs(J @ got).max(), np.abs(got @ got - got).max())), "largest entry of J N and of N N - N"
 
 
 def equipped(answer) -> Manipulator:
