@@ -103,6 +103,11 @@ def test_a_design_that_returns_nothing_is_not_tried_yet(name):
     assert judged(exercises()[name], lambda robot: None).word == "todo"
 
 
+def test_several_arrays_are_no_answer():
+    said = judged(VECTOR, lambda K, v, m: (K, np.outer(K, v))).sentence
+    assert said.endswith("of type tuple: 2 arrays, of shapes (3,), (3, 3), where one is wanted")
+
+
 def test_a_design_is_judged_by_its_numbers_beside_their_limits():
     def judge(gain):
         return [Measured("error", 2.0 / gain, "mm", 1.0), Measured("margin", 10.0 - gain, "dB", 5.0, at_most=False)]
@@ -126,8 +131,8 @@ def test_hints_come_in_three_steps(capsys):
     for step in (0, 4, True, "1"):
         with pytest.raises(ValueError, match="allowed: a whole number from 1 to 3"):
             hint(name, step)
-    with pytest.raises(ValueError, match=r"allowed: 01\."):
-        hint("04.nothing")
+    with pytest.raises(ValueError, match=r"did you mean '04.saved_energy'\?\); allowed: 01\."):
+        hint("04.saved_enery")
 
 
 @pytest.mark.parametrize("name", sorted(exercises()))

@@ -128,8 +128,11 @@ def numbers(got: Any) -> np.ndarray:
     try:
         array = guarded(_array, got)
     except Ended:
-        kind = type(got).__name__
-        raise Ended("wrong", f"the answer is not numeric but of type {kind}, or too large", "not numeric") from None
+        kind, parts = type(got).__name__, ""
+        if isinstance(got, tuple | list) and all(isinstance(part, np.ndarray) for part in got):
+            parts = f": {len(got)} arrays, of shapes {', '.join(str(part.shape) for part in got)}, where one is wanted"
+        sentence = f"the answer is not numeric but of type {kind}{parts or ', or too large'}"
+        raise Ended("wrong", sentence, "not numeric") from None
     if array.dtype.kind == "c":
         real = " (.real of it, since all imaginary parts are zero, as after np.linalg.eig)" * (not array.imag.any())
         raise Ended("wrong", f"the answer is complex; a real one is wanted{real}", "complex")

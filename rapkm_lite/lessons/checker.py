@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..machine.datafiles import known
 from .answers import Answer, Ended, Result, fitting, given, numbers, tidied
 from .exercise import Case, Exercise, Measured
 from .judging import judged
@@ -37,10 +38,9 @@ def exercises() -> dict[str, Exercise]:
 
 
 def _known(name: str) -> Exercise:
-    known = exercises()
-    if name not in known:
-        raise ValueError(f"name = {name!r}; allowed: {', '.join(sorted(known))}")
-    return known[name]
+    found = exercises()
+    known("name", name, sorted(found))
+    return found[name]
 
 
 def judge(name: str, answer: Any) -> Result:
