@@ -97,7 +97,8 @@ from .simulation.faults import DeadDrive, EncoderDropout, OffsetJump, TorqueLimi
 from .simulation.patience import progress
 from .simulation.runs import Run, SimulationError, simulate
 from .simulation.sensors import Sensors
-from .simulation.sweeps import Sweep, sweep
+from .simulation.studies import Sweep
+from .simulation.sweeps import sweep
 
 __version__ = "0.1.0"
 

@@ -33,12 +33,14 @@ def _lessons(options) -> None:
 
 def _grade(options) -> None:
     from .lessons.grading.grader import grade
-    from .lessons.grading.tables import bar, by_exercise, by_student, write_csv
+    from .lessons.grading.tables import bar, by_exercise, by_student, check_place, write_csv
 
+    if options.csv:
+        check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
+    print(by_exercise(grades), by_student(grades), sep="\n\n")
     if options.csv:
         write_csv(Path(options.csv), grades)
-    print(by_exercise(grades), by_student(grades), sep="\n\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

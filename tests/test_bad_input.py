@@ -291,14 +291,28 @@ def test_rules_measures_and_numbers():
         refused(rk.closed_loop_projector, "delta", np.ones((3, 6)), bad)
 
 
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+@pytest.mark.parametrize("delta", [1, 2, 3])
+def test_a_delta_that_is_not_the_rank_is_named(rank, delta):
+    """A product of factors of `rank` columns has that rank; also where one of many poses differs."""
+    draw = np.random.default_rng(rank).normal
+    A, regular = draw(size=(3, rank)) @ draw(size=(rank, 6)), draw(size=(3, delta)) @ draw(size=(delta, 6))
+    if rank == delta:
+        assert rk.closed_loop_projector(A, delta).shape == (6, 6)
+        return
+    for A_tilde in (A, np.stack([regular, A])):
+        with pytest.raises(ValueError, match=rf"delta = {delta}, but A_tilde has rank {rank}.*; allowed: the rank of"):
+            rk.closed_loop_projector(A_tilde, delta)
+
+
 def test_rank_loss_is_named():
     flat = np.ones((3, 2))
     for f in (rk.weighted_pseudoinverse, rk.antagonism_filter, rk.prestress_projector):
         refused(f, "A", flat)
     refused(rk.steady_state_error, "A", flat, 1.0, np.zeros(3))
     refused(rk.explicit_pseudoinverse, "A~_1", np.ones((3, 6)), (0, 1))
-    refused(rk.closed_loop_projector, "A~_1", np.ones((3, 6)))
-    refused(rk.closed_loop_projector, "rows", np.random.default_rng(0).normal(size=(3, 6)))
+    with pytest.raises(ValueError, match=r"^J has lost rank .*; allowed: matrices with rank J = r = 2$"):
+        rk.projector(np.zeros((2, 4)))
     for columns in (1, 2, 3):
         refused(rk.common_sign, "A", np.zeros((5, columns)))
     refused(rk.effective_gain, "F^T F", np.zeros((6, 2)), 1.0)

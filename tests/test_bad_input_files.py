@@ -77,6 +77,26 @@ def test_the_good_file_is_good(tmp_path):
         assert type(rk.experiment(path).faults[0]).__name__ == kind
 
 
+def test_a_mark_before_the_first_line_is_no_part_of_the_file(tmp_path):
+    path, read = tmp_path / "mine.toml", []
+    for mark in (b"", b"\xef\xbb\xbf"):
+        path.write_bytes(mark + text().encode())
+        read.append((rk.experiment(path), rk.load(path)))
+    assert read[0] == read[1]
+
+
+@pytest.mark.parametrize("number", ["1_0", "1_0.5", "0.1_5", "1e1_0"])
+def test_numbers_of_a_log_hold_no_underscore(tmp_path, number):
+    """Python reads them so: float("1_0") is 10."""
+    lines = Path(rk.data_path("mystery_runs/gain.csv")).read_text(encoding="utf-8").splitlines()
+    cells = lines[3].split(",")
+    lines[3] = ",".join([*cells[:4], number, *cells[5:]])
+    file = tmp_path / "own.csv"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(ValueError, match=rf"line 4, column 5 \(.*\) holds '{re.escape(number)}'; allowed: numbers"):
+        rk.read_log(file)
+
+
 def test_every_key_of_every_table_is_tried():
     assert {t: set(keys) for t, keys in GOOD.items()} == {t: set(k) for t, k in UNITS_OF.items() if t != "fault"}
     assert {"kind"}.union(*FAULTS.values()) == set(UNITS_OF["fault"])

@@ -1,6 +1,7 @@
 """Self-calibration: made-up truths found again, logs with hidden offsets, ranks by counting, refusals, bad logs."""
 
 import re
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import cautions, closure, gauge, poses, rounding
+from rapkm_lite.mechanics.encoders import _crossings, cautions, certain, closure, gauge, poses, rounding
 from rapkm_lite.mechanics.rests import Gain, Rests, fitted_gain, one_sided, rests
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
@@ -60,6 +61,107 @@ def test_base_points_are_found_but_for_a_similarity_of_the_plane(name):
     assert_allclose(sides(found.base), scale * sides(true.base), rtol=0, atol=1e-11)
     assert_allclose(found.lengths, scale * true.lengths, rtol=0, atol=1e-11)
     assert_allclose(np.diff(found.offset), np.diff(OFFSET[:N]), rtol=0, atol=1e-10)
+
+
+# Two assemblies fit the readings at the place DOUBTFUL about equally well, until the lengths are known.
+UNEVEN = rk.Manipulator(
+    base=[[0.17163012, 0.04518794], [-0.03682789, 0.2946983], [-0.20337257, -0.23649425]],
+    lengths=[[0.23279629, 0.24753959], [0.225235, 0.27220869], [0.25790243, 0.16032862]],
+    masses=0.1,
+)
+BUILT = UNEVEN.replace(lengths=[[0.2326495, 0.24755329], [0.22532782, 0.27213689], [0.25778293, 0.16052578]])
+DOUBTFUL, UNEVEN_OFFSET = [0.08396742, -0.15468512], np.array([-0.00108325, 0.0025305, -0.00060771])
+
+
+def uneven_readings(count):
+    """Noise-free base angles (count + 1, 3) at places where the arms bend, and at the doubtful one."""
+    x = np.vstack([random_points(UNEVEN, count, seed=1, bend=0.3), DOUBTFUL])
+    return rk.inverse_kinematics(BUILT, x)[:, :3] + UNEVEN_OFFSET
+
+
+@pytest.mark.parametrize("count", [12, 24, 95])
+def test_one_place_on_the_other_assembly_does_not_bend_the_offsets(count):
+    """Noise-free recovery; the place starts 0.16 m off, where the nominal machine fits its readings better."""
+    angles = uneven_readings(count)
+    sure, x = certain(UNEVEN, angles)
+    assert np.linalg.norm(x[-1] - DOUBTFUL) > 0.1
+    assert not sure[-1] and sure.sum() > 0.7 * count
+    found = rk.calibrate(UNEVEN, angles, "offsets+lengths")
+    assert_allclose(found.offset, UNEVEN_OFFSET, rtol=0, atol=1e-9)
+    assert_allclose(found.lengths, BUILT.lengths, rtol=0, atol=1e-9)
+    assert found.residual < 1e-12
+
+
+def test_an_assembly_is_chosen_again_with_the_guess_that_it_belongs_to():
+    """On the machine as built, the true assembly fits without residuals, whatever place was held before."""
+    angles = uneven_readings(12) - UNEVEN_OFFSET
+    wrong = rk.at(UNEVEN, poses(UNEVEN, angles + UNEVEN_OFFSET)).x
+    assert_allclose(rk.at(BUILT, poses(BUILT, angles, wrong)).x[-1], DOUBTFUL, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("robot", "given"), [(UNEVEN, uneven_readings(24)), (MACHINES["four_arms"], None)])
+def test_the_numbers_of_the_arms_do_not_matter(robot, given):
+    """Symmetry: permuted arms have permuted offsets, and the same residual, without noise and with it."""
+    N = robot.n_arms
+    given = (
+        readings(robot, 24, bend=0.15) + np.random.default_rng(2).normal(0, 1e-5, (24, N)) if given is None else given
+    )
+    found = rk.calibrate(robot, given)
+    for order in map(list, permutations(range(N))):
+        changes = {"base": robot.base[order], "lengths": robot.lengths[order], "mode": robot.mode[order]}
+        again = rk.calibrate(robot.replace(**changes), given[:, order])
+        assert_allclose(again.offset, found.offset[order], rtol=0, atol=1e-12)
+        assert_allclose(again.residual, found.residual, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["testbed", "asymmetric", "four_arms"])
+def test_a_place_where_one_pair_crosses_badly_is_found_by_another(name):
+    """Noise-free recovery from places in the whole workspace, of which some lie near a pair's singularity."""
+    robot = MACHINES[name]
+    N, rng = robot.n_arms, np.random.default_rng(0)
+    for seed in range(12):
+        offset = rng.uniform(-5e-3, 5e-3, N)
+        x = random_points(robot, 30, seed, bend=0.15)
+        found = rk.calibrate(robot, rk.inverse_kinematics(robot, x)[:, :N] + offset)
+        assert_allclose(found.offset, offset, rtol=0, atol=1e-12)
+
+
+def test_five_places_of_four_arms_of_which_arms_1_and_2_hardly_reach_one():
+    robot, offset = MACHINES["four_arms"], np.array([5e-3, 5e-3, -5e-3, -5e-3])
+    x, y, inside = rk.workspace_grid(robot, 60)
+    grid = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    # Of all places the one nearest to where this was seen: the circles of arms 1 and 2 touch there, almost.
+    last = grid[np.argmin(np.linalg.norm(grid - [0.0807, -0.1756], axis=-1))]
+    places = [[0.0, 0.0], [0.1, 0.05], [-0.1, 0.02], [0.03, -0.12], last]
+    found = rk.calibrate(robot, rk.inverse_kinematics(robot, places)[:, :4] + offset)
+    assert_allclose(found.offset, offset, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_crossings_are_a_distal_link_away_from_both_elbows(name):
+    """Their definition, and d_i x d_j of the first half above zero, of the second below."""
+    robot = MACHINES[name]
+    angles = readings(robot)
+    elbow = robot.base + robot.lengths[:, :1] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    i, j = np.triu_indices(robot.n_arms, 1)
+    x = _crossings(robot, angles).reshape(2, len(i), len(angles), 2)
+    meet = np.linalg.norm(elbow[:, i] - elbow[:, j], axis=-1).T < robot.lengths[i, 1, None] + robot.lengths[j, 1, None]
+    d_i, d_j = (x - elbow[:, arm].swapaxes(0, 1) for arm in (i, j))
+    for arm, d in ((i, d_i), (j, d_j)):
+        far = np.linalg.norm(d, axis=-1) - robot.lengths[arm, 1, None]
+        assert np.abs(far[:, meet]).max() < 1e-14
+    turn = d_i[..., 0] * d_j[..., 1] - d_i[..., 1] * d_j[..., 0]
+    assert np.all(turn[0][meet] > 0) and np.all(turn[1][meet] < 0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("unknowns", ["offsets", "offsets+lengths"])
+def test_a_log_is_refused_where_one_reading_of_many_fits_no_pose(name, unknowns):
+    """All proximal links point outwards: no two distal links meet."""
+    robot = MACHINES[name]
+    outward = np.arctan2(robot.base[:, 1], robot.base[:, 0])
+    with pytest.raises(ValueError, match="log holds angles that fit no pose of"):
+        rk.calibrate(robot, np.vstack([readings(robot), outward]), unknowns)
 
 
 def test_intervals_are_those_of_a_normal_distribution():

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -228,6 +229,13 @@ def test_a_new_fault_needs_to_be_no_dataclass():
     assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weaker(0.04)]).c).max() == 0.04
 
 
+class Orphan:
+    """It can do what a fault can, and derives from none."""
+
+    def mark(self, table, t):
+        table.limit[:] = 0.1
+
+
 class Noise(Fault):
     """It remembers what it has drawn."""
 
@@ -255,6 +263,7 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
         (0, lambda table: table.jump.fill(np.nan), r"no finite number into table\.jump"),
         (0, lambda table: table.jump.fill(np.inf), r"no finite number into table\.jump"),
         (0, lambda table: table.limit.fill(np.nan), r"no finite number into table\.jump or table\.limit"),
+        (0, lambda table: table.limit.fill(-0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
     ],
 )
 def test_a_new_fault_that_marks_wrongly_is_named(drive, write, words):
@@ -315,12 +324,52 @@ def test_the_same_in_a_data_file(tmp_path):
     assert rk.experiment(file) == given == pickle.loads(pickle.dumps(given))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Ripple(Fault):
+    """A fault of a user's with a field that may be left out."""
+
+    drive: int
+    frequency: float = 2.0
+
+    def mark(self, table, t):
+        table.jump[:, self.drive] += 1e-3 * np.sin(2 * np.pi * self.frequency * t)
+
+
+@pytest.mark.parametrize(
+    ("entries", "fault"),
+    [
+        ('kind = "Ripple"\ndrive = 1\n', Ripple(1)),
+        ('kind = "Ripple"\ndrive = 1\nfrequency = 3.0\n', Ripple(1, 3.0)),
+        ('kind = "Weaker"\nlimit = 0.05\n', Weaker(0.05)),
+    ],
+)
+def test_what_has_a_default_may_be_left_out_of_a_data_file(tmp_path, entries, fault):
+    file = tmp_path / "broken.toml"
+    file.write_text(f"{TOML}[[fault]]\n{entries}")
+    assert rk.experiment(file).faults == (fault,)
+
+
+def test_faults_that_do_not_fit_the_machine_are_refused_when_a_file_is_read(tmp_path):
+    file = tmp_path / "broken.toml"
+    for entries, words in (
+        ('kind = "DeadDrive"\ndrive = 9\ntime = 0.1\n', "drive = 9 in .*; allowed: 0 to 2"),
+        ('kind = "TorqueLimit"\nlimit = [0.1, 0.2]\n', r"limit has shape \(2,\); allowed: one number or \(3,\)"),
+    ):
+        file.write_text(f"{TOML}[[fault]]\n{entries}")
+        with pytest.raises(ValueError, match=words):
+            rk.experiment(file)
+    given = rk.experiment("testbed")
+    with pytest.raises(ValueError, match=r"drive = 3 in .*; allowed: 0 to 2"):
+        rk.Experiment(given.robot, given.law, given.trajectory, given.sensors, [rk.DeadDrive(3, 0.1)])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("[[fault]]\ndrive = 1\n", r"allowed: a table with kind = one of TorqueLimit, DeadDrive"),
         ('[[fault]]\nkind = "DeadDrives"\n', r"unknown kind of fault 'DeadDrives' \(did you mean 'DeadDrive'\?\)"),
         ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive lacks 'time'; needed: drive, time"),
+        ('[[fault]]\nkind = "Ripple"\nfrequency = 1\n', "the fault Ripple lacks 'drive'; needed: drive$"),
         ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\ntimes = 1\n', r"unknown entry of DeadDrive 'times' \(did you mean"),
     ],
 )
@@ -354,7 +403,16 @@ def test_mistakes_in_a_data_file(tmp_path, text, message):
             r"limit has shape \(2,\); .* \(3,\)",
         ),
         (lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]), "faults holds 'dead'; allowed: TorqueLimit, DeadDrive"),
-        (lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive), "faults holds .*; allowed: TorqueLimit"),
+        (
+            lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive),
+            r"faults holds .*DeadDrive'>, which is a class; allowed: a fault, such as DeadDrive\(\.\.\.\)$",
+        ),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=[Weaker]), r"is a class; allowed: a fault, such as Weaker\("),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=[int]), r"is a class; allowed: a fault, such as DeadDrive\("),
+        (
+            lambda: rk.simulate(ROBOT, PD, PATH, faults=[Orphan()]),
+            r"faults holds .*; allowed: TorqueLimit, .* derive its class from rapkm_lite\.simulation\.faults\.Fault",
+        ),
         (lambda: rk.Sensors(encoder=0), "encoder = 0; allowed: >= 1"),
         (lambda: rk.Sensors(velocity_filter=-1.0), "velocity_filter = -1; allowed: >= 0"),
         (lambda: rk.simulate(ROBOT, PD, PATH, sensors=2000), "sensors = 2000; allowed: Sensors"),

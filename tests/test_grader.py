@@ -2,13 +2,14 @@
 
 import csv
 import json
+import re
 
 import pytest
 
 from rapkm_lite.__main__ import main
-from rapkm_lite.lessons.grading.grader import grade
+from rapkm_lite.lessons.grading.grader import Grade, grade
 from rapkm_lite.lessons.grading.submission import found, needed, statements
-from rapkm_lite.lessons.grading.tables import by_exercise, by_student, write_csv
+from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
 
 SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
 TORQUES = "def filtered_torques(A, c):\n    return A @ np.linalg.solve(A.T @ A, A.T @ c)\n"
@@ -111,6 +112,33 @@ def test_the_tables_count_mistakes_and_points(graded, tmp_path):
     assert "1 x the answer has the opposite sign" in by_exercise(graded)
     line = next(line for line in by_student(graded).splitlines() if line.startswith("ben"))
     assert line.split()[2] == "10"
+
+
+@pytest.mark.parametrize("place", ["nowhere/grades.csv", ".", "x" * 300])
+def test_a_place_for_the_file_is_looked_at_before_grading(place, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rapkm_lite.lessons.grading.grader.grade", lambda *_: pytest.fail("it graded"))
+    assert main(["grade", str(tmp_path), "--csv", str(tmp_path / place)]) == 2
+    out, said = capsys.readouterr()
+    assert re.fullmatch(r"csv = '.* cannot be written \(.*\); allowed: a file in a folder\n", said) and not out
+
+
+@pytest.mark.parametrize("before", [None, "mine"])
+def test_looking_at_a_place_leaves_it_as_it_was(before, tmp_path):
+    place = tmp_path / "grades.csv"
+    if before is not None:
+        place.write_text(before)
+    check_place(place)
+    assert (place.read_text() if place.exists() else None) == before
+
+
+def test_grades_are_shown_though_their_file_is_lost(tmp_path, capsys, monkeypatch):
+    """A disk may fill while an hour of grading runs: here its folder goes."""
+    own, folder = Grade("ada", NAMES[0], "ok", 10.0, 10.0, "right", ""), tmp_path / "folder"
+    folder.mkdir()
+    monkeypatch.setattr("rapkm_lite.lessons.grading.grader.grade", lambda *_: [folder.rmdir(), own][1:])
+    assert main(["grade", str(tmp_path), "--csv", str(folder / "grades.csv")]) == 2
+    out, said = capsys.readouterr()
+    assert "ada" in out and "csv = " in said and said.count("\n") == 1
 
 
 def test_only_what_the_answers_need_is_run():

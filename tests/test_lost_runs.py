@@ -82,6 +82,18 @@ def consistent(error, rows):
     assert repr(run).startswith("Run(")
 
 
+def test_a_run_has_a_row_for_a_sample_of_its_path_and_fewer_when_it_was_lost():
+    run = rk.simulate(ROBOT, rk.PD(7.05, 0.225), rk.hold(ROBOT, [0.0, 0.0], 0.1))
+    names = ("t", "x", "xd", "q_a", "qd_a", "c", "pairs")
+    for rows in (0, 1, 50, 101):
+        part = rk.Run(**(run._fields() | {name: getattr(run, name)[:rows] for name in names}))
+        assert part.path_error.shape == (rows,) and part.error.shape == (rows, 3)
+    with pytest.raises(ValueError, match=r"t has shape \(101,\); allowed: \(k,\), up to the 51 samples"):
+        rk.Run(**(run._fields() | {"trajectory": rk.hold(ROBOT, [0.0, 0.0], 0.05)}))
+    with pytest.raises(ValueError, match=r"t has shape \(101, 1\); allowed: \(k,\)"):
+        rk.Run(**(run._fields() | {"t": run.t[:, None]}))
+
+
 # Single runs.
 def test_an_exception_of_the_law_keeps_the_samples_before_it():
     error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.__main__ import main
 from rapkm_lite.lessons.copies import bare, copy_lessons, lesson_folder
 from rapkm_lite.simulation.summary import OFFSET, ROWS
 
@@ -83,6 +84,20 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(ValueError, match="cannot be written"):
         copy_lessons(tmp_path / "file" / "lessons")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["lessons", "~nosuchuser/x"], "folder = '~nosuchuser/x' names no user of this computer; allowed: a folder"),
+        (["lessons", "x" * 300], "cannot be written ("),
+        (["grade", "x" * 300], "allowed: a folder that exists"),
+    ],
+)
+def test_names_that_no_folder_can_have_are_refused_in_a_line(arguments, words, capsys):
+    assert main(arguments) == 2
+    out, said = capsys.readouterr()
+    assert words in said and said.count("\n") == 1 and not out
 
 
 def test_importing_the_package_imports_nothing_heavy():

@@ -1,5 +1,6 @@
 """Studies: the same numbers as single runs, to the last bit the same in whatever company, failures never counted."""
 
+import collections
 import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.faults import Fault
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.4)
@@ -134,6 +136,69 @@ def test_a_law_of_a_student():
         rtol=0,
         atol=1e-11,
     )
+
+
+GAINS = [rk.PD(7.05, 0.225), rk.PD(6.0, 0.2)]
+
+
+class Listed(list):
+    """A list of a user's."""
+
+
+def array_of(laws):
+    array = np.empty(len(laws), object)
+    array[:] = laws
+    return array
+
+
+@pytest.mark.parametrize(
+    "form",
+    [tuple, Listed, collections.deque, array_of, iter, lambda laws: dict(enumerate(laws)).values()],
+    ids=["tuple", "Listed", "deque", "array", "iter", "values"],
+)
+def test_laws_come_in_whatever_has_an_order(form):
+    study, same_laws = (rk.sweep(ROBOT, laws, PATH, OFFSETS[:2]) for laws in (form(GAINS), GAINS))
+    same(study, same_laws)
+    assert study == same_laws and study.law == tuple(GAINS)
+    unstable = rk.sweep(ROBOT, form([PD, rk.PD(7.05, 30.0)]), PATH, OFFSETS[0], failed="mask")
+    assert unstable.reasons[0] is None and "unstable gain" in unstable.reasons[1]
+
+
+def test_laws_without_an_order_are_refused_before_a_run():
+    asked = []
+    law = lambda t, q_a, qd_a, desired: asked.append(t)  # noqa: E731
+    for laws in ({law}, frozenset([law]), {law: 1}):
+        with pytest.raises(ValueError, match=r"law = .*; allowed: a law, such as PD"):
+            rk.sweep(ROBOT, laws, PATH, OFFSETS[0])
+    assert not asked
+
+
+def test_a_study_has_one_law_or_one_per_row():
+    study = rk.sweep(ROBOT, GAINS, PATH, OFFSETS[:2])
+    assert rk.Sweep(**(study._fields() | {"law": Listed(GAINS)})) == study
+    with pytest.raises(ValueError, match="law holds 1 laws for 2 rows; allowed: one law, or one per row"):
+        rk.Sweep(**(study._fields() | {"law": [PD]}))
+
+
+def test_a_law_that_cannot_go_to_another_process_is_named():
+    """A lambda has no name in a module, by which pickle would find it there."""
+    law = lambda t, q_a, qd_a, desired: -7.05 * (q_a - desired.q_a)  # noqa: E731
+
+    class Local(Fault):
+        def mark(self, table, t):
+            pass
+
+    words = r"law of run 1 = <function .* cannot be sent to another process \(.*\); allowed: .*, or threads"
+    with ProcessPoolExecutor(1) as executor:
+        with pytest.raises(ValueError, match=words) as e:
+            rk.sweep(ROBOT, [PD, law], PATH, OFFSETS[:2], executor=executor, chunk=1)
+        assert isinstance(e.value.__cause__, pickle.PicklingError | AttributeError)
+        assert e.value.partial.failed.tolist() == [False, True]
+        with pytest.raises(ValueError, match=r"fault 0 = Local\(\) cannot be sent to another process"):
+            rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=executor, faults=Local())
+        same(rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=executor), rk.sweep(ROBOT, PD, PATH, OFFSETS[:2]))
+    with ThreadPoolExecutor(1) as executor:
+        same(rk.sweep(ROBOT, law, PATH, OFFSETS[0], executor=executor), rk.sweep(ROBOT, law, PATH, OFFSETS[0]))
 
 
 def test_result_is_an_array_of_energies():

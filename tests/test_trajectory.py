@@ -168,6 +168,41 @@ def test_rates_of_another_motion_are_refused(factor):
         rk.follow(TESTBED, path.t, path.x, factor * path.xd, path.xdd)
 
 
+def square(count, radius=0.05):
+    """The corners of a regular polygon."""
+    angle = 2 * np.pi * np.arange(count) / count
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+@pytest.mark.parametrize("edges", [2, 3, 4, 7])
+@pytest.mark.parametrize("steps", [2.0, 2.25, 3.6])
+def test_two_samples_per_edge_show_every_corner_and_the_motion(edges, steps):
+    """A quintic has gone 10/4^3 - 15/4^4 + 6/4^5 = 0.104 of its way after a quarter of its time."""
+    corners, k = square(edges), round(edges * steps)
+    path = rk.polygon(TESTBED, corners, duration=1.0, dt=1.0 / k)
+    length = np.linalg.norm(corners[1] - corners[0])
+    near = np.linalg.norm(path.x - corners[:, None], axis=-1).min(axis=1)
+    assert near.max() <= (10 / 4**3 - 15 / 4**4 + 6 / 4**5) * length * (1 + 1e-9)
+    for i in range(edges):
+        inside = (path.t > (i + 1e-6) / edges) & (path.t < (i + 1 - 1e-6) / edges)
+        assert np.linalg.norm(path.xd[inside], axis=-1).max() > 0.1 * length
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: rk.triangle(TESTBED, 0.1, duration=1.0, dt=1.0), r"dt = 1 s; .* half the time of an edge, .* 0.333"),
+        (lambda: rk.triangle(TESTBED, 0.1, duration=1.0, dt=0.5), r"dt = 0\.5 s; allowed: .*, so a shorter dt"),
+        (lambda: rk.triangle(TESTBED, 0.1, duration=1.0, dt=0.2), r"dt = 0\.2 s; allowed: up to half the time"),
+        (lambda: rk.polygon(TESTBED, square(10_000), 1.0, 0.01), r"\(10000 edges in .* 1 s\), .* or fewer corners"),
+        (lambda: rk.triangle(TESTBED, duration=1.0, rest=0.499), r"dt = 0\.001 s; .* 2 rest = 0\.002 s\), .*less rest"),
+    ],
+)
+def test_samples_that_would_miss_a_corner_or_the_motion_are_refused(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
 @pytest.mark.parametrize("duration", [0.01, 1.0, 100.0])
 def test_a_step_fits_a_duration_to_a_part_in_a_milliard(duration):
     """Decimal fractions do so in numbers of the computer, however long or short the path."""

@@ -34,7 +34,18 @@ def closed_loop_projector(A_tilde, delta: int = 2) -> np.ndarray:
     True
     """
     A_tilde = wide_matrix("A_tilde", A_tilde)
-    return A_tilde.mT @ explicit_pseudoinverse(A_tilde, select_independent(A_tilde, delta=delta))
+    rows = select_independent(A_tilde, delta=delta)
+    try:
+        return A_tilde.mT @ explicit_pseudoinverse(A_tilde, rows)
+    except ValueError:
+        rank = np.linalg.matrix_rank(A_tilde, rtol=1e-12)
+        other = rank[rank != rows.shape[-1]]
+        if other.size == 0:
+            raise
+        words = " (at an input singularity it is less than elsewhere)" if other[0] < rows.shape[-1] else ""
+        raise ValueError(
+            f"delta = {rows.shape[-1]}, but A_tilde has rank {other[0]}{words}; allowed: the rank of A_tilde"
+        ) from None
 
 
 def effective_gain(F, K) -> np.ndarray:

@@ -236,26 +236,27 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
             break_drives(lanes, arms, faults, w, k)
 
         # Record.
-        if study is not None:
-            if user is not None:
-                if k + 1 == clock.samples:
-                    last_torque(drives, arms, w, k)
-                    return
-            add_up(lanes, drives, arms, w)
         if history is not None:
             record(arms, history, w, k)
-            if k + 1 == clock.samples:
-                last_torque(drives, arms, w, k)
-                return
+        if k + 1 == clock.samples:
+            last_torque(drives, arms, w, k)
+            return
+        if study is not None:
+            add_up(lanes, drives, arms, w)
 
         # Hold.
         hold(lanes, arms, extra, study, history, w, dt)
-        # A single run that is sound needs no judgement.
-        going = False
-        if history is not None:
-            going = single.sound(arms, extra, w)
-        if not going and plant.judge(lanes, arms, w, k) == len(lanes):
+        if over(lanes, arms, extra, history, w, k):
             return
+
+
+@leaf
+def over(lanes, arms, extra, history, w, k):
+    """Have all runs ended? A single one that is sound needs no judgement."""
+    if history is not None:
+        if single.sound(arms, extra, w):
+            return False
+    return plant.judge(lanes, arms, w, k) == len(lanes)
 
 
 @outlined

@@ -68,6 +68,22 @@ def fill(drives, arms, law, t, table, o, w, buffer):
 
 
 @leaf
+def links(law, table, o, w, W, i):
+    """Both links of arm i, their cross product, and their rates, at the pose that the law asks for."""
+    m = MODEL * W + i
+    if law.asks == DESIRED:
+        cos, sin = want(table, o, COS, i, W), want(table, o, SIN, i, W)
+        turn_c, turn_s = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
+        l1, l2 = math.sqrt(w[m + L1SQ * W]), math.sqrt(w[m + L2SQ * W])
+        ax, ay, dx, dy = l1 * cos, l1 * sin, l2 * (cos * turn_c - sin * turn_s), l2 * (sin * turn_c + cos * turn_s)
+        base = want(table, o, RATE, i, W)
+        return ax, ay, dx, dy, ax * dy - ay * dx, base, base + want(table, o, ELBOW_RATE, i, W)
+    (bx, by, lx, ly, _, _, den), _ = placed(MODEL, w, i, 0, W, 1, w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
+    vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
+    return den * lx, den * ly, den * bx, den * by, den, bx * vx + by * vy, -(lx * vx + ly * vy)
+
+
+@leaf
 def fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link):
     """What arm i adds to the loop constraints: every arm is cut from the second one."""
     for row in range(N - 1):
@@ -114,19 +130,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     for i in range(N):
         m = MODEL * W + i
         l1sq, l2sq = w[m + L1SQ * W], w[m + L2SQ * W]
-        if law.asks == DESIRED:
-            cos, sin = want(table, o, COS, i, W), want(table, o, SIN, i, W)
-            turn_c, turn_s = want(table, o, ELBOW_COS, i, W), want(table, o, ELBOW_SIN, i, W)
-            l1, l2 = math.sqrt(l1sq), math.sqrt(l2sq)
-            ax, ay, dx, dy = l1 * cos, l1 * sin, l2 * (cos * turn_c - sin * turn_s), l2 * (sin * turn_c + cos * turn_s)
-            base = want(table, o, RATE, i, W)
-            link = base + want(table, o, ELBOW_RATE, i, W)
-            den = ax * dy - ay * dx
-        else:
-            (bx, by, lx, ly, _, _, den), _ = placed(MODEL, w, i, 0, W, 1, w[of(PX, 0, W, 1)], w[of(PY, 0, W, 1)])
-            ax, ay, dx, dy = den * lx, den * ly, den * bx, den * by
-            vx, vy = w[of(PVX, 0, W, 1)], w[of(PVY, 0, W, 1)]
-            base, link = bx * vx + by * vy, -(lx * vx + ly * vy)
+        ax, ay, dx, dy, den, base, link = links(law, table, o, w, W, i)
         if i == 0:
             x[0, 0], x[0, 1] = w[m + BX * W] + ax + dx, w[m + BY * W] + ay + dy
             x[1, 0], x[1, 1] = -(base * ay + link * dy), base * ax + link * dx

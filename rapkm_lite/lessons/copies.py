@@ -6,6 +6,7 @@ The build of the wheel uses it too, see `docs/package_data.py`.
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 # What a student gets beside the lessons: the pages that they link to.
@@ -47,9 +48,12 @@ def copy_lessons(target: str | Path) -> list[Path]:
 
     Raises ValueError, and writes nothing, where one of them would be overwritten or the folder cannot be made.
     """
-    target = Path(target).expanduser()
+    try:
+        target = Path(target).expanduser()
+    except RuntimeError:
+        raise ValueError(f"folder = {str(target)!r} names no user of this computer; allowed: a folder") from None
     files = shipped(lesson_folder())
-    there = [path.name for path in files if (target / path.name).exists()]
+    there = [path.name for path in files if os.path.exists(target / path.name)]
     if there:
         raise ValueError(f"{str(target)!r} holds {there[0]!r} already; allowed: a new or empty folder")
     try:

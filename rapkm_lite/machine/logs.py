@@ -124,7 +124,9 @@ def _table(path: Path, header: list[str], lines: list[list[str]]) -> np.ndarray:
     """All numbers of a log; one by one only where something is wrong, to say what and where."""
     try:
         table = np.array(lines, dtype=float)
-        if table.shape[1:] == (len(header),) and np.abs(table).max() < 1e100:
+        # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
+        plain = not any("_" in text for line in lines for text in line)
+        if plain and table.shape[1:] == (len(header),) and np.abs(table).max() < 1e100:
             return table
     except ValueError:
         pass
@@ -138,7 +140,7 @@ def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> lis
     for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
         try:
             row.append(float(text))
-            fine = abs(row[-1]) < 1e100
+            fine = abs(row[-1]) < 1e100 and "_" not in text
         except ValueError:
             fine = False
         if not fine:

@@ -8,18 +8,17 @@ n_k^T (q_k - offset - q_a(x_k)) = 0: no torque, no gain, no friction enters, and
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number, real_array
-from ..machine.logs import Log, read_log
+from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, Value
 from .at import at
-from .encoders import cautions, changed, closure, gauge, poses, rounding, unknown_names
+from .encoders import cautions, certain, changed, closure, gauge, measured, poses, rounding, unknown_names
 from .rests import Rests, fitted_gain, one_sided, rests
 
 UNKNOWNS = ("offsets", "offsets+lengths", "all")
@@ -140,7 +139,7 @@ def calibrate(
     noise = None if noise is None else positive_number("noise", noise)
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
-    angles, logs = _read(robot, log)
+    angles, logs = measured(robot, log)
     stand = rests(logs) if logs else None
     gain = fitted_gain(stand) if stand else None
     notes = [] if gain is None or K_P is None else gain.objections(K_P)
@@ -150,25 +149,6 @@ def calibrate(
         step = rounding(angles)
         angles = np.unique(angles, axis=0)
     return _solved(robot, angles, unknowns, noise, step, None if gain is None else gain.K_P, notes)
-
-
-def _read(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
-    """All measured angles (k, N), and the logs they come from, none for bare angles."""
-    if isinstance(log, Log | str | Path):
-        log = [log]
-    if isinstance(log, list | tuple) and log and all(isinstance(part, Log | str | Path) for part in log):
-        logs = [part if isinstance(part, Log) else read_log(part) for part in log]
-        for part in logs:
-            if part.q_a.shape[1] != robot.n_arms:
-                raise ValueError(f"log = {part!r} has {part.q_a.shape[1]} drives; allowed: {robot.n_arms}")
-        return np.concatenate([part.q_a for part in logs]), logs
-    try:
-        angles = real_array("log", log, robot.n_arms)
-    except ValueError as error:
-        raise ValueError(f"{error}, a Log, a path, or a list of these") from None
-    if angles.ndim != 2 or len(angles) == 0:
-        raise ValueError(f"log has shape {angles.shape}; allowed: angles (k, {robot.n_arms}) with k >= 1, or a Log")
-    return angles, []
 
 
 def _angles_of_torques(
@@ -209,37 +189,19 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     if unknowns == "all":
         free = np.linalg.svd(gauge(robot).T)[2][4:].T
         basis = np.block([[basis[:, : 3 * N], np.vstack([np.zeros((3 * N, 2 * N - 4)), robot.lengths.max() * free])]])
-    p, machine, guess = nominal[:count], robot, None
-    for _ in range(50):
-        pose = at(machine, poses(machine, angles - p[:N], guess))
-        guess = pose.x
-        left, rows = (part / math.sqrt(len(angles)) for part in closure(pose, angles - p[:N], count))
-        rows = rows @ basis
-        U, sigma, Vt = np.linalg.svd(rows, full_matrices=False)
-        explained = U.T @ left
-        # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
-        unexplained = math.sqrt(max(left @ left - explained @ explained, 0.0))
-        rank = int(np.sum(sigma > max(1e-8, 10 * max(step, noise or 0.0, unexplained)) * sigma[0]))
-        if rank < basis.shape[1]:
-            spread = max(step, noise or 0.0, unexplained) / math.sqrt(len(angles)) / sigma[:rank]
-            raise _refusal(robot, basis, Vt[:rank], explained[:rank] / sigma[:rank], spread, p - nominal[:count])
-        move = -Vt.T @ (explained / sigma)
-        p = p + basis @ move
-        machine = changed(robot, p)
-        # No step gets smaller than its rounding.
-        if np.abs(move).max() < 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]:
-            break
-    else:
-        raise ConvergenceError(
-            f"calibrate did not converge: a last step of {np.abs(move).max():.3g} at offsets {p[:N].tolist()} rad; "
-            "allowed: a log of this machine, whose angles are near a pose"
-        )
+    p, blur = nominal[:count], max(step, noise or 0.0)
+    sure, x = certain(robot, angles)
+    if basis.shape[1] < (N - 2) * sure.sum() < (N - 2) * len(angles):
+        # A sample on the wrong assembly holds the unknowns where it fits there: those in doubt wait for the others.
+        with suppress(ValueError):
+            p = _minimum(robot, angles[sure], basis, p, p, x[sure], blur, enough=1e-3)[0]
+    p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur)
     spare, total = len(left) - len(sigma), float(left @ left) * len(angles)
     spread = math.sqrt(total / spare) if spare else 0.0
     used = max(spread, step) if noise is None else noise
     half = basis @ (Vt.T / sigma)
     condition = float(sigma[0] / sigma[-1])
-    notes = [*notes, *cautions(guess, robot, condition, spread, step if noise is None else noise)]
+    notes = [*notes, *cautions(x, robot, condition, spread, step if noise is None else noise)]
     if used == 0.0:
         notes.append("no reading is left over to show the noise, so that the covariance is none: pass noise")
     if unknowns == "all":
@@ -253,13 +215,46 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         covariance=half @ half.T * used**2 / len(angles),
         noise=used,
         freedom=spare if noise is None else math.inf,
-        rank=rank,
+        rank=len(sigma),
         condition=condition,
         unseen=GAUGE if unknowns == "all" else (),
         residual=math.sqrt(total / len(left)),
         K_P=K_P,
         corrected=machine,
         note="; ".join(notes),
+    )
+
+
+def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0):
+    """Unknowns of least closure, Gauss and Newton from p and the places x (k, 2) m on.
+
+    It ends where a step (in `basis`) is small enough or a rounding.
+    Returns them, their machine, and of the last step the places (k, 2) m, the closure, and the singular values and
+    right vectors of its derivative.  blur : rad, what is known of the noise.
+    Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
+    """
+    N, machine, size = robot.n_arms, changed(robot, p), math.inf
+    for _ in range(50):
+        pose = at(machine, poses(machine, angles - p[:N], x))
+        x = pose.x
+        left, rows = (part / math.sqrt(len(angles)) for part in closure(pose, angles - p[:N], len(p)))
+        U, sigma, Vt = np.linalg.svd(rows @ basis, full_matrices=False)
+        explained = U.T @ left
+        # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
+        noise = max(blur, math.sqrt(max(left @ left - explained @ explained, 0.0)))
+        rank = int(np.sum(sigma > max(1e-8, 10 * noise) * sigma[0]))
+        if rank < basis.shape[1]:
+            spread = noise / math.sqrt(len(angles)) / sigma[:rank]
+            raise _refusal(robot, basis, Vt[:rank], explained[:rank] / sigma[:rank], spread, p - nominal)
+        move = -Vt.T @ (explained / sigma)
+        p, size = p + basis @ move, np.abs(move).max()
+        machine = changed(robot, p)
+        # No step gets smaller than its rounding.
+        if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
+            return p, machine, x, left, sigma, Vt
+    raise ConvergenceError(
+        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad; "
+        "allowed: a log of this machine, whose angles are near a pose"
     )
 
 

@@ -175,17 +175,18 @@ def null_space(A: np.ndarray) -> np.ndarray:
     return np.linalg.qr(A, mode="complete")[0][..., A.shape[-1] :]
 
 
-def row_space(J: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+def row_space(J: np.ndarray, size: float, of_pose: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Q1 (..., n, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
 
+    of_pose : the caller was given q, and not J.
     Raises ValueError where J, whose entries are of the order of `size`, lacks full rank.
     """
     Q, R = orthogonal(J.mT, complete=J.ndim == 2)
     smallest = pivots(R)[0] / size
     if smallest < 1e-12:
+        start, place = ("q is a c-space singularity: ", "configurations") if of_pose else ("", "matrices")
         raise ValueError(
-            f"q is a c-space singularity: J has lost rank (relative pivot {smallest:.3g}); allowed: configurations "
-            f"with rank J = r = {J.shape[-2]}"
+            f"{start}J has lost rank (relative pivot {smallest:.3g}); allowed: {place} with rank J = r = {J.shape[-2]}"
         )
     return Q, R
 

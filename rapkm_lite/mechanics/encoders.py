@@ -7,13 +7,15 @@ only the first N or 3N of them.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError
+from ..machine.arguments import ConvergenceError, real_array
+from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator
 from . import cores
-from .at import At
+from .at import At, at
 from .closure import estimate_pose
 from .kinematics import cross, unit_vector
 
@@ -26,6 +28,28 @@ def unknown_names(N: int) -> tuple[str, ...]:
         *(f"length {what} {i}" for i in arms for what in ("proximal", "distal")),
         *(f"base {axis} {i}" for i in arms for axis in "xy"),
     )
+
+
+def measured(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
+    """All measured angles (k, N), and the logs they come from, none for bare angles.
+
+    Raises ValueError for what is neither, and for another number of drives than the machine has.
+    """
+    if isinstance(log, Log | str | Path):
+        log = [log]
+    if isinstance(log, list | tuple) and log and all(isinstance(part, Log | str | Path) for part in log):
+        logs = [part if isinstance(part, Log) else read_log(part) for part in log]
+        for part in logs:
+            if part.q_a.shape[1] != robot.n_arms:
+                raise ValueError(f"log = {part!r} has {part.q_a.shape[1]} drives; allowed: {robot.n_arms}")
+        return np.concatenate([part.q_a for part in logs]), logs
+    try:
+        angles = real_array("log", log, robot.n_arms)
+    except ValueError as error:
+        raise ValueError(f"{error}, a Log, a path, or a list of these") from None
+    if angles.ndim != 2 or len(angles) == 0:
+        raise ValueError(f"log has shape {angles.shape}; allowed: angles (k, {robot.n_arms}) with k >= 1, or a Log")
+    return angles, []
 
 
 def rounding(angles: np.ndarray) -> float:
@@ -51,30 +75,65 @@ def changed(robot: Manipulator, p: np.ndarray) -> Manipulator:
 
 
 def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
-    """Configurations (k, 2N) nearest to the angles."""
+    """Configurations (k, 2N) nearest to the angles (k, N) rad, from the best of all crossings and the guess (k, 2) m.
+
+    Raises ValueError for angles that fit no pose.
+    """
+    starts = _crossings(robot, angles)
+    if guess is not None:
+        starts = np.concatenate([guess[None], starts])
+    # The circles of one pair may cross badly, or not at all, where those of another cross well.  A crossing that fits
+    # better than the pose of least squares nearby belongs to another assembly, and to a better one.
+    best = np.argmin(_misfit(robot, angles, starts), axis=0)
     try:
-        return estimate_pose(robot, angles, _crossings(robot, angles) if guess is None else guess)
+        return estimate_pose(robot, angles, starts[best, np.arange(len(angles))])
     except (ConvergenceError, ValueError) as error:
         raise ValueError(f"log holds angles that fit no pose of {robot!r}: {error}") from None
 
 
+def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the angles (k, N) rad leave no doubt of their assembly, (k,), and the places (k, 2) m of all.
+
+    The worst misfit of all poses shows how wrong readings may be.  In doubt is what a second assembly may fit as well.
+    Raises ValueError for angles that fit no pose.
+    """
+    pose = at(robot, poses(robot, angles))
+    i, j = np.triu_indices(robot.n_arms, 1)
+    side = cross(pose.d[:, i], pose.d[:, j]).T
+    across = np.concatenate([side < 0.0, side > 0.0])
+    second = np.where(across, _misfit(robot, angles, _crossings(robot, angles)), np.inf)
+    # With residuals r at a pose, those at the crossing of the pair S of largest |det A_S| are r - A A_S^-1 r_S to first
+    # order; no entry of A A_S^-1 exceeds 1, and 1 + 2 (N - 2) bounds the growth of the square.
+    return second.min(axis=0) > (2 * robot.n_arms - 3) * _misfit(robot, angles, pose.x).max(), pose.x
+
+
 def _crossings(robot: Manipulator, angles: np.ndarray) -> np.ndarray:
-    """Where the distal links of the first two arms meet, (k, 2) m; of the two crossings the one that suits all arms."""
+    """Where distal links meet, (N (N - 1), k, 2) m: of all pairs i < j the points with d_i x d_j > 0, then those below.
+
+    Circles that do not meet have the point between them on their radical axis.
+    """
     l1, l2 = robot.lengths.T
-    a = l1[:, None] * unit_vector(angles)
-    elbow = robot.base + a
-    gap = elbow[:, 1] - elbow[:, 0]
-    distance = np.maximum(np.linalg.norm(gap, axis=-1, keepdims=True), 1e-12)
+    i, j = np.triu_indices(robot.n_arms, 1)
+    elbow = (robot.base + l1[:, None] * unit_vector(angles)).swapaxes(0, 1)
+    l_i, l_j = l2[i, None, None], l2[j, None, None]
+    gap = elbow[j] - elbow[i]
+    distance = np.maximum(np.linalg.norm(gap, axis=-1, keepdims=True), 1e-12 * l2.max())
     unit = gap / distance
-    along = (distance**2 + l2[0] ** 2 - l2[1] ** 2) / (2 * distance)
-    across = np.sqrt(np.maximum(l2[0] ** 2 - along**2, 0.0)) * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
-    middle = elbow[:, 0] + along * unit
-    both = np.stack([middle + across, middle - across])
-    d = both[..., None, :] - elbow
-    wrong_mode = np.sum(cross(a, d) * robot.mode < 0, axis=-1)
-    gaps = np.abs(np.linalg.norm(d, axis=-1) - l2).sum(axis=-1)
-    best = np.argmin(wrong_mode + gaps / l2.max(), axis=0)
-    return both[best, np.arange(len(best))]
+    along = (distance**2 + l_i**2 - l_j**2) / (2 * distance)
+    across = np.sqrt(np.maximum(l_i**2 - along**2, 0.0)) * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+    middle = elbow[i] + along * unit
+    return np.concatenate([middle + across, middle - across])
+
+
+def _misfit(robot: Manipulator, angles: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Sums of the squared residuals of the angles (k, N) at places x (..., k, 2), rad^2; infinite where none fits.
+
+    That is out of reach, and where an arm would point the other way, by more than a quarter of a turn.
+    """
+    q, cosine = cores.joint_angles(robot, x, robot.mode)
+    residual = cores.wrap(angles - q[..., : robot.n_arms])
+    out = ((np.abs(cosine) > 1.0 - 1e-12) | (np.abs(residual) > np.pi / 2)).any(axis=-1)
+    return np.where(out, np.inf, np.vecdot(residual, residual))
 
 
 def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -55,7 +55,7 @@ def projector(J) -> np.ndarray:
     array([0., 2., 3.])
     """
     J = _jacobian(J)
-    return cores.projector(*cores.row_space(J, _size(J)))
+    return cores.projector(*cores.row_space(J, _size(J), of_pose=False))
 
 
 def projector_dot(J, J_dot) -> np.ndarray:
@@ -65,7 +65,7 @@ def projector_dot(J, J_dot) -> np.ndarray:
     -2.0
     """
     J, J_dot = _jacobians(J, J_dot)
-    Q, R = cores.row_space(J, _size(J))
+    Q, R = cores.row_space(J, _size(J), of_pose=False)
     return cores.projector_dot(Q, R, J_dot, cores.projector(Q, R))
 
 

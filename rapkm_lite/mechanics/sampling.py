@@ -73,6 +73,25 @@ def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
 
 
+def slow_edges(t: np.ndarray, edges: int, rest: float) -> float:
+    """The time of an edge of a polygon in s, unless samples would miss a corner or the motion.
+
+    With two samples in that time one lies inside every edge, and one a quarter of it from every corner at most: a tenth
+    of an edge.
+    """
+    duration, dt = t[-1], t[-1] / (len(t) - 1)
+    if not 0.0 <= 2 * rest < duration:
+        raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
+    edge_time = (duration - 2 * rest) / edges
+    if edge_time < 2 * dt * (1 - 1e-9):
+        raise ValueError(
+            f"dt = {dt:g} s; allowed: up to half the time of an edge, which is {edge_time:g} s ({edges} edges in "
+            f"duration - 2 rest = {duration - 2 * rest:g} s), so a shorter dt, a longer duration, less rest or fewer "
+            "corners"
+        )
+    return edge_time
+
+
 def slow_turns(t: np.ndarray, turns) -> float:
     """The turns of a circle, unless samples would show another one; a quintic is 15/8 times as fast as on average."""
     turns = positive_number("turns", turns)

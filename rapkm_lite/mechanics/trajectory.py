@@ -10,7 +10,7 @@ import numpy as np
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
-from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_turns
+from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_edges, slow_turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -184,7 +184,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     """The closed polygon through `corners` (k, 2) in m, each edge quintic from rest to rest in the same time.
 
     duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after.
-    Raises ValueError when the path leaves the workspace, or a time does not fit.
+    Raises ValueError when the path leaves the workspace, or a time does not fit, so that an edge has two samples.
 
     >>> import rapkm_lite as rk
     >>> rk.polygon(rk.load(), [[-0.05, 0.01], [0.05, 0.01], [0.0, 0.05]], duration=3.0).x[1000].round(3)
@@ -198,12 +198,8 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
 
 
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
-    t = sample_times(duration, dt)
-    duration, rest = positive_number("duration", duration), float(exact_array("rest", rest))
-    if not 0.0 <= 2 * rest < duration:
-        raise ValueError(f"rest = {rest:g} s; allowed: 0 <= rest < duration / 2 = {duration / 2:g} s")
-    edges = len(corners)
-    edge_time = (duration - 2 * rest) / edges
+    t, rest, edges = sample_times(duration, dt), float(exact_array("rest", rest)), len(corners)
+    edge_time = slow_edges(t, edges, rest)
     ends = np.roll(corners, -1, axis=0)
 
     def motion(rows: slice):

@@ -12,9 +12,10 @@ from ..machine.datafiles import UNITS_OF, data_path, known, read_toml
 from ..machine.manipulator import Manipulator, load
 from ..machine.values import Value
 from ..mechanics.trajectory import Trajectory, triangle
-from .faults import Fault, check_faults, read_fault
+from .faults import Fault, read_fault
 from .runs import Run, simulate
 from .sensors import Sensors
+from .setup import prepare
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,7 +34,8 @@ class Experiment(Value):
     faults: tuple[Fault, ...] = ()
 
     def __post_init__(self):
-        self._set(faults=check_faults(self.faults))
+        # What a run would refuse is refused here.
+        self._set(faults=prepare(self.robot, self.trajectory, self.sensors, faults=self.faults).broken)
         super().__post_init__()
 
     @property

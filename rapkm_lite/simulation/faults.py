@@ -6,6 +6,7 @@ Drives count from 0, times are in s from the start of the run.  To add a fault, 
 from __future__ import annotations
 
 import copy
+import inspect
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -186,6 +187,8 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
         if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
             raise ValueError(f"{fault!r} writes what is no finite number into table.jump or table.limit")
+        if table.limit.min() < 0.0:
+            raise ValueError(f"{fault!r} writes table.limit = {table.limit.min():g} N m; allowed: 0 or more")
     return table
 
 
@@ -196,9 +199,18 @@ def check_faults(faults) -> tuple[Fault, ...]:
     checked = []
     for fault in () if faults is None else faults if np.iterable(faults) else (faults,):
         if not isinstance(fault, Fault):
-            raise ValueError(f"faults holds {short(fault)}; allowed: {', '.join(kinds())}")
+            raise ValueError(f"faults holds {short(fault)}{_instead(fault)}")
         checked.append(fault)
     return tuple(checked)
+
+
+def _instead(wrong) -> str:
+    """What is allowed in place of what is no fault."""
+    if isinstance(wrong, type):
+        name = wrong.__name__ if issubclass(wrong, Fault) else "DeadDrive"
+        return f", which is a class; allowed: a fault, such as {name}(...)"
+    own = ", or a fault of your own: derive its class from rapkm_lite.simulation.faults.Fault"
+    return f"; allowed: {', '.join(kinds())}{own if hasattr(wrong, 'mark') else ''}"
 
 
 def read_fault(table) -> Fault:
@@ -208,10 +220,13 @@ def read_fault(table) -> Fault:
     values = {key: value for key, value in table.items() if key != "kind"}
     known("kind of fault", table["kind"], list(kinds()))
     kind = kinds()[table["kind"]]
-    names = list(kind.__dataclass_fields__)
+    # The signature knows defaults, also of a class that is no dataclass.
+    parameters = inspect.signature(kind).parameters.values()
+    given = {p.name: p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)}
     for key in values:
-        known(f"entry of {table['kind']}", key, names)
-    for name in names:
+        known(f"entry of {table['kind']}", key, list(given))
+    needed = [name for name, parameter in given.items() if parameter.default is parameter.empty]
+    for name in needed:
         if name not in values:
-            raise ValueError(f"the fault {table['kind']} lacks {name!r}; needed: {', '.join(names)}")
+            raise ValueError(f"the fault {table['kind']} lacks {name!r}; needed: {', '.join(needed)}")
     return kind(**values)

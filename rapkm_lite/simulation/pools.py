@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+
+from ..machine.arguments import short
 
 
 @contextmanager
@@ -16,6 +19,33 @@ def pool_of(executor: Executor | None, threads: int):
     finally:
         if executor is None:
             pool.shutdown(cancel_futures=True)
+
+
+def answer(job: Future, first: int, setup, laws, offsets):
+    """What `run_chunk` answers for the runs from `first` on.
+
+    Raises ValueError where an executor could not send it to another process, for a law or fault that does not travel.
+    """
+    try:
+        return job.result()
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        named = {f"law of run {i}": law for i, law in enumerate(laws, first)}
+        for name, value in (named | {f"fault {i}": fault for i, fault in enumerate(setup.broken)}).items():
+            if words := _kept_here(value):
+                raise ValueError(
+                    f"{name} = {short(value)} cannot be sent to another process ({words}); allowed: what pickle sends, "
+                    "such as a def or a class of a module, or threads (executor = None or a ThreadPoolExecutor)"
+                ) from error
+        raise
+
+
+def _kept_here(value) -> str:
+    """Why a value cannot be sent to another process; nothing where it can."""
+    try:
+        pickle.dumps(value)
+        return ""
+    except Exception as error:
+        return " ".join(str(error).split()) or type(error).__name__
 
 
 def _threads() -> bool:

@@ -92,6 +92,9 @@ class Run(Value):
         as_law(self.law)
         self._set(faults=check_faults(self.faults))
         super().__post_init__()
+        if self.t.ndim != 1 or len(self.t) > len(self.trajectory):
+            most = len(self.trajectory)
+            raise ValueError(f"t has shape {self.t.shape}; allowed: (k,), up to the {most} samples of the trajectory")
         for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
             shape = self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
             real_array(name, getattr(self, name))

@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import builtins
 import json
+import os
 import re
 import symtable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...machine.arguments import short
 from ..exercise import Exercise
 
 _EXERCISE = re.compile(r"\d\d\.\w+")
@@ -45,8 +47,8 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
     known : numbers of the lessons that have exercises.  Notebooks without such a number in their name are left out.
     Raises ValueError when the folder does not exist or holds none.
     """
-    if not folder.is_dir():
-        raise ValueError(f"submissions = {str(folder)!r}; allowed: a folder that exists")
+    if not os.path.isdir(folder):  # also where the name is longer than a name can be
+        raise ValueError(f"submissions = {short(str(folder))}; allowed: a folder that exists")
     submissions = []
     for path in sorted(folder.rglob("*.ipynb")):
         parts = path.relative_to(folder).parts

@@ -3,23 +3,47 @@
 from __future__ import annotations
 
 import csv
+import os
 import sys
 from collections import Counter
 from pathlib import Path
 
+from ...machine.arguments import short
 from .grader import Grade
 from .submission import Submission
 
 COLUMNS = ("student", "exercise", "verdict", "points", "of", "sentence", "mistake")
 
 
+def check_place(path: Path) -> None:
+    """Raise ValueError where a file cannot be written: to be asked before an hour of grading, not after it."""
+    try:
+        there = os.path.lexists(path)
+        with path.open("a"):
+            pass
+        if not there:
+            path.unlink()
+    except OSError as error:
+        raise _unwritten(path, error) from None
+
+
 def write_csv(path: Path, grades: list[Grade]) -> None:
-    """One row per student and exercise; text that a spreadsheet would run as a formula is quoted."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(COLUMNS)
-        for grade in grades:
-            rows.writerow([_harmless(getattr(grade, column)) for column in COLUMNS])
+    """One row per student and exercise; text that a spreadsheet would run as a formula is quoted.
+
+    Raises ValueError where the file cannot be written.
+    """
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow(COLUMNS)
+            for grade in grades:
+                rows.writerow([_harmless(getattr(grade, column)) for column in COLUMNS])
+    except OSError as error:
+        raise _unwritten(path, error) from None
+
+
+def _unwritten(path: Path, error: OSError) -> ValueError:
+    return ValueError(f"csv = {short(str(path))} cannot be written ({error.strerror}); allowed: a file in a folder")
 
 
 def _harmless(value: object) -> object:
