@@ -335,9 +335,17 @@ class Ripple(Fault):
         table.jump[:, self.drive] += 1e-3 * np.sin(2 * np.pi * self.frequency * t)
 
 
+class LateRipple(Ripple):
+    """A fault that derives from one that derives from `Fault`."""
+
+    def mark(self, table, t):
+        table.jump[t > 0.1, self.drive] += 1e-3
+
+
 @pytest.mark.parametrize(
     ("entries", "fault"),
     [
+        ('kind = "LateRipple"\ndrive = 1\n', LateRipple(1)),
         ('kind = "Ripple"\ndrive = 1\n', Ripple(1)),
         ('kind = "Ripple"\ndrive = 1\nfrequency = 3.0\n', Ripple(1, 3.0)),
         ('kind = "Weaker"\nlimit = 0.05\n', Weaker(0.05)),

@@ -155,8 +155,12 @@ class OffsetJump(Fault):
 
 
 def kinds() -> dict[str, type[Fault]]:
-    """All faults by name, also those that you wrote."""
-    return {kind.__name__: kind for kind in Fault.__subclasses__()}
+    """All faults by name, also those that you wrote, whichever fault they derive from."""
+    found, new = {}, Fault.__subclasses__()
+    while new:
+        found |= {kind.__name__: kind for kind in new}
+        new = [kind for parent in new for kind in parent.__subclasses__()]
+    return found
 
 
 def _from(t: np.ndarray, time: float) -> np.ndarray:
