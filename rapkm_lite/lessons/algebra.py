@@ -77,7 +77,7 @@ def argument_factor(seen: Seen) -> str:
 def constant_factor(seen: Seen) -> str:
     """Any other constant factor."""
     k = ratio_of(seen.got, seen.want)
-    if k != 0.0 and seen.same([k * w for w in seen.want]):
+    if abs(abs(k) - 1.0) > 2 * seen.slack and k != 0.0 and seen.same([k * w for w in seen.want]):
         sign = ", and the sign is opposite" * (k < 0)
         return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
@@ -132,6 +132,8 @@ def mixture(seen: Seen) -> str:
     if want.shape[1] < 2 * shape[0] or np.linalg.matrix_rank(want, 1e-6 * np.abs(want).max()) < shape[0]:
         return ""
     M = got @ np.linalg.pinv(want)
+    if np.abs(M - np.eye(len(M))).max() <= 5 * seen.slack:
+        return ""
     return _mixed(M, "row" if len(shape) == 2 else "entry") if alike(M @ want, got, seen.slack) else ""
 
 

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+NOTHING = "no value is returned: is a return missing, or has a solver found nothing?"
+
 
 class Result(NamedTuple):
     """What an examination finds: "ok", "close", "todo" or "wrong", one sentence, and the name of the mistake if any."""
@@ -107,7 +109,7 @@ def given(answer: Any, case: tuple) -> Any:
         raise Ended("wrong", sentence, "not numeric")
     got = guarded(answer, *map(copied, case)) if callable(answer) else answer
     if got is None or got is Ellipsis or got is NotImplemented:
-        raise Ended("todo", "not yet: no value is returned")
+        raise Ended("todo", NOTHING)
     if inspect.iscoroutine(got):
         got.close()
         raise Ended("wrong", "the answer is a coroutine: write def, not async def", "not numeric")

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .answers import Answer, Ended, Result, copied, fitting, given, guarded, numbers
+from ..machine.manipulator import Manipulator
+from .answers import NOTHING, Answer, Ended, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
 from .seen import Seen, alike
@@ -76,8 +77,11 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
         try:
             got.append(ask(k))
         except Ended as end:
+            if end.result.sentence == NOTHING and got:
+                raise Ended("wrong", f"{NOTHING}; some other case has one", "none") from None
             if all(labels[: k + 1]) and label not in labels[:k] and k > 0:
-                end.add_note(f"; for {label}, while it goes through for {labels[0]}")
+                own = " (is it the robot of the arguments?)" * any(isinstance(v, Manipulator) for v in cases[k])
+                end.add_note(f"; for {label}, while it goes through for {labels[0]}{own}")
             raise
     return got
 
@@ -135,32 +139,31 @@ def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
     return (lawful if lawful == lawful else np.inf), sentence
 
 
-def _matches(mistake: Callable, seen: Seen) -> str:
-    """Words for the sign with which a mistake explains the answer in every case, or None where it does not."""
+def _sign(mistake: Callable, seen: Seen) -> int:
+    """The sign with which a mistake explains the answer in every case; 0 where it does not."""
     try:
         with np.errstate(all="ignore"):
             made = [np.asarray(mistake(*map(copied, case)), dtype=float) for case in seen.cases]
     except Exception:
-        return "no"
-    if all(m.shape == w.shape and alike(m, w, 1e-9) for m, w in zip(made, seen.want, strict=True)):
-        return "no"
-    for sign, words in ((1, ""), (-1, ", and the sign is opposite")):
-        if seen.same([sign * m for m in made]):
-            return words
-    return "no"
+        return 0
+    if all(m.shape == w.shape and alike(m, w, max(1e-9, seen.slack)) for m, w in zip(made, seen.want, strict=True)):
+        return 0
+    return next((sign for sign in (1, -1) if seen.same([sign * m for m in made])), 0)
 
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:
     """End the examination where the answer is that of a mistake the exercise knows by name."""
     if exercise.unique and all(alike(w, g, max(seen.slack, 0.0)) for g, w, _ in seen):
         return
-    for sentence, mistake in exercise.mistakes.items():
-        words = _matches(mistake, seen)
-        if words != "no":
+    signs = {sentence: _sign(mistake, seen) for sentence, mistake in exercise.mistakes.items()}
+    # What explains the answer as it is goes before what explains its opposite.
+    for sentence in sorted(signs, key=lambda sentence: -signs[sentence]):
+        if signs[sentence] != 0:
+            turned = ", and the sign is opposite" * (signs[sentence] < 0)
             off = ""
             if all(g.shape == w.shape for g, w, _ in seen):
                 off = f"; off by up to {max(_deviation(g, w) for g, w, _ in seen):.3g} {exercise.unit}"
-            raise Ended("wrong", f"{sentence}{words}{off}", sentence)
+            raise Ended("wrong", f"{sentence}{turned}{off}", sentence)
 
 
 def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> None:

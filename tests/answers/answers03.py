@@ -313,6 +313,8 @@ ANSWERS = {
         ("right", "one NaN", float("nan")),
         ("right", "the one number", 1.5e-4),
         ("right", "words", "the three offsets cannot be told from one place"),
+        ("wrong", "numbers in words", "the offsets are 4, -2 and 5 mrad, nothing else", "say it with numbers"),
+        ("wrong", "another in words", "the offset is known: nothing is wrong", "say it with numbers"),
         (
             "wrong",
             "minimum norm",

@@ -193,6 +193,9 @@ EXERCISES = {
             "this is the midpoint of another side of the base triangle, (order of the arms)": (
                 lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[1]]].mean(axis=0)
             ),
+            "this is the sum of the two base points, not the point midway (a factor of 2)": (
+                lambda mode: 2 * tasks.input_singularity(mode)
+            ),
             "this is a base joint of the two arms that bend alike, not the middle between them": (
                 lambda mode: load().base[tasks.equal(mode)[0]]
             ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 
 import numpy as np
 
@@ -59,11 +60,13 @@ def fight_cases(rng) -> list[tuple]:
         n = null_vector(robot, inverse_kinematics(robot, x))
         cases.append((n, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)))
     idle = np.array([0.0, 0.6, 0.8])
+    mixed = null_vector(robot, inverse_kinematics(robot, robot.base[:2].mean(axis=0) + [0.05, 0.06], (1, 1, -1)))
     four = rng.standard_normal(4)
     four /= np.linalg.norm(four)
     return [
         *cases,
         Case("a pose where drive 1 has no share", idle, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)),
+        Case("another working mode", mixed, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)),
         Case("four drives", four, rng.uniform(2.0, 20.0, 4), rng.uniform(-8e-3, 8e-3, 4), beyond=True),
     ]
 
@@ -99,16 +102,16 @@ def betrayal(offsets) -> list[Measured]:
         ("four_arms", (0.03, -0.04), 0.3),
     ):
         robot = load(name).replace(friction=0.0)
-        given = np.asarray(offsets(robot, np.array(x)), dtype=float)
-        if given.shape != (robot.n_arms,):
+        chosen = numbers(given(offsets, (robot, np.array(x))))
+        if chosen.shape != (robot.n_arms,):
             raise Ended(
-                "wrong", f"the offsets have shape {given.shape}, expected ({robot.n_arms},): one for each drive"
+                "wrong", f"the offsets have shape {chosen.shape}, expected ({robot.n_arms},): one for each drive"
             )
         gains, stay = _gains(robot, spread), hold(robot, x, 1.0)
-        run = simulate(robot, _pd(gains), stay, given)
+        run = simulate(robot, _pd(gains), stay, chosen)
         shift.append(1e3 * np.linalg.norm(run.x[-1] - x))
         torque.append(1e3 * np.abs(run.c[-1]).max())
-        size.append(1e3 * np.abs(given).max())
+        size.append(1e3 * np.abs(chosen).max())
     return [
         Measured("smallest shift at rest", min(shift), "mm", SHIFT, at_most=False),
         Measured("largest torque at rest", max(torque), "mN m", HELD),
@@ -179,7 +182,8 @@ def unexplained_gain(gains):
 def refusal(answer) -> Result:
     """The verdict on what `offset_c` tells: one number, eta.offset; no single offset."""
     if isinstance(answer, str):
-        if any(word in answer.lower() for word in ("not", "can't", "unknown", "impossible", "nan", "one number")):
+        said = set(re.findall(r"[a-z']+", answer.lower()))
+        if said & {"not", "cannot", "can't", "unknown", "impossible", "nan"} and not re.search(r"\d", answer):
             return Result("ok", "one place tells one number, eta.offset; the three offsets stay open, as you say")
         raise Ended("wrong", "say it with numbers: three offsets, np.nan for each one that the log cannot tell")
     got = numbers(given(answer, ()))

@@ -45,6 +45,9 @@ EXERCISES = {
             "only the first place is used, and the smallest offsets that explain it: one place knows one combination": (
                 tasks.of_one_place
             ),
+            "the readings are corrected the wrong way: the poses are those of q_a - offset": (
+                tasks.corrected_the_wrong_way
+            ),
             "these are the gaps of the places, not the offsets behind them": lambda robot, q_a, guess: tasks.equations(
                 robot, q_a, 0.0, guess
             )[1].ravel(),
@@ -61,7 +64,8 @@ EXERCISES = {
         unit="m",
         judge=tasks.known,
         close=0.1,
-        improve="move every place to the edge of the disc, towards a direction in which one component of n vanishes",
+        improve="bring what is marked as missed inside its limit; the places that tell most lie where a component of n "
+        "vanishes, as far out as the disc allows",
         points=10.0,
         mistakes={
             "these are six places evenly on a circle, three of which show what is known already: compare the "
@@ -81,7 +85,7 @@ EXERCISES = {
         unit="",
         judge=tasks.shown,
         close=0.1,
-        improve="reach further out, where the null vectors differ most, and pass as many counts as the time allows",
+        improve="bring what is marked as missed inside its limit; far out in the disc the null vectors differ most",
         points=10.0,
     ),
     "08.counts": Exercise(

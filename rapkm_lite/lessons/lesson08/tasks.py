@@ -49,13 +49,17 @@ def equations(robot, q_a, offset, guess) -> tuple[np.ndarray, np.ndarray]:
     return rows, np.einsum("kij,kj->ki", rows, cores.wrap(q_a - q[:, : robot.n_arms]))
 
 
-def self_calibrate(robot, q_a, guess) -> np.ndarray:
+def self_calibrate(robot, q_a, guess, sign=1.0) -> np.ndarray:
     """Offsets (N,) in rad from readings q_a (k, N) in rad; guess (k, 2) in m lies near the places."""
     offset = np.zeros(robot.n_arms)
     for _ in range(10):
-        rows, gap = equations(robot, q_a, offset, guess)
+        rows, gap = equations(robot, q_a, sign * offset, guess)
         offset = np.linalg.lstsq(rows.reshape(-1, robot.n_arms), gap.ravel(), rcond=None)[0]
     return offset
+
+
+def corrected_the_wrong_way(robot, q_a, guess) -> np.ndarray:
+    return self_calibrate(robot, q_a, guess, -1.0)
 
 
 def left_over(robot, q_a, guess) -> np.ndarray:

@@ -73,9 +73,25 @@ def one_sign_cases(rng) -> list[tuple]:
             if common_sign(A):
                 found.append(A)
         for A in found:
+            least = rng.uniform(2e-3, 9e-3)
             f = A.T @ rng.uniform(-0.05, 0.05, len(A))
-            cases.append(Case(label, A, f, rng.uniform(2e-3, 9e-3), beyond=name == "four_arms"))
+            # With four arms least squares has another answer, though not for every force.
+            for _ in range(200 if len(A) > 3 else 0):
+                if _beyond_squares(A, one_sign(A, f, least), least):
+                    break
+                f = A.T @ rng.uniform(-0.3, 0.3, len(A))
+            cases.append(Case(label, A, f, least, beyond=name == "four_arms"))
     return cases
+
+
+def _beyond_squares(A, c, least) -> bool:
+    """Are torques c of smallest sum not those of smallest sum of squares?
+
+    Then a multiplier of the bounds that hold is below 0: beyond its bound the squares would fall.
+    """
+    bound = c < least + 1e-9
+    force = np.linalg.lstsq(A[~bound], c[~bound], rcond=None)[0]
+    return bool((c[bound] - A[bound] @ force).min(initial=0.0) < -1e-3)
 
 
 def off_the_force(got, A, f, least) -> tuple[float, str]:

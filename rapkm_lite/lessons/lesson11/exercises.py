@@ -18,6 +18,12 @@ def _frequencies(robot, q, matrix) -> np.ndarray:
     return np.sqrt(np.abs(np.sort(np.linalg.eigvals(matrix).real))) / (2 * np.pi)
 
 
+def _taken_for_symmetric(robot, q, K_P) -> np.ndarray:
+    G, A = _terms(robot, q)
+    values = np.linalg.eigvalsh(np.linalg.solve(G, A.T @ (K_P[:, None] * A)))
+    return np.sqrt(np.abs(values)) / (2 * np.pi)
+
+
 def _terms(robot, q):
     return minimal_dynamics(robot, q, 0 * q, None)[0], control_matrix(robot, q)
 
@@ -88,6 +94,9 @@ EXERCISES = {
             ),
             "the gains are averaged: unequal gains turn and split the two modes": (
                 lambda robot, q, K_P: tasks.pd_frequencies(robot, q, np.full(robot.n_arms, np.mean(K_P)))
+            ),
+            "eigvalsh takes the matrix for symmetric, which G^-1 A^T K_P A is not: np.linalg.eigvals": (
+                _taken_for_symmetric
             ),
             "A is missing: each drive moves only its own proximal link then": (
                 lambda robot, q, K_P: (
