@@ -127,6 +127,7 @@ def rho(eta, offset):
 
 
 FIGHT = [
+    ("wrong", "eta without its signs", lambda n, k, o: -np.abs(n) * (np.abs(n) @ o) / np.sum(n**2 / k), "working mode"),
     ("right", "formula", fight),
     ("right", "through the rest pose", through_rest),
     ("right", "root of the closing condition", by_fit),

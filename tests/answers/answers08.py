@@ -85,6 +85,7 @@ COUNTS = [
 
 ANSWERS = {
     "08.self_calibrate": [
+        ("wrong", "corrected the wrong way", tasks.corrected_the_wrong_way, "the wrong way"),
         ("right", "reference", tasks.self_calibrate),
         ("right", "the package", by_the_package),
         ("right", "a search", by_a_search),

@@ -30,6 +30,14 @@ def clipped(A, f, least=0.0):
     return np.maximum(tasks.smallest(A, f), least)
 
 
+def least_squares(A, f, least):
+    made = {"type": "eq", "fun": lambda c: A.T @ c - f}
+    start, bounds = clipped(A, f, least), [(least, None)] * len(A)
+    return minimize(
+        lambda c: c @ c, start, bounds=bounds, constraints=[made], method="SLSQP", options={"ftol": 1e-15}
+    ).x
+
+
 def along_n(A, f, least):
     c, n = tasks.smallest(A, f), rk.null_basis(A)[:, 0]
     return c + max((least - c) / n) * n
@@ -68,6 +76,7 @@ def little(least):
 
 ANSWERS = {
     "09.room": [
+        ("wrong", "n turned round", lambda c, n, limit: tasks.room(c, -n, limit), "the sign of mu"),
         ("right", "reference", tasks.room),
         ("right", "drive by drive, a tuple", drive_by_drive),
         ("right", "middle and half, a list", with_absolute_values),
@@ -91,6 +100,7 @@ ANSWERS = {
         ("wrong", "the torques at the ends", lambda c, n, m: c + tasks.room(c, n, m)[:, None] * n, ""),
     ],
     "09.one_sign": [
+        ("close", "the smallest sum of squares", least_squares),
         ("right", "reference", tasks.one_sign),
         ("right", "another solver", lambda A, f, least: linprog(
             [1] * len(A), A_eq=A.T, b_eq=f, bounds=[(least, 10)] * len(A), method="highs-ipm").x),

@@ -21,6 +21,11 @@ def symmetric(robot, q, K_P):
     return np.sqrt(eigh(stiffness, inertia, eigvals_only=True)) / (2 * np.pi)
 
 
+def taken_for_symmetric(robot, q, K_P):
+    G, A = rk.minimal_dynamics(robot, q, 0 * q, None)[0], rk.control_matrix(robot, q)
+    return np.sqrt(np.abs(np.linalg.eigvalsh(np.linalg.inv(G) @ A.T @ np.diag(K_P) @ A))) / (2 * np.pi)
+
+
 def in_angles(robot, q, K_P):
     """In the angles of drives 1 and 2 instead of the place of the end-effector."""
     F = rk.orthogonal_complement(robot, q, (0, 1))
@@ -175,6 +180,7 @@ GAINS = [
 
 ANSWERS = {
     "11.pd_frequencies": [
+        ("wrong", "taken for symmetric", taken_for_symmetric, "eigvalsh"),
         ("right", "reference", right),
         ("right", "symmetric eigenproblem", symmetric),
         ("right", "in two angles, a list", in_angles),
