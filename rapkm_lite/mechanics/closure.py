@@ -94,7 +94,7 @@ def _pose_hessian(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np
     return np.where(regular[..., None, None], hessian, square)
 
 
-def _misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q at x, the residuals of the base angles q_a there, and the sum of their squares, infinite out of reach."""
     q, cosine = cores.joint_angles(robot, x, robot.mode)
     residual = wrap(q_a - q[..., : robot.n_arms])
@@ -122,7 +122,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     size, limit = np.full((*lead, 1), np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
     limit += 8.0 * np.spacing(np.abs(robot.base).max() + robot.lengths.max())  # the rounding of x far from the origin
-    q, residual, square = _misfit(robot, q_a, x)
+    q, residual, square = misfit(robot, q_a, x)
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         if np.isinf(square).any():
             break
@@ -135,7 +135,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
         step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))
         for k in range(40):
-            trial = _misfit(robot, q_a, x + step)
+            trial = misfit(robot, q_a, x + step)
             worse = trial[2] > square + 1e-14
             if not worse.any():
                 break

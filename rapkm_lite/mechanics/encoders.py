@@ -16,7 +16,7 @@ from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator
 from . import cores
 from .at import At, at
-from .closure import estimate_pose
+from .closure import estimate_pose, misfit
 from .kinematics import cross, unit_vector
 
 
@@ -84,7 +84,7 @@ def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
         starts = np.concatenate([guess[None], starts])
     # The circles of one pair may cross badly, or not at all, where those of another cross well.  A crossing that fits
     # better than the pose of least squares nearby belongs to another assembly, and to a better one.
-    best = np.argmin(_misfit(robot, angles, starts), axis=0)
+    best = np.argmin(_fit(robot, angles, starts), axis=0)
     try:
         return estimate_pose(robot, angles, starts[best, np.arange(len(angles))])
     except (ConvergenceError, ValueError) as error:
@@ -101,10 +101,10 @@ def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndar
     i, j = np.triu_indices(robot.n_arms, 1)
     side = cross(pose.d[:, i], pose.d[:, j]).T
     across = np.concatenate([side < 0.0, side > 0.0])
-    second = np.where(across, _misfit(robot, angles, _crossings(robot, angles)), np.inf)
+    second = np.where(across, _fit(robot, angles, _crossings(robot, angles)), np.inf)
     # With residuals r at a pose, those at the crossing of the pair S of largest |det A_S| are r - A A_S^-1 r_S to first
     # order; no entry of A A_S^-1 exceeds 1, and 1 + 2 (N - 2) bounds the growth of the square.
-    return second.min(axis=0) > (2 * robot.n_arms - 3) * _misfit(robot, angles, pose.x).max(), pose.x
+    return second.min(axis=0) > (2 * robot.n_arms - 3) * _fit(robot, angles, pose.x).max(), pose.x
 
 
 def _crossings(robot: Manipulator, angles: np.ndarray) -> np.ndarray:
@@ -125,15 +125,13 @@ def _crossings(robot: Manipulator, angles: np.ndarray) -> np.ndarray:
     return np.concatenate([middle + across, middle - across])
 
 
-def _misfit(robot: Manipulator, angles: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _fit(robot: Manipulator, angles: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Sums of the squared residuals of the angles (k, N) at places x (..., k, 2), rad^2; infinite where none fits.
 
     That is out of reach, and where an arm would point the other way, by more than a quarter of a turn.
     """
-    q, cosine = cores.joint_angles(robot, x, robot.mode)
-    residual = cores.wrap(angles - q[..., : robot.n_arms])
-    out = ((np.abs(cosine) > 1.0 - 1e-12) | (np.abs(residual) > np.pi / 2)).any(axis=-1)
-    return np.where(out, np.inf, np.vecdot(residual, residual))
+    _, residual, square = misfit(robot, angles, x)
+    return np.where((np.abs(residual) > np.pi / 2).any(axis=-1), np.inf, square)
 
 
 def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

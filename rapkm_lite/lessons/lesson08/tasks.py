@@ -49,8 +49,12 @@ def equations(robot, q_a, offset, guess) -> tuple[np.ndarray, np.ndarray]:
     return rows, np.einsum("kij,kj->ki", rows, cores.wrap(q_a - q[:, : robot.n_arms]))
 
 
-def self_calibrate(robot, q_a, guess, sign=1.0) -> np.ndarray:
+def self_calibrate(robot, q_a, guess) -> np.ndarray:
     """Offsets (N,) in rad from readings q_a (k, N) in rad; guess (k, 2) in m lies near the places."""
+    return _repeated(robot, q_a, guess, 1.0)
+
+
+def _repeated(robot, q_a, guess, sign) -> np.ndarray:
     offset = np.zeros(robot.n_arms)
     for _ in range(10):
         rows, gap = equations(robot, q_a, sign * offset, guess)
@@ -59,7 +63,7 @@ def self_calibrate(robot, q_a, guess, sign=1.0) -> np.ndarray:
 
 
 def corrected_the_wrong_way(robot, q_a, guess) -> np.ndarray:
-    return self_calibrate(robot, q_a, guess, -1.0)
+    return _repeated(robot, q_a, guess, -1.0)
 
 
 def left_over(robot, q_a, guess) -> np.ndarray:
