@@ -483,14 +483,15 @@ export function mount(el, scene, link) {
   function typed({ type, target, key }) {
     if (!target.matches?.(".widget-readout") || !around()?.contains(target)) return;
     const words = () => target.textContent.replace("−", "-").trim(), before = words(), { was } = target.dataset;
-    if (type === "focus") target.dataset.was = before;
-    if (type === "blur" && before !== was) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
+    if (type === "beforeinput") target.dataset.was ??= before;
+    if (type === "blur" && was !== undefined) target.dispatchEvent(new KeyboardEvent("keydown", ENTER));
     if (key !== "Enter") return;
+    delete target.dataset.was;
     const { drawn } = state, meant = before ? Number(before) : NaN, whole = isFinite(meant);
     target.textContent = whole ? meant : before; // a slider reads neither a true minus nor, in whole numbers, 1e3
     setTimeout(() => {
-      const now = (target.dataset.was = words()), how = now === was ? "not read, it stays" : "read as";
-      if (state.drawn > drawn + 1 || around()?.querySelector(".noUi-active")) return; // the hand has moved on
+      const now = words(), how = now === was ? "not read, it stays" : "read as", again = "was" in target.dataset;
+      if (again || state.drawn > drawn + 1 || around()?.querySelector(".noUi-active")) return; // the hand has moved on
       say(meant === Number(now) ? "" : minus(`${before || "an empty field"} was ${whole ? "rounded to" : how} ${now}`));
     }, 400);
   }
@@ -498,12 +499,11 @@ export function mount(el, scene, link) {
   // A new style sheet may come late, so the picture is painted again for a while.
   const watch = new MutationObserver(() => [0, 300, 1200].forEach((ms) => setTimeout(paint, ms, true)));
   for (const node of [document.documentElement, document.body]) watch.observe(node, { attributes: true });
-  const sizes = new ResizeObserver(paint), gone = new AbortController(), { signal } = gone;
+  const sizes = new ResizeObserver(paint), gone = new AbortController(), here = { signal: gone.signal, capture: true };
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
-  for (const media of ["(prefers-color-scheme: dark)", "print"])
-    matchMedia(media).addEventListener("change", paint, { signal });
-  window.addEventListener("keydown", page, { signal, capture: true }); // JupyterLab listens on the document
-  for (const name of ["focus", "blur", "keydown"]) document.addEventListener(name, typed, { signal, capture: true });
+  for (const m of ["(prefers-color-scheme: dark)", "print"]) matchMedia(m).addEventListener("change", paint, here);
+  window.addEventListener("keydown", page, here); // JupyterLab listens on the document
+  for (const name of ["beforeinput", "blur", "keydown"]) document.addEventListener(name, typed, here);
   link.receive(receive);
   link.send({ kind: "hello" });
   return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove()), { say });

@@ -433,6 +433,18 @@ def test_number_that_is_left_counts_and_the_focus_goes_where_the_hand_went(shown
     assert still(notebook)["x"] == 54 and notebook.ask("() => stage.note()") == ""
 
 
+def test_number_that_is_typed_while_the_one_before_is_read_counts(shown):
+    notebook = shown("machine")
+    typed(notebook, "81")
+    notebook.page.keyboard.press("Enter")
+    typed(notebook, "51")
+    # The note on the first number would come now.
+    notebook.page.wait_for_timeout(800)
+    assert notebook.ask("() => stage.note()") == ""
+    changed(notebook, lambda: leave(notebook))
+    notebook.wait("() => stage.places().x === 52 && stage.note() === '51 was rounded to 52'", 10)
+
+
 def test_no_note_where_nothing_was_typed_or_the_hand_has_moved_on(shown):
     notebook = shown("machine")
     for _ in range(3):
