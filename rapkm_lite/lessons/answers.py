@@ -107,12 +107,17 @@ def given(answer: Any, case: tuple) -> Any:
     if isinstance(answer, type):
         sentence = f"the answer is the class {answer.__name__}; a value or a function is wanted"
         raise Ended("wrong", sentence, "not numeric")
-    got = guarded(answer, *map(copied, case)) if callable(answer) else answer
-    if got is None or got is Ellipsis or got is NotImplemented:
-        raise Ended("todo", NOTHING)
+    got = returned(guarded(answer, *map(copied, case))) if callable(answer) else returned(answer)
     if inspect.iscoroutine(got):
         got.close()
         raise Ended("wrong", "the answer is a coroutine: write def, not async def", "not numeric")
+    return got
+
+
+def returned(got: Any) -> Any:
+    """What a function of the student gave back; ends the examination where that is nothing."""
+    if got is None or got is Ellipsis or got is NotImplemented:
+        raise Ended("todo", NOTHING)
     return got
 
 

@@ -53,10 +53,19 @@ def _near_and_far(exercise: Exercise, answer: Any) -> Result:
     try:
         all_of_them = _numbers(exercise, answer, cases)
     except Ended as end:
-        labels = ", ".join(sorted({case.label for case in far}))
-        short = f"it is right, but not for {labels}, where {end.result.sentence}"
+        kinds = sorted({case.label for case in far})
+        fails = [kind for kind in kinds if _fails(exercise, answer, [case for case in far if case.label == kind])]
+        short = f"it is right, but not for {', '.join(fails or kinds)}, where {end.result.sentence}"
         return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
     return all_of_them if result.word == "ok" else result
+
+
+def _fails(exercise: Exercise, answer: Any, cases: list[tuple]) -> bool:
+    """True where the answer is wrong for these cases, taken alone."""
+    try:
+        return _numbers(exercise, answer, cases).word != "ok"
+    except Ended:
+        return True
 
 
 def _seen(exercise: Exercise, answer: Any, cases: list[tuple]) -> Seen:

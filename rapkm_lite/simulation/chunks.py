@@ -77,7 +77,7 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
 def _alone(setup: Setup, laws: list, offsets: np.ndarray, rows: Columns) -> list[int]:
     """Enter the rows of compiled laws, side by side; returns which rows have to run alone, in Python."""
     # Without a compiler nothing runs side by side, and sums are sooner made at the end of a run.
-    codes = {id(law): encode(law, setup.model) if compiled() else None for law in laws}
+    codes = {id(law): encode(law, setup) if compiled() else None for law in laws}
     fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
     own = list(fast)
     if fast:

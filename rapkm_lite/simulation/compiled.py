@@ -27,16 +27,16 @@ __all__ = [
 ]  # fmt: skip
 
 
-def encode(law: Any, model) -> Code | None:
-    """The engine's form of a law, or None where it has none: then the law runs through the textbook layer.
+def encode(law: Any, setup: Setup) -> Code | None:
+    """The engine's form of a law, or None where it has none for this run: then it runs through the textbook layer.
 
     It is kept beside the fields of a law of the package, which do not change.
     """
-    known = law.__dict__.setdefault("_codes", {}) if isinstance(law, Value) else {}
+    known, model = law.__dict__.setdefault("_codes", {}) if isinstance(law, Value) else {}, setup.model
     if model.n_arms not in known:
         known[model.n_arms] = code_of(law, model)
     code = known[model.n_arms]
-    return None if code is None or (code.user is not None and not compiled()) else code
+    return None if code is None or (code.user is not None and not (compiled() and setup.suits(code.user))) else code
 
 
 def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]:

@@ -251,7 +251,7 @@ def _runs(setup: Setup, law, k: int) -> bool:
     trajectory = setup.trajectory.for_robot(setup.model)._changed(robot=setup.model)
     setup = setup._replace(trajectory=trajectory).begin(k + k // 2 + 100)
     try:
-        code = encode(law, setup.model)
+        code = encode(law, setup)
         outcome, cause = closed_loop(setup, law) if code is None else single(setup, code)
     except (ValueError, ArithmeticError):
         return False

@@ -203,7 +203,7 @@ def simulate(
 def complete(setup: Setup, law) -> Run:
     """The whole run; raises SimulationError with a part of it."""
     as_law(law)
-    code, cause = encode(law, setup.model), None
+    code, cause = encode(law, setup), None
     steps = friction_steps(setup.robot, *setup.trajectory.x[0].tolist(), setup.trajectory.dt)
     words = f"friction is stiff: up to {steps} steps in every hold in which a drive is nearly at rest ..."
     with patience(text=words) if steps > MANY_STEPS else nullcontext():

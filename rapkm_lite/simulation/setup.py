@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..control.compiled_law import CompiledLaw
 from ..machine.arguments import of_kind
 from ..machine.manipulator import Manipulator, manipulator
+from ..mechanics import cores
 from ..mechanics.at import at
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
@@ -29,6 +31,16 @@ class Setup(NamedTuple):
     sensors: Sensors
     faults: FaultTable | None
     broken: tuple[Fault, ...] = ()
+
+    def suits(self, law: CompiledLaw) -> bool:
+        """Do the loops close where a compiled law asks for matrices?  Where not, it runs in Python, which says so."""
+        path = self.trajectory
+        if law.at != "desired" or path._apart is None:
+            return True
+        try:
+            return bool(cores.closed(self.model.tree, cores.link_vectors(self.model.tree, path.q)).size)
+        except ValueError:
+            return False
 
     def begin(self, samples: int) -> Setup:
         """The first samples of the run, two at least."""

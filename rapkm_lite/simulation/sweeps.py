@@ -63,7 +63,7 @@ def sweep(
     chunk = _check_options(failed, chunk, executor, progress)
     given, laws, offsets = _rows(law, offsets, robot.n_arms)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
-    in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup.model) is None]
+    in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup) is None]
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)

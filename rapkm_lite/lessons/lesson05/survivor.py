@@ -11,6 +11,7 @@ from ...mechanics.actuation import inverse_dynamics
 from ...mechanics.trajectory import triangle
 from ...simulation.faults import EncoderDropout
 from ...simulation.runs import SimulationError, simulate
+from ..answers import returned
 from ..checker import Exercise, Measured
 
 OFFSET = (4e-3, -2e-3, 5e-3)
@@ -34,7 +35,7 @@ def survivor(robot):
 
 def _runs(make) -> list[Measured]:
     """The largest distance from the path for each dead encoder; the machine has friction, the law's model none."""
-    law, path = make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)
+    law, path = returned(make(_model())), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)
     found = []
     for drive in range(3):
         dead = EncoderDropout(drive, START, 10.0)

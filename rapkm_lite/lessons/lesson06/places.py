@@ -12,6 +12,7 @@ from ...mechanics.kinematics import reachable
 from ...mechanics.trajectory import triangle
 from ...simulation.energy import antagonism_form
 from ...simulation.sweeps import sweep
+from ..answers import returned
 from ..checker import Measured
 
 SIDE, GAIN = 0.08, 7.05
@@ -67,7 +68,7 @@ def _places(answer) -> tuple[np.ndarray, ...]:
 
 
 def _point(centre) -> np.ndarray:
-    point = np.asarray(centre, dtype=float)
+    point = np.asarray(returned(centre), dtype=float)
     if point.shape != (2,) or not np.all(np.isfinite(point)):
         raise ValueError(f"the place is {centre!r}; allowed: two finite coordinates of the centre, in m")
     return point
