@@ -113,6 +113,7 @@ ANSWERS = {
         ("wrong", "all negative", lambda A, f, least: -tasks.one_sign(A, -f, least), "sign"),
         ("wrong", "opposite force", lambda A, f, least: tasks.one_sign(A, -f, least), "sign"),
         ("wrong", "no force", lambda A, f, least: tasks.one_sign(A, 0 * f, least), "force"),
+        ("wrong", "least on top", lambda A, f, least: tasks.smallest(A, f) + least, "added to every drive"),
         ("wrong", "far too much", box, ""),
         ("wrong", "all equal", lambda A, f, least: np.full(len(A), least), ""),
         ("wrong", "mN m", lambda A, f, least: 1e3 * tasks.one_sign(A, f, least), "1000"),

@@ -87,6 +87,7 @@ ANSWERS = {
         ("wrong", "own units", lambda J, scale: rk.projector(J), "scale"),
         ("wrong", "not carried back", lambda J, scale: rk.projector(J / scale), "come back"),
         ("wrong", "inverse scale", lambda J, scale: tasks.in_units(J, 1 / scale), "columns of J shrink"),
+        ("wrong", "J S alone", lambda J, scale: rk.projector(J * scale), "not J S, and"),
         ("wrong", "order", lambda J, scale: rk.projector(J / scale) / scale * scale[:, None], "order"),
         ("wrong", "same J", lambda J, scale: rk.projector(J) * scale / scale[:, None], "J was not changed"),
         ("wrong", "right side only", lambda J, scale: rk.projector(J / scale) * scale, "left"),

@@ -72,6 +72,9 @@ EXERCISES = {
                 lambda A, f, least: tasks.smallest(A, f)
             ),
             "clipped from below: the force is no longer f": lambda A, f, least: np.maximum(tasks.smallest(A, f), least),
+            "the same amount is added to every drive: the force is no longer f": (
+                lambda A, f, least: tasks.smallest(A, f) + least
+            ),
             "the absolute values make another force than f (the sign is no free choice)": (
                 lambda A, f, least: np.abs(tasks.smallest(A, f))
             ),

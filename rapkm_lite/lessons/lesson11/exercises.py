@@ -24,6 +24,11 @@ def _taken_for_symmetric(robot, q, K_P) -> np.ndarray:
     return np.sqrt(np.abs(values)) / (2 * np.pi)
 
 
+def _uncoupled(robot, q, K_P) -> np.ndarray:
+    G, A = _terms(robot, q)
+    return np.sqrt(np.sort(np.diag(A.T @ (K_P[:, None] * A)) / np.diag(G))) / (2 * np.pi)
+
+
 def _terms(robot, q):
     return minimal_dynamics(robot, q, 0 * q, None)[0], control_matrix(robot, q)
 
@@ -98,6 +103,7 @@ EXERCISES = {
             "eigvalsh takes the matrix for symmetric, which G^-1 A^T K_P A is not: np.linalg.eigvals": (
                 _taken_for_symmetric
             ),
+            "only the diagonals are kept: stiffness and inertia couple x and y": _uncoupled,
             "A is missing: each drive moves only its own proximal link then": (
                 lambda robot, q, K_P: (
                     np.sqrt(np.sort(K_P / np.diag(mass_matrix(robot, q))[: robot.n_arms])[:2]) / (2 * np.pi)

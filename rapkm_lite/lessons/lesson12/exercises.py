@@ -63,6 +63,7 @@ EXERCISES = {
             "J' = J S^-1, not J S: rates grow by scale, so the columns of J shrink": (
                 lambda J, scale: tasks.in_units(J, 1 / scale)
             ),
+            "J' = J S^-1, not J S, and the result has to come back": lambda J, scale: projector(J * scale),
             "there and back in the wrong order: S first, then N', then S^-1": (
                 lambda J, scale: projector(J / scale) / scale * scale[:, None]
             ),
