@@ -222,7 +222,7 @@ def triangle(
     angle: float = 0.0,
     rest: float = 0.0,
 ) -> Trajectory:
-    """The chapter's path: an equilateral triangle, one corner up, from the lower left corner, counter-clockwise.
+    """The triangle of fig. 4; our choice: equilateral, one corner up, from the lower left corner, counter-clockwise.
 
     side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s, see `polygon`.
 

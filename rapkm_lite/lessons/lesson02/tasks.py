@@ -26,7 +26,7 @@ def arms(rng) -> list[tuple]:
     """Arm vectors of seeded poses of the testbed in all working modes, of other machines, and near the rim."""
     robot = load()
     x = rng.uniform(-0.1, 0.1, (8, 2))
-    cases = [_pose(robot, p, s) for p, s in zip(x, working_modes(robot), strict=True)]
+    cases = [Case("the testbed", *_pose(robot, p, s)) for p, s in zip(x, working_modes(robot), strict=True)]
     uneven, four = load("asymmetric"), load("four_arms")
     cases += [Case("three different arms", *_pose(uneven, p)) for p in rng.uniform(-0.05, 0.05, (2, 2))]
     cases += [Case("four arms", *_pose(four, p), beyond=True) for p in rng.uniform(-0.08, 0.08, (2, 2))]
@@ -52,7 +52,7 @@ def control_matrices(rng) -> list[tuple]:
     """Control matrices with a torque limit: random poses, four arms, unequal arms, another mode."""
     robot, four, uneven = load(), load("four_arms"), load("asymmetric")
     x = rng.uniform(-0.1, 0.1, (6, 2))
-    cases = [(_matrix(robot, p), c) for p, c in zip(x, rng.uniform(0.05, 0.2, 6), strict=True)]
+    cases = [Case("the testbed", _matrix(robot, p), c) for p, c in zip(x, rng.uniform(0.05, 0.2, 6), strict=True)]
     middle = robot.base[:2].mean(axis=0)
     return [
         *cases,
@@ -127,9 +127,8 @@ def choices(rng) -> list[tuple]:
     for k in range(10):
         A = _matrix(four if k in (3, 7) else robot, rng.uniform(-0.06, 0.06, 2))
         m = len(A)
-        case = A, rng.uniform(-1.0, 1.0, 2), _weights(rng, m, k > 3), rng.uniform(-0.1, 0.1, m)
-        label = "four drives" if m == 4 else "weights that are not diagonal"
-        cases.append(Case(label, *case) if m == 4 or k > 3 else case)
+        label = "four drives" if m == 4 else f"weights that are {'not ' * (k > 3)}diagonal"
+        cases.append(Case(label, A, rng.uniform(-1.0, 1.0, 2), _weights(rng, m, k > 3), rng.uniform(-0.1, 0.1, m)))
     middle = robot.base[:2].mean(axis=0)
     A = _matrix(robot, middle + [0.004, 0.003], (1, 1, -1))
     cases.append(Case("a nearly singular pose", A, np.array([0.1, -0.2]), _weights(rng, 3, False), np.full(3, 0.05)))

@@ -33,7 +33,9 @@ def rest_cases(rng) -> list[tuple]:
     def gains(m):
         return np.diag(rng.uniform(2.0, 20.0, m))
 
-    cases = [(_matrix(robot, x), gains(3), rng.uniform(-8e-3, 8e-3, 3)) for x in rng.uniform(-0.08, 0.08, (5, 2))]
+    cases = []
+    for x in rng.uniform(-0.08, 0.08, (5, 2)):
+        cases.append(Case("the testbed", _matrix(robot, x), gains(3), rng.uniform(-8e-3, 8e-3, 3)))
     for x in rng.uniform(-0.08, 0.08, (2, 2)):
         cases.append(Case("four drives", _matrix(four, x), gains(4), rng.uniform(-8e-3, 8e-3, 4), beyond=True))
     mixed = 0.8 * rng.standard_normal((3, 3))
@@ -58,7 +60,7 @@ def fight_cases(rng) -> list[tuple]:
     cases = []
     for x in rng.uniform(-0.08, 0.08, (6, 2)):
         n = null_vector(robot, inverse_kinematics(robot, x))
-        cases.append((n, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)))
+        cases.append(Case("the testbed", n, rng.uniform(2.0, 20.0, 3), rng.uniform(-8e-3, 8e-3, 3)))
     idle = np.array([0.0, 0.6, 0.8])
     mixed = null_vector(robot, inverse_kinematics(robot, robot.base[:2].mean(axis=0) + [0.05, 0.06], (1, 1, -1)))
     four = rng.standard_normal(4)

@@ -116,8 +116,8 @@ EXERCISES = {
             "bare PD drives: with links that are too long they fight, and no gain is both stiff and cheap": (
                 lambda answer: isinstance(answer(tasks.machine()[1]), PD)
             ),
-            "the gain is that of the chapter; three drives may be stiff enough with it, two are not": (
-                lambda answer: tasks.gains_of_the_chapter(answer(tasks.machine()[1]))
+            "the gain is that of the other lessons; three drives may be stiff enough with it, two are not": (
+                lambda answer: tasks.gains_of_the_lessons(answer(tasks.machine()[1]))
             ),
         },
     ),

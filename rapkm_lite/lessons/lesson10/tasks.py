@@ -97,8 +97,8 @@ def spare_law(drawing):
     return AntagonismFilter(PD(19.0, 0.55))
 
 
-def gains_of_the_chapter(law) -> bool:
-    """Is this the filter around the PD drives of the chapter?"""
+def gains_of_the_lessons(law) -> bool:
+    """Is this the filter around the PD drives of the other lessons?"""
     return isinstance(law, AntagonismFilter) and law == AntagonismFilter(PD(7.05, 0.225))
 
 
