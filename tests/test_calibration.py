@@ -277,6 +277,40 @@ def test_intervals_from_few_poses_cover_what_they_say(count):
         assert np.all(np.abs(inside - level) < 4 * np.sqrt(level * (1 - level) / draws))
 
 
+@pytest.mark.parametrize("count", [4000, 20000])
+def test_intervals_from_torques_know_that_encoders_count(count):
+    covered, step = [], 2 * np.pi / count
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        offset, logs = rng.uniform(-6e-3, 6e-3, 3), []
+        for place in rng.uniform(-0.09, 0.09, (4, 2)):
+            path = rk.hold(TESTBED, place, 1.0, 5e-3)
+            run = rk.simulate(TESTBED, rk.PD(7.05, 0.1), path, offset, encoder=count)
+            seen, c = step * np.rint((run.q_a + offset) / step), run.c + rng.normal(0, 1e-5, run.c.shape)
+            logs.append(rk.Log("rest", path.t, seen, path.q_a, c))
+        try:
+            low, high = rk.calibrate(TESTBED, logs, use="torques", K_P=7.05).interval()
+        except (rk.CalibrationError, rk.ConvergenceError):
+            continue
+        covered.extend((low <= offset) & (offset <= high))
+    assert len(covered) >= 30 and np.mean(covered) > 0.85  # of 95 %; without the counts 17 % of few rests
+
+
+@pytest.mark.parametrize("size, least", [(0.2, 20), (0.3, 15), (0.6, 0)])
+def test_offsets_far_from_zero_are_found_or_refused(size, least):
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        q_a = rk.inverse_kinematics(TESTBED, rng.uniform(-0.09, 0.09, (40, 2)))[:, :3]
+        offset = rng.uniform(-size, size, 3)
+        try:
+            assert_allclose(rk.calibrate(TESTBED, q_a + offset).offset, offset, rtol=0, atol=1e-11)
+            found += 1
+        except ValueError as error:
+            assert re.search("determines|contradict each other by|fit no pose", str(error))
+    assert found >= least
+
+
 def test_interval_of_one_spare_reading_is_that_of_cauchy():
     """Student's t with one degree of freedom has the quantile tan(pi level / 2); the spread is that of one reading."""
     found = rk.calibrate(TESTBED, readings(TESTBED, 4) + 1e-5 * np.random.default_rng(1).normal(size=(4, 3)))

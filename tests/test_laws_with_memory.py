@@ -263,6 +263,26 @@ def test_the_measured_pose_is_the_least_squares_pose_of_the_model(name, offset, 
         assert_allclose(qd[:N], A @ np.linalg.lstsq(A, qd[:N], rcond=None)[0], atol=1e-12)
 
 
+class PDOfThePose(rk.Law):
+    """PD with the base angles of the pose, whichever is asked for."""
+
+    def __init__(self, pose):
+        self.pose = pose
+
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        return (7.05 * (desired.q - q) + 0.225 * (desired.qd - qd))[: model.n_arms]
+
+
+@pytest.mark.parametrize("pose", ["measured", "true"])
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_base_angles_of_a_pose_go_on_where_a_path_turns_on(name, pose):
+    robot = rk.load(name)
+    path = rk.circle(robot, 0.12, duration=1.0) if name == "testbed" else rk.triangle(robot, duration=2.0)
+    assert path.q_a.min() < -np.pi
+    run = rk.simulate(robot, PDOfThePose(pose), path)
+    assert_allclose(run.c, rk.simulate(robot, PD, path).c, rtol=0, atol=1e-9)
+
+
 def test_a_bare_law_finds_no_pose():
     """A law that does not ask for a pose does not care that the angles fit none."""
     far = 2.5 * np.array([1.0, -1.0, 1.0])

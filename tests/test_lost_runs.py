@@ -493,7 +493,7 @@ def test_a_division_by_zero_ends_a_run_without_a_compiler_too():
 def test_sums_of_a_failed_run_are_zeros():
     """All but its time and status; those of the run beside it are its own."""
     setup, laws = prepare(ROBOT, PATH, rk.Sensors(OFFSET)), [PD, rk.PD(1e4, 0.225)]
-    *sums, time, status = compiled.many(setup, [compiled.encode(law, ROBOT) for law in laws], np.array([OFFSET] * 2))
+    *sums, time, status = compiled.many(setup, [compiled.encode(law, setup) for law in laws], np.array([OFFSET] * 2))
     assert status[0] == compiled.DONE != status[1] and time[0] == 0.0 < time[1]
     for column in sums:
         assert np.all(column[0] != 0.0) and np.all(column[1] == 0.0)

@@ -168,6 +168,44 @@ def test_rates_of_another_motion_are_refused(factor):
         rk.follow(TESTBED, path.t, path.x, factor * path.xd, path.xdd)
 
 
+@pytest.mark.parametrize("factor", [0.0, -1.0, 1000.0])
+def test_accelerations_of_another_motion_are_refused(factor):
+    path = rk.circle(TESTBED, 0.05, 1.0)
+    with pytest.raises(
+        ValueError, match=r"xdd\[\d+\] = .* m/s\^2 does not fit xd: .* allowed: the time derivative of xd"
+    ):
+        rk.follow(TESTBED, path.t, path.x, path.xd, factor * path.xdd)
+
+
+def test_rates_by_differences_and_jumps_of_the_speed_are_taken():
+    path = rk.circle(TESTBED, 0.05, 1.0)
+    # A recorded path, to 0.1 um, and its differences.
+    x = path.x + np.random.default_rng(3).normal(0.0, 1e-7, path.x.shape)
+    xd = np.gradient(x, 1e-3, axis=0)
+    rk.follow(TESTBED, path.t, x, xd, np.gradient(xd, 1e-3, axis=0))
+    there_and_back = 0.05 - np.abs(np.outer(0.1 * path.t - 0.05, [1.0, 0.0]))
+    speed = np.outer(np.where(path.t < 0.5, 0.1, -0.1), [1.0, 0.0])
+    rk.follow(TESTBED, path.t, there_and_back, speed, 0.0 * speed)
+
+
+def test_times_that_are_not_equidistant_say_where():
+    path = rk.circle(TESTBED, 0.05, 1.0, dt=1e-2)
+    t = path.t.copy()
+    t[50] += 1e-4
+    with pytest.raises(
+        ValueError, match=r"t\[50\] - t\[49\] = 0.0101 s, on average 0.01 s; allowed: equidistant times"
+    ):
+        rk.follow(TESTBED, t, path.x, path.xd, path.xdd)
+
+
+def test_set_points_on_another_turn_are_refused():
+    path = rk.circle(TESTBED, 0.12, 1.0)
+    with pytest.raises(ValueError, match=r"q_a\[\d+, 2\] = .* is 6.28 rad away from the path; allowed: up to pi"):
+        path.with_set_points((path.q_a + np.pi) % (2 * np.pi) - np.pi)
+    with pytest.raises(ValueError, match="in rad"):
+        path.with_set_points(np.rad2deg(path.q_a))
+
+
 def square(count, radius=0.05):
     """The corners of a regular polygon."""
     angle = 2 * np.pi * np.arange(count) / count

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.at import at
-from ..mechanics.closure import estimate_pose
+from ..mechanics.closure import estimate_pose, on_the_turn_of
 from ..mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
 from .grammar import ask, begin, coordinates, measured
@@ -69,6 +69,7 @@ class Sample:
     def pose(self, source: str | None = "measured") -> tuple[np.ndarray | None, np.ndarray | None]:
         """Configuration q and rate qd on V, (2N,) each, read-only; found when asked for, and kept.
 
+        The base angles of q are on the turn of the measured ones, as those of a path that turns on.
         source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
         Raises ConvergenceError when the measured angles fit no pose.
         """
@@ -77,7 +78,7 @@ class Sample:
         if not isinstance(source, str) or source not in self._found:
             one_of("source", source, ("measured", "true"))
             here, xd = self._true() if source == "true" else self._measured()
-            q, qd = here.q.copy(), matvec(here.F, xd)
+            q, qd = on_the_turn_of(self.q_a, here.q), matvec(here.F, xd)
             q.setflags(write=False)
             qd.setflags(write=False)
             self._found[source] = q, qd

@@ -143,10 +143,12 @@ def calibrate(
     stand = rests(logs) if logs else None
     gain = fitted_gain(stand) if stand else None
     notes = [] if gain is None or K_P is None else gain.objections(K_P)
+    step = rounding(angles)
     if use == "torques":
-        angles, step = _angles_of_torques(robot, stand, gain, K_P, notes)
+        # The drives know the readings of their encoders, counts and all.
+        angles, spread = _angles_of_torques(robot, stand, gain, K_P, notes)
+        step = math.hypot(step, spread)
     else:
-        step = rounding(angles)
         angles = np.unique(angles, axis=0)
     return _solved(robot, angles, unknowns, noise, step, None if gain is None else gain.K_P, notes)
 
@@ -154,7 +156,7 @@ def calibrate(
 def _angles_of_torques(
     robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]
 ) -> tuple[np.ndarray, float]:
-    """Readings at the rests from their torques, one row a rest, and the standard deviation of one of them."""
+    """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
     if stand is None:
         raise ValueError("use = 'torques' needs logs with torques; allowed: a Log, a path, or a list of these")
     if K_P is None:
@@ -239,22 +241,25 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0):
         x = pose.x
         left, rows = (part / math.sqrt(len(angles)) for part in closure(pose, angles - p[:N], len(p)))
         U, sigma, Vt = np.linalg.svd(rows @ basis, full_matrices=False)
-        explained = U.T @ left
+        explained, gap = U.T @ left, math.sqrt(left @ left)
         # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
-        noise = max(blur, math.sqrt(max(left @ left - explained @ explained, 0.0)))
+        noise = max(blur, math.sqrt(max(gap**2 - explained @ explained, 0.0)))
         rank = int(np.sum(sigma > max(1e-8, 10 * noise) * sigma[0]))
-        if rank < basis.shape[1]:
+        # Far from the minimum what is not explained is no noise: what is determined there leads on.
+        step = explained[:rank] / sigma[:rank]
+        move = -Vt[:rank].T @ step
+        if rank < basis.shape[1] and np.abs(move).max() < 1e-3 and gap < 0.05:
             spread = noise / math.sqrt(len(angles)) / sigma[:rank]
-            raise _refusal(robot, basis, Vt[:rank], explained[:rank] / sigma[:rank], spread, p - nominal)
-        move = -Vt.T @ (explained / sigma)
+            raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
         p, size = p + basis @ move, np.abs(move).max()
         machine = changed(robot, p)
         # No step gets smaller than its rounding.
-        if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
+        if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]) and gap < 0.05:
             return p, machine, x, left, sigma, Vt
     raise ConvergenceError(
-        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad; "
-        "allowed: a log of this machine, whose angles are near a pose"
+        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad, where the readings "
+        f"contradict each other by {gap:.3g} rad; allowed: a log of this machine, and offsets below "
+        "about 0.3 rad"
     )
 
 

@@ -103,6 +103,12 @@ def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarr
     return q, residual, np.where(out, np.inf, np.vecdot(residual, residual))
 
 
+def on_the_turn_of(q_a: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """q (..., 2N) with whole turns added to its base angles, so that they lie within half a turn of q_a (..., N)."""
+    N = q_a.shape[-1]
+    return q + 2 * np.pi * np.rint(np.concatenate([q_a - q[..., :N], 0.0 * q[..., N:]], axis=-1) / (2 * np.pi))
+
+
 def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 50) -> np.ndarray:
     """The configuration whose base angles are nearest to the measured ones, (..., 2N) in rad.
 
@@ -110,7 +116,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     other.  The pose taken is the least-squares one, min_x sum_i (q_i(x) - q_a,i)^2, found by Newton steps from the
     end-effector position `guess` (..., 2) in m, of Gauss and Newton with the control matrix A = d q_a / d x where the
     exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
-    kinematics of the five-bar.
+    kinematics of the five-bar.  Its base angles are on the turn of the measured ones, the elbow angles in (-pi, pi].
     Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
@@ -131,7 +137,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
         size = np.abs(step).max(axis=-1, keepdims=True)
         if size.max(initial=0.0) < limit:
-            return q
+            return on_the_turn_of(q_a, q)
         # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
         step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))
         for k in range(40):

@@ -138,7 +138,7 @@ class Trajectory(Desired):
         angles and rates, such as `PD`, follow them; x, elbow angles and accelerations stay those of the path.
         For another machine, or a model with another geometry, they stay as far from the angles of the path.
         q_a : (k, N) rad.  qd_a : (k, N) rad/s; default: central differences of q_a.
-        Raises ValueError for other shapes, or numbers that are not finite.
+        Raises ValueError for other shapes, numbers that are not finite, or angles half a turn away from the path.
 
         >>> import rapkm_lite as rk
         >>> path = rk.circle(rk.load(), radius=0.05, duration=1.0)
@@ -148,6 +148,10 @@ class Trajectory(Desired):
         """
         k, N = len(self), self.n_arms
         q_a = exact_array("q_a", q_a, k, N)
+        if (apart := np.abs(q_a - self.q_a)).max() > np.pi:
+            at, i = np.unravel_index(apart.argmax(), apart.shape)
+            far = f"q_a[{at}, {i}] = {q_a[at, i]:g} rad is {apart[at, i]:.3g} rad away from the path"
+            raise ValueError(f"{far}; allowed: up to pi, on the turn of the path (np.unwrap(q_a, axis=0)), in rad")
         qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, k, N)
         q, qd = (np.hstack([new, old[:, N:]]) for new, old in ((q_a, self.q), (qd_a, self.qd)))
         return self._changed(q=q, qd=qd)
@@ -159,7 +163,8 @@ class Trajectory(Desired):
 def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
-    Raises ValueError when the path leaves the workspace or the times are not equidistant from zero.
+    Raises ValueError when the path leaves the workspace, the times are not equidistant from zero (to 1e-6 of a step),
+    or xd and xdd are not the derivatives of x and xd; a few jumps are allowed.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
