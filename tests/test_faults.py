@@ -263,6 +263,12 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
         (0, lambda table: table.jump.fill(np.nan), r"no finite number into table\.jump"),
         (0, lambda table: table.jump.fill(np.inf), r"no finite number into table\.jump"),
         (0, lambda table: table.limit.fill(np.nan), r"no finite number into table\.jump or table\.limit"),
+        (
+            0,
+            lambda table: setattr(table, "limit", np.ones(3)),
+            r"Wrong.*mark raised AttributeError: .*; allowed: to write",
+        ),
+        (0, lambda table: table.limit.__setitem__(..., np.ones(7)), r"mark raised ValueError: .*; allowed: to write"),
         (0, lambda table: table.limit.fill(-0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
     ],
 )
@@ -355,6 +361,15 @@ def test_what_has_a_default_may_be_left_out_of_a_data_file(tmp_path, entries, fa
     file = tmp_path / "broken.toml"
     file.write_text(f"{TOML}[[fault]]\n{entries}")
     assert rk.experiment(file).faults == (fault,)
+
+
+def test_a_unit_that_nobody_knows_is_refused(tmp_path):
+    file = tmp_path / "broken.toml"
+    file.write_text(f'{TOML}[[fault]]\nkind = "Ripple"\ndrive = 1\nfrequency = {{ value = 3.0, unit = "kHz" }}\n')
+    with pytest.raises(ValueError, match=r"frequency in \[\[fault\]\] has the unit 'kHz', which is not known here"):
+        rk.experiment(file)
+    file.write_text(f'{TOML}[[fault]]\nkind = "Ripple"\ndrive = 1\nfrequency = {{ value = 3.0, source = "ours" }}\n')
+    assert rk.experiment(file).faults == (Ripple(1, 3.0),)
 
 
 def test_faults_that_do_not_fit_the_machine_are_refused_when_a_file_is_read(tmp_path):

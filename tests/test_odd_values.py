@@ -1,5 +1,6 @@
 """Values that look like numbers and are none, or are so large or small that an answer would be nonsense: refused."""
 
+import re
 from decimal import Decimal
 from fractions import Fraction
 
@@ -138,6 +139,31 @@ class Formula(rk.Law):
 def test_methods_of_a_law_with_other_parameters(law, name):
     for whole in (law, rk.AntagonismFilter(law)):
         with pytest.raises(ValueError, match=rf"law.{name} = .* cannot be called .*; allowed: a function \("):
+            rk.simulate(TESTBED, whole, HOLD)
+
+
+class Turned(rk.Law):
+    def start(self, dt, model):
+        return None
+
+
+class Exchanged(rk.Law):
+    def step(self, sample, memory):
+        return np.zeros(3), memory
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [
+        (Turned(), "start takes (dt, model)"),
+        (Exchanged(), "step takes (sample, memory)"),
+        (lambda t, qd_a, q_a, desired: 0.0 * q_a, "law takes (t, qd_a, q_a, desired)"),
+        (rk.compiled(lambda t, q_a, qd_a, d, memory, at: 0.0 * q_a, at="true", memory=1), "d, memory, at)"),
+    ],
+)
+def test_arguments_in_another_order_are_refused(law, told):
+    for whole in (law, rk.AntagonismFilter(law)):
+        with pytest.raises(ValueError, match=re.escape(f"{told}, in another order; allowed: (")):
             rk.simulate(TESTBED, whole, HOLD)
 
 

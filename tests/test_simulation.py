@@ -79,6 +79,14 @@ def test_a_jump_over_the_boundary_is_seen():
     assert "unstable gain" not in end.reason
 
 
+def test_a_run_keeps_what_repeats_it():
+    robot = rk.load()
+    model, path = robot.replace(lengths=0.201, masses=0.2), rk.circle(robot, 0.05, duration=0.2)
+    run = rk.simulate(robot, rk.RedundantCTC(400.0, 40.0), path, [4e-3, 0.0, 0.0], 4000, model=model)
+    again = rk.simulate(run.robot, run.law, run.trajectory, model=run.model, sensors=run.sensors, faults=run.faults)
+    assert run.model == model and again == run and rk.simulate(robot, run.law, path).model == robot
+
+
 def test_work_without_friction_is_the_kinetic_energy():
     run = rk.simulate(ROBOT, PD, rk.triangle(ROBOT, duration=1.5), OFFSET)
     kinetic = rk.kinetic_energy(ROBOT, run.q, run.qd)

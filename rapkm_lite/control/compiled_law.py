@@ -13,7 +13,7 @@ import numpy as np
 
 from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
-from .grammar import UNASKED, LawValue
+from .grammar import UNASKED, LawValue, in_order
 
 SOURCES = ("desired", "measured", "true")
 
@@ -77,6 +77,7 @@ class CompiledLaw(LawValue):
                 f"the law {self._name} takes {signature}; allowed with at = {self.at!r} and memory = {self.memory}: "
                 f"({', '.join(given)})"
             ) from None
+        in_order(f"the law {self._name}", self.function, *given)
 
     @property
     def _name(self) -> str:
@@ -121,9 +122,11 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
 
     at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
-    q_a and qd_a are the function's own, too: what it writes into them stays with it.
+    q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
+    read only: Python refuses to write into them, compiled code does it, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
+    Random numbers of `numpy.random` would be others in every run: noise belongs into an array, an entry per sample.
     Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it
     raised, when it gave no finite torques, from the start of the run to there.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.

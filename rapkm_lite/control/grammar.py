@@ -13,6 +13,7 @@ Errors are measured minus desired.
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from reprlib import recursive_repr
@@ -95,7 +96,9 @@ class Function(Law):
 
     def start(self, model, dt):
         """A function that cannot be called so is refused before the run."""
-        callable_with("law", self.function, "t", "q_a", "qd_a", "desired")
+        given = "t", "q_a", "qd_a", "desired"
+        callable_with("law", self.function, *given)
+        in_order("law", self.function, *given)
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
@@ -122,7 +125,18 @@ def begin(law, model: Manipulator, dt: float):
     for name, given in _METHODS.items():
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
             callable_with(f"law.{name}", getattr(law, name), *given)
+            in_order(f"law.{name}", getattr(law, name), *given)
     return law.start(model, dt)
+
+
+def in_order(name: str, function, *given: str) -> None:
+    """Raise ValueError where a function has the names of its arguments in another order; it gets them by position."""
+    try:
+        told = tuple(inspect.signature(function).parameters)
+    except ValueError:
+        return  # built-in functions have none
+    if any(own in given and own != place for own, place in zip(told, given, strict=False)):
+        raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: ({', '.join(given)})")
 
 
 def _check_asked(kind: type) -> None:

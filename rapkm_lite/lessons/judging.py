@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -43,11 +43,15 @@ def _seeded(exercise: Exercise) -> list[tuple]:
     return exercise.cases(np.random.default_rng(20_111_130))
 
 
+def _is_far(case: tuple) -> TypeGuard[Case]:
+    return isinstance(case, Case) and case.beyond
+
+
 def _near_and_far(exercise: Exercise, answer: Any) -> Result:
     """The verdict on the plain cases; what is right there may fall short in those that lie beyond."""
     cases = _seeded(exercise)
-    far = [case for case in cases if isinstance(case, Case) and case.beyond]
-    result = _numbers(exercise, answer, [case for case in cases if not (isinstance(case, Case) and case.beyond)])
+    far = [case for case in cases if _is_far(case)]
+    result = _numbers(exercise, answer, [case for case in cases if not _is_far(case)])
     if not far:
         return result
     try:

@@ -107,6 +107,10 @@ def _table(name: str, values):
 
 def _entries(name: str, values) -> dict:
     of_kind(name, values, dict, f"a table [{name}]")
+    for key, value in values.items():
+        if name == "fault" and key not in UNITS_OF[name] and isinstance(value, dict) and "unit" in value:
+            words = "which is not known here; allowed: a number in the unit of its class"
+            raise ValueError(f"{key} in [[fault]] has the unit {short(value['unit'])}, {words}")
     return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
 
 

@@ -187,13 +187,22 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
         drive = getattr(fault, "drive", 0)
         if not isinstance(drive, int | np.integer) or not 0 <= drive < N:
             raise ValueError(f"drive = {drive!r} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
-        if copy.deepcopy(fault).mark(table, t) is not None:  # what one remembers begins anew
+        if _marked(fault, table, t) is not None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
         if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
             raise ValueError(f"{fault!r} writes what is no finite number into table.jump or table.limit")
         if table.limit.min() < 0.0:
             raise ValueError(f"{fault!r} writes table.limit = {table.limit.min():g} N m; allowed: 0 or more")
     return table
+
+
+def _marked(fault: Fault, table: FaultTable, t: np.ndarray) -> object:
+    """What `mark` returns; what a fault remembers begins anew."""
+    try:
+        return copy.deepcopy(fault).mark(table, t)
+    except Exception as error:
+        words = "allowed: to write into table.limit (N,), alive, held and jump (k, N)"
+        raise ValueError(f"{fault!r}.mark raised {type(error).__name__}: {error}; {words}") from error
 
 
 def check_faults(faults) -> tuple[Fault, ...]:

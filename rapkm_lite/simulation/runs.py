@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..control.grammar import LawLike, as_law
 from ..machine.arguments import matvec, real_array, short
 from ..machine.manipulator import Manipulator
-from ..machine.values import Value, frozen
+from ..machine.values import Value, default, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
@@ -64,6 +64,7 @@ class Run(Value):
     """Result of a sampled closed loop, one row per sample.
 
     law : the law that ran; a copy, when it was an object in Python.
+    model : the controller's own manipulator, whose desired motion `trajectory` is.
     sensors, faults : with which it measured, and what was broken.
     t : (k,) s.  x, xd : (k, 2) true end-effector motion, m and m/s.  q_a, qd_a : (k, N) true base angles and rates.
     c : (k, N) drive torques in N m that act; c[k] is held from t[k] to t[k+1] (the last row is not applied any more).
@@ -87,10 +88,11 @@ class Run(Value):
     qd_a: np.ndarray
     c: np.ndarray
     pairs: np.ndarray
+    model: Manipulator = default(None)
 
     def __post_init__(self):
         as_law(self.law)
-        self._set(faults=check_faults(self.faults))
+        self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
         super().__post_init__()
         if self.t.ndim != 1 or len(self.t) > len(self.trajectory):
             most = len(self.trajectory)
@@ -238,7 +240,8 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
         columns = [column[:rows] for column in columns]
     # What a kernel has finished is finite and frozen.
     make = Run if status != DONE or columns[1].flags.writeable else Run.trusted
-    return make(setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns)
+    fields = setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns, setup.model
+    return make(*fields)
 
 
 def hand_over(error, partial, note: str) -> None:
