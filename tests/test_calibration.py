@@ -419,6 +419,7 @@ HEADER = ",".join(
     [
         ("", "line 1, column 1 holds ''|line 1, column 1 holds nothing"),
         ("a,b\n1,2\n", "line 1, column 1 holds 'a'"),
+        (HEADER.replace(",", ";") + "\n", "line 1 has no commas; allowed: values with commas between them"),
         (HEADER.replace("c1 in N m", "c1 in mN m") + "\n", "line 1, column 8 holds 'c1 in mN m'"),
         (HEADER + "\n", "has no record"),
         (HEADER + "\n0,1,2,3\n", "line 2 has 4 columns; allowed: 10"),

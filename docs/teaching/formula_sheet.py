@@ -28,7 +28,11 @@ ROWS = [
     ("its matrices", "(7)", r"$\bar G=F^TGF,\quad \bar C=F^T(CF+G\dot F),\quad \bar Q=F^TQ$"),
     ("Actuation", "", ""),
     ("control system", "(8), (9)", r"drift $-\bar G^{-1}(\bar C\dot q_2+\bar Q)$, fields: columns of $\bar G^{-1}A^T$"),
-    ("degree of actuation", "(10)*", r"$\alpha=\mathrm{rank}\,A$; input singularity where it changes, here $\alpha<\delta$"),
+    (
+        "degree of actuation",
+        "(10)*",
+        r"$\alpha=\mathrm{rank}\,A$; input singularity where it changes, here $\alpha<\delta$",
+    ),
     (
         "end-effector coordinates",
         "",

@@ -88,6 +88,8 @@ def read_log(source: str | Path) -> Log:
     while lines and not lines[-1]:
         lines.pop()
     N, rest = divmod(len(header) - 1, 3)
+    if len(header) == 1 and set(";\t") & set(header[0]):
+        raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
     wanted = columns(max(N, 2))
     header = [name.strip() for name in header]
     if rest or header != wanted:

@@ -6,6 +6,7 @@ import pickle
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -240,7 +241,7 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
         columns = [column[:rows] for column in columns]
     # What a kernel has finished is finite and frozen.
     make = Run if status != DONE or columns[1].flags.writeable else Run.trusted
-    fields = setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns, setup.model
+    fields: list[Any] = [setup.robot, law, setup.trajectory, setup.sensors, setup.broken, *columns, setup.model]
     return make(*fields)
 
 
