@@ -22,7 +22,7 @@ from .setup import prepare
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Value):
-    """Result of `sweep`, one row per run; rows of failed runs are masked.
+    """Result of `sweep`, one row per run; rows of failed runs are masked, and zero under the mask: use `compressed`.
 
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.
