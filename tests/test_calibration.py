@@ -311,6 +311,19 @@ def test_offsets_far_from_zero_are_found_or_refused(size, least):
     assert found >= least
 
 
+@pytest.mark.parametrize("unknowns", ["offsets+lengths", "all"])
+def test_a_noisy_log_of_few_places_is_refused_with_what_it_says(unknowns):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        q_a = rk.inverse_kinematics(TESTBED, rng.uniform(-0.07, 0.07, (8, 2)))[:, :3] + rng.normal(0.0, 2e-3, (8, 3))
+        with pytest.raises(rk.CalibrationError, match=r"determines \d+ of \d+ unknowns"):
+            rk.calibrate(TESTBED, q_a, unknowns)
+    step = 2 * np.pi / 20
+    coarse = np.rint(readings(TESTBED, 200) / step) * step
+    with pytest.raises(rk.CalibrationError, match="determines 0 of 3"):
+        rk.calibrate(TESTBED, coarse)
+
+
 def test_interval_of_one_spare_reading_is_that_of_cauchy():
     """Student's t with one degree of freedom has the quantile tan(pi level / 2); the spread is that of one reading."""
     found = rk.calibrate(TESTBED, readings(TESTBED, 4) + 1e-5 * np.random.default_rng(1).normal(size=(4, 3)))

@@ -283,6 +283,11 @@ def test_base_angles_of_a_pose_go_on_where_a_path_turns_on(name, pose):
     assert_allclose(run.c, rk.simulate(robot, PD, path).c, rtol=0, atol=1e-9)
 
 
+def test_a_true_pose_knows_no_offsets():
+    run = rk.simulate(ROBOT, PDOfThePose("true"), rk.hold(ROBOT, [0.0, 0.0], 0.1), offset=[3.2, 0.0, 2 * np.pi])
+    assert_allclose(run.c, 0.0, atol=1e-12)
+
+
 def test_a_bare_law_finds_no_pose():
     """A law that does not ask for a pose does not care that the angles fit none."""
     far = 2.5 * np.array([1.0, -1.0, 1.0])

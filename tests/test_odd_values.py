@@ -1,5 +1,6 @@
 """Values that look like numbers and are none, or are so large or small that an answer would be nonsense: refused."""
 
+import functools
 import re
 from decimal import Decimal
 from fractions import Fraction
@@ -165,6 +166,17 @@ def test_arguments_in_another_order_are_refused(law, told):
     for whole in (law, rk.AntagonismFilter(law)):
         with pytest.raises(ValueError, match=re.escape(f"{told}, in another order; allowed: (")):
             rk.simulate(TESTBED, whole, HOLD)
+
+
+def test_a_wrapper_counts_not_what_it_wraps():
+    def inner(q_a, qd_a, desired, t):
+        return 0.0 * q_a
+
+    @functools.wraps(inner)
+    def outer(t, q_a, qd_a, desired):
+        return inner(q_a, qd_a, desired, t)
+
+    assert not rk.simulate(TESTBED, outer, HOLD).c.any()
 
 
 class Joints(rk.Law):

@@ -188,6 +188,16 @@ def test_rates_by_differences_and_jumps_of_the_speed_are_taken():
     rk.follow(TESTBED, path.t, there_and_back, speed, 0.0 * speed)
 
 
+def test_accelerations_that_are_held_between_samples_are_taken():
+    rng, dt = np.random.default_rng(4), 1e-3
+    pulses = np.concatenate([np.ones(5), np.zeros(11), -np.ones(5), -np.ones(5), np.zeros(11), np.ones(5)])
+    for acc in (np.tile(pulses, 10), np.repeat(rng.choice([-1.0, 1.0], 200), 2), rng.choice([-1.0, 1.0], 400)):
+        a = np.outer(np.append(acc, 0.0), 1.86 * np.array([0.6, 0.8]))
+        v = np.vstack([[0.0, 0.0], np.cumsum(a[:-1] * dt, axis=0)])
+        x = np.vstack([[0.0, 0.0], np.cumsum(v[:-1] * dt + a[:-1] * dt * dt / 2, axis=0)])
+        rk.follow(TESTBED, np.arange(len(a)) * dt, x, v, a)
+
+
 def test_times_that_are_not_equidistant_say_where():
     path = rk.circle(TESTBED, 0.05, 1.0, dt=1e-2)
     t = path.t.copy()
@@ -200,10 +210,13 @@ def test_times_that_are_not_equidistant_say_where():
 
 def test_set_points_on_another_turn_are_refused():
     path = rk.circle(TESTBED, 0.12, 1.0)
-    with pytest.raises(ValueError, match=r"q_a\[\d+, 2\] = .* is 6.28 rad away from the path; allowed: up to pi"):
+    with pytest.raises(ValueError, match=r"q_a = .* rad lies 6.28 rad away from the path; allowed: up to pi"):
         path.with_set_points((path.q_a + np.pi) % (2 * np.pi) - np.pi)
     with pytest.raises(ValueError, match="in rad"):
         path.with_set_points(np.rad2deg(path.q_a))
+    # It is the path that counts, not the set-points before.
+    again = path.with_set_points(path.q_a + 2.0).with_set_points(path.q_a - 2.0)
+    assert_allclose(again.q_a, path.q_a - 2.0)
 
 
 def square(count, radius=0.05):

@@ -132,8 +132,9 @@ def begin(law, model: Manipulator, dt: float):
 def in_order(name: str, function, *given: str) -> None:
     """Raise ValueError where a function has the names of its arguments in another order; it gets them by position."""
     try:
-        told = tuple(inspect.signature(function).parameters)
-    except ValueError:
+        parameters = inspect.signature(function, follow_wrapped=False).parameters.values()
+        told = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
+    except (TypeError, ValueError):
         return  # built-in functions have none
     if any(own in given and own != place for own, place in zip(told, given, strict=False)):
         raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: ({', '.join(given)})")

@@ -69,7 +69,7 @@ class Sample:
     def pose(self, source: str | None = "measured") -> tuple[np.ndarray | None, np.ndarray | None]:
         """Configuration q and rate qd on V, (2N,) each, read-only; found when asked for, and kept.
 
-        The base angles of q are on the turn of the measured ones, as those of a path that turns on.
+        The base angles of q are on the turn of the measured ones, of the true pose on that of the desired ones.
         source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
         Raises ConvergenceError when the measured angles fit no pose.
         """
@@ -78,7 +78,8 @@ class Sample:
         if not isinstance(source, str) or source not in self._found:
             one_of("source", source, ("measured", "true"))
             here, xd = self._true() if source == "true" else self._measured()
-            q, qd = on_the_turn_of(self.q_a, here.q), matvec(here.F, xd)
+            turn = self.desired.q[: self.model.n_arms] if source == "true" else self.q_a
+            q, qd = on_the_turn_of(turn, here.q), matvec(here.F, xd)
             q.setflags(write=False)
             qd.setflags(write=False)
             self._found[source] = q, qd

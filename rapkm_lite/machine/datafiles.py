@@ -109,7 +109,9 @@ def _entries(name: str, values) -> dict:
     of_kind(name, values, dict, f"a table [{name}]")
     for key, value in values.items():
         if name == "fault" and key not in UNITS_OF[name] and isinstance(value, dict) and "unit" in value:
-            words = "which is not known here; allowed: a number in the unit of its class"
+            close = difflib.get_close_matches(key, UNITS_OF[name], n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            words = f"which is not known here{hint}; allowed: a number in the unit of its class"
             raise ValueError(f"{key} in [[fault]] has the unit {short(value['unit'])}, {words}")
     return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
 

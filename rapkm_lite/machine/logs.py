@@ -87,17 +87,7 @@ def read_log(source: str | Path) -> Log:
         raise ValueError(f"source = {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
     while lines and not lines[-1]:
         lines.pop()
-    N, rest = divmod(len(header) - 1, 3)
-    if len(header) == 1 and set(";\t") & set(header[0]):
-        raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    wanted = columns(max(N, 2))
-    header = [name.strip() for name in header]
-    if rest or header != wanted:
-        wrong = next((k for k, pair in enumerate(zip(header, wanted, strict=False)) if len(set(pair)) > 1), len(header))
-        got = repr(header[wrong]) if wrong < len(header) else "nothing"
-        raise ValueError(
-            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"
-        )
+    header, N = _names(path, header)
     table = _table(path, header, lines)
     if len(table) == 0:
         raise ValueError(f"the log {path.name!r} has no record; allowed: one line or more below the header")
@@ -120,6 +110,22 @@ def _without_gaps(path: Path, t: np.ndarray) -> None:
             f"the log {path.name!r}, line {k + 3}, column 1: after {t[k]:g} s comes {t[k + 1]:g} s, though records "
             f"come every {np.median(steps):g} s; allowed: a log without gaps, or one file for each part"
         )
+
+
+def _names(path: Path, header: list[str]) -> tuple[list[str], int]:
+    """The names of the columns, and of how many drives they are; raises ValueError for others."""
+    N, rest = divmod(len(header) - 1, 3)
+    if len(header) == 1 and set(";\t") & set(header[0]):
+        raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
+    wanted = columns(max(N, 2))
+    header = [name.strip() for name in header]
+    if rest or header != wanted:
+        wrong = next((k for k, pair in enumerate(zip(header, wanted, strict=False)) if len(set(pair)) > 1), len(header))
+        got = repr(header[wrong]) if wrong < len(header) else "nothing"
+        raise ValueError(
+            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"
+        )
+    return header, N
 
 
 def _table(path: Path, header: list[str], lines: list[list[str]]) -> np.ndarray:

@@ -19,7 +19,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, Value
 from .at import at
 from .encoders import cautions, certain, changed, closure, gauge, measured, poses, rounding, unknown_names
-from .rests import Rests, fitted_gain, one_sided, rests
+from .rests import angles_of_torques, fitted_gain, rests
 
 UNKNOWNS = ("offsets", "offsets+lengths", "all")
 GAUGE = ("scale", "rotation", "translation x", "translation y")
@@ -146,40 +146,11 @@ def calibrate(
     step = rounding(angles)
     if use == "torques":
         # The drives know the readings of their encoders, counts and all.
-        angles, spread = _angles_of_torques(robot, stand, gain, K_P, notes)
+        angles, spread = angles_of_torques(robot, stand, gain, K_P, notes)
         step = math.hypot(step, spread)
     else:
         angles = np.unique(angles, axis=0)
     return _solved(robot, angles, unknowns, noise, step, None if gain is None else gain.K_P, notes)
-
-
-def _angles_of_torques(
-    robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]
-) -> tuple[np.ndarray, float]:
-    """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
-    if stand is None:
-        raise ValueError("use = 'torques' needs logs with torques; allowed: a Log, a path, or a list of these")
-    if K_P is None:
-        if gain is None:
-            raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
-        K_P = gain.K_P
-        left = stand.c + K_P * (stand.q_a - stand.desired)
-        if np.sum(left**2) >= 0.25 * np.sum(stand.c**2):
-            raise ValueError(
-                "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
-                "filter; allowed: the gain of the drives, or use = 'angles'"
-            )
-    K_P = bounded("K_P", K_P, 0.0, strict=True)
-    angles = stand.desired - stand.c / K_P
-    notes += one_sided(stand, K_P)
-    spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
-    felt, seen = (np.abs(closure(at(robot, poses(robot, a)), a, 0)[0]).max() for a in (angles, stand.q_a))
-    if felt < 0.1 * seen and seen > 5 * spread:
-        notes.append(
-            f"the torques are mute: the angles contradict each other by {1e3 * seen:.3g} mrad, the torques by "
-            f"{1e3 * felt:.2g} mrad, as under an antagonism filter; use the angles"
-        )
-    return angles, spread
 
 
 def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
@@ -197,7 +168,13 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         # A sample on the wrong assembly holds the unknowns where it fits there: those in doubt wait for the others.
         with suppress(ValueError):
             p = _minimum(robot, angles[sure], basis, p, p, x[sure], blur, enough=1e-3)[0]
-    p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur)
+    try:
+        p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur)
+    except CalibrationError as refusal:
+        try:
+            p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur, bold=True)
+        except ValueError as error:
+            raise error if isinstance(error, CalibrationError) else refusal from None
     spare, total = len(left) - len(sigma), float(left @ left) * len(angles)
     spread = math.sqrt(total / spare) if spare else 0.0
     used = max(spread, step) if noise is None else noise
@@ -227,12 +204,13 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     )
 
 
-def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0):
+def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, bold=False):
     """Unknowns of least closure, Gauss and Newton from p and the places x (k, 2) m on.
 
     It ends where a step (in `basis`) is small enough or a rounding.
     Returns them, their machine, and of the last step the places (k, 2) m, the closure, and the singular values and
-    right vectors of its derivative.  blur : rad, what is known of the noise.
+    right vectors of its derivative.  blur : rad, what is known of the noise.  bold : go on where rank is missing, along
+    what is determined there: far from the minimum what is not explained is no noise.
     Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
     """
     N, machine, size = robot.n_arms, changed(robot, p), math.inf
@@ -245,21 +223,22 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0):
         # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
         noise = max(blur, math.sqrt(max(gap**2 - explained @ explained, 0.0)))
         rank = int(np.sum(sigma > max(1e-8, 10 * noise) * sigma[0]))
-        # Far from the minimum what is not explained is no noise: what is determined there leads on.
         step = explained[:rank] / sigma[:rank]
         move = -Vt[:rank].T @ step
-        if rank < basis.shape[1] and np.abs(move).max() < 1e-3 and gap < 0.05:
+        settled = np.abs(move).max(initial=0.0) < 1e-3
+        if bold and settled and gap > 0.02:  # another minimum
+            break
+        if rank < basis.shape[1] and (settled or not bold):
             spread = noise / math.sqrt(len(angles)) / sigma[:rank]
             raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
-        p, size = p + basis @ move, np.abs(move).max()
+        p, size = p + basis @ move, np.abs(move).max(initial=0.0)
         machine = changed(robot, p)
         # No step gets smaller than its rounding.
-        if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]) and gap < 0.05:
+        if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
             return p, machine, x, left, sigma, Vt
     raise ConvergenceError(
-        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad, where the readings "
-        f"contradict each other by {gap:.3g} rad; allowed: a log of this machine, and offsets below "
-        "about 0.3 rad"
+        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad; "
+        "allowed: a log of this machine, whose angles are near a pose"
     )
 
 

@@ -1,4 +1,4 @@
-"""The rests of a log: where the desired angles stand still and the machine has settled; the gain they show."""
+"""The rests of a log: where the desired angles stand still and the machine has settled; what their torques show."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..machine.arguments import bounded
 from ..machine.logs import Log
+from ..machine.manipulator import Manipulator
+from .at import at
+from .encoders import closure, poses
 
 
 class Rests(NamedTuple):
@@ -86,3 +90,30 @@ def fitted_gain(stand: Rests) -> Gain | None:
     if np.any(information == 0.0):
         return None
     return Gain(-(weight * e * stand.c).sum(axis=0) / information, 1.0 / np.sqrt(information))
+
+
+def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]) -> tuple[np.ndarray, float]:
+    """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
+    if stand is None:
+        raise ValueError("use = 'torques' needs logs with torques; allowed: a Log, a path, or a list of these")
+    if K_P is None:
+        if gain is None:
+            raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
+        K_P = gain.K_P
+        left = stand.c + K_P * (stand.q_a - stand.desired)
+        if np.sum(left**2) >= 0.25 * np.sum(stand.c**2):
+            raise ValueError(
+                "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
+                "filter; allowed: the gain of the drives, or use = 'angles'"
+            )
+    K_P = bounded("K_P", K_P, 0.0, strict=True)
+    angles = stand.desired - stand.c / K_P
+    notes += one_sided(stand, K_P)
+    spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
+    felt, seen = (np.abs(closure(at(robot, poses(robot, a)), a, 0)[0]).max() for a in (angles, stand.q_a))
+    if felt < 0.1 * seen and seen > 5 * spread:
+        notes.append(
+            f"the torques are mute: the angles contradict each other by {1e3 * seen:.3g} mrad, the torques by "
+            f"{1e3 * felt:.2g} mrad, as under an antagonism filter; use the angles"
+        )
+    return angles, spread

@@ -148,10 +148,10 @@ class Trajectory(Desired):
         """
         k, N = len(self), self.n_arms
         q_a = exact_array("q_a", q_a, k, N)
-        if (apart := np.abs(q_a - self.q_a)).max() > np.pi:
-            at, i = np.unravel_index(apart.argmax(), apart.shape)
-            far = f"q_a[{at}, {i}] = {q_a[at, i]:g} rad is {apart[at, i]:.3g} rad away from the path"
-            raise ValueError(f"{far}; allowed: up to pi, on the turn of the path (np.unwrap(q_a, axis=0)), in rad")
+        before = self._apart["q"][:, :N] if self._apart else 0.0
+        if (apart := np.abs(q_a - self.q_a + before)).max() > np.pi:
+            words = "away from the path; allowed: up to pi, on the turn of the path (np.unwrap(q_a, axis=0)), in rad"
+            raise ValueError(f"q_a = {q_a.flat[apart.argmax()]:g} rad lies {apart.max():.3g} rad {words}")
         qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, k, N)
         q, qd = (np.hstack([new, old[:, N:]]) for new, old in ((q_a, self.q), (qd_a, self.qd)))
         return self._changed(q=q, qd=qd)

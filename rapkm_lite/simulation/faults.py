@@ -198,9 +198,12 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
 
 def _marked(fault: Fault, table: FaultTable, t: np.ndarray) -> object:
     """What `mark` returns; what a fault remembers begins anew."""
+    own = copy.deepcopy(fault)
     try:
-        return copy.deepcopy(fault).mark(table, t)
+        return own.mark(table, t)
     except Exception as error:
+        if type(fault).__module__ == __name__:  # it says itself what does not fit
+            raise
         words = "allowed: to write into table.limit (N,), alive, held and jump (k, N)"
         raise ValueError(f"{fault!r}.mark raised {type(error).__name__}: {error}; {words}") from error
 

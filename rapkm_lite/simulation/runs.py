@@ -95,6 +95,8 @@ class Run(Value):
         as_law(self.law)
         self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
         super().__post_init__()
+        if self.model.n_arms != self.robot.n_arms:
+            raise ValueError(f"model has {self.model.n_arms} arms; allowed: {self.robot.n_arms}, as many as robot")
         if self.t.ndim != 1 or len(self.t) > len(self.trajectory):
             most = len(self.trajectory)
             raise ValueError(f"t has shape {self.t.shape}; allowed: (k,), up to the {most} samples of the trajectory")
