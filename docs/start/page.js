@@ -225,7 +225,8 @@ function change(to, by = {}) {
   const wish = { ...to };
   for (const [name, count] of Object.entries(by)) wish[name] = state[name] + count * controls[name].step;
   if (taken) {
-    [state.x, state.y] = reachable(snap("x", wish.x ?? state.x), snap("y", wish.y ?? state.y));
+    // A key on a slider goes by 1 mm, one on the machine by the step.
+    [state.x, state.y] = reachable(snap("x", wish.x ?? state.x, 1), snap("y", wish.y ?? state.y, 1));
     state.moving = false;
   }
   // A hand on the machine or on its time ends the play.
@@ -250,7 +251,7 @@ function address() {
 
 function fromAddress(url) {
   const whole = new URL(url).hash.slice(1).split(",").map(Number), names = Object.keys(controls);
-  if (whole.length !== names.length + 2 || !whole.every(Number.isInteger)) return;
+  if (whole.length !== names.length + 2 || !whole.every(Number.isInteger) || url.includes(",,")) return;
   const value = (k) => whole[k] * (k < 2 ? 1 : controls[names[k]].step);
   // At the rim a place may lie between two steps.
   [state.x, state.y] = reachable(snap("x", value(0), 1), snap("y", value(1), 1));

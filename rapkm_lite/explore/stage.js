@@ -425,15 +425,15 @@ export function mount(el, scene, link) {
     rest = setTimeout(atRest, 700, message.sentence ?? ""); // read out when the hand rests, not at every step
   }
 
-  // Taking hold of the nearest knob or line, else of a line that is pushed along the panel.
-  function under(panel, { clientX, clientY, pointerType }) {
+  // Taking hold of the nearest knob or line, else of a line that is pushed along the panel; one finger at a time.
+  function under(panel, { clientX, clientY, pointerType, pointerId }) {
     const area = panel.plot.getBoundingClientRect(), x = clientX - area.left, y = clientY - area.top;
     let best = null;
     for (const handle of panel.box ? state.handles.filter((h) => h.panel === panel.name) : []) {
       const bare = handle.at[1] === null, [hx, hy] = bare ? [x, y] : panel.at(...handle.at);
       const grip = handle.grip ? nearest(handle.grip.flatMap((p) => panel.at(...p)), x, y).gap / 14 : Infinity;
       const gap = bare ? 0.99 : Math.min(Math.hypot(x - hx, y - hy) / 24, grip) / (pointerType === "mouse" ? 1 : 1.6);
-      if (gap < (best?.gap ?? 1)) best = { panel, handle, gap, off: [hx - x, hy - y] };
+      if (gap < (best?.gap ?? 1)) best = { panel, handle, gap, off: [hx - x, hy - y], id: pointerId, x: clientX };
     }
     return best;
   }
@@ -446,20 +446,20 @@ export function mount(el, scene, link) {
   for (const panel of panels) {
     const { plot } = panel;
     plot.onpointerdown = (event) => {
-      held = event.button === 0 ? under(panel, event) : null;
-      if (!held) return;
+      if (held?.panel.plot.hasPointerCapture(held.id) || event.button !== 0 || !(held = under(panel, event))) return;
       event.preventDefault();
       plot.setPointerCapture(event.pointerId);
       knobs[state.handles.indexOf(held.handle)].focus({ preventScroll: true });
-      if (held.handle.at[1] === null) move(event);
+      if (held.handle.at[1] === null && event.pointerType === "mouse") move(event);
     };
     plot.onpointermove = (event) => {
-      if (held) move(event);
+      const up = held?.handle.at[1] === null && event.pointerType !== "mouse" && Math.abs(event.clientX - held.x) < 9;
+      if (held?.id === event.pointerId && !up) move(event); // a finger that goes up or down scrolls the page
       plot.style.cursor = held ? "grabbing" : under(panel, event) ? "grab" : "";
     };
-    plot.onlostpointercapture = () => (held = null);
-    // A finger that takes hold scrolls the page no more, unless all of the panel would stop it.
-    plot.addEventListener("touchstart", (event) => held?.handle.at[1] != null && event.preventDefault());
+    plot.onpointerup = (event) => held?.id === event.pointerId && held.handle.at[1] === null && move(event);
+    plot.onlostpointercapture = ({ pointerId }) => held?.id === pointerId && (held = null);
+    plot.addEventListener("touchstart", (event) => held?.handle.at[1] != null && event.preventDefault()); // no scroll
   }
 
   copy.onclick = () => say(state.code) && navigator.clipboard?.writeText(state.code).catch(() => {});

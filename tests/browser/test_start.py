@@ -93,6 +93,81 @@ def test_the_end_effector_follows_the_mouse_and_the_keys_and_the_address_brings_
     assert seen.errors == []
 
 
+def test_a_key_on_a_slider_goes_by_a_millimetre_both_ways(browser, address):
+    seen = Page(browser, address)
+    for name in ("x", "y"):
+        seen.page.locator(f"#{name}").focus()
+        first = seen.places()[name]
+        for key, value in (("ArrowLeft", first - 1), ("ArrowDown", first - 2), ("ArrowRight", first - 1)):
+            seen.page.keyboard.press(key)
+            seen.wait(name, value)
+
+
+class Fingers:
+    """Touches of a page, each at the place (x, y) in px that it has last been moved to."""
+
+    def __init__(self, page):
+        self.session, self.at = page.context.new_cdp_session(page), {}
+
+    def send(self, kind):
+        points = [{"x": x, "y": y, "id": name} for name, (x, y) in self.at.items()]
+        self.session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def down(self, name, x, y):
+        self.at[name] = x, y
+        self.send("touchStart")
+
+    def move(self, name, dx, dy, steps=10):
+        for _ in range(steps):
+            x, y = self.at[name]
+            self.at[name] = x + dx / steps, y + dy / steps
+            self.send("touchMove")
+
+    def up(self):
+        self.at.clear()
+        self.send("touchEnd")
+
+
+def middle(page, selector):
+    box = page.locator(selector).first.bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_a_finger_along_the_time_sets_it_and_one_across_scrolls(browser, address):
+    seen = Page(browser, address, 390, has_touch=True)
+    plot = ".rapkm-plot:has(.rapkm-knob.bare)"
+    seen.page.locator(plot).scroll_into_view_if_needed()
+    fingers, before, top = Fingers(seen.page), seen.places(), seen.page.evaluate("scrollY")
+    fingers.down(1, *middle(seen.page, plot))
+    fingers.move(1, 0, -150)
+    fingers.up()
+    seen.page.wait_for_timeout(300)
+    assert seen.places() == before and seen.page.evaluate("scrollY") > top
+    fingers.down(1, *middle(seen.page, plot))
+    fingers.move(1, 40, 0)
+    fingers.up()
+    seen.page.wait_for_function("JSON.parse(document.querySelector('.rapkm').dataset.places).time > 2.5")
+
+
+def test_a_second_finger_takes_nothing_from_the_first(browser, address):
+    seen = Page(browser, address, has_touch=True)
+    fingers, before = Fingers(seen.page), seen.places()
+    fingers.down(1, *middle(seen.page, ".rapkm-knob >> nth=0"))
+    fingers.down(2, *middle(seen.page, ".rapkm-knob >> nth=2"))
+    fingers.move(1, 40, 0)
+    seen.page.wait_for_function(f"JSON.parse(document.querySelector('.rapkm').dataset.places).x > {before['x'] + 10}")
+    fingers.up()
+    assert {name: v for name, v in seen.places().items() if "offset" in name} == {
+        name: v for name, v in before.items() if "offset" in name
+    }
+    # And the next touch takes hold again.
+    fingers.down(1, *middle(seen.page, ".rapkm-knob >> nth=0"))
+    fingers.move(1, -60, 0)
+    fingers.up()
+    seen.page.wait_for_function(f"JSON.parse(document.querySelector('.rapkm').dataset.places).x < {before['x'] + 5}")
+    assert seen.errors == []
+
+
 def test_far_outside_it_stops_where_an_arm_is_nearly_stretched(browser, address):
     seen = Page(browser, address)
     for name, value in (("x", 150), ("y", 180)):
