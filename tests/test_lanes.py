@@ -13,6 +13,7 @@ import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED
 from rapkm_lite.engine.loop import closed_loops
 from rapkm_lite.simulation import compiled
+from rapkm_lite.simulation.setup import prepare
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
 PD = rk.PD(7.05, 0.225)
@@ -89,7 +90,7 @@ def cut(path, first, count):
 def agree(robot, law, path, model=None, **options):
     """One run, its row in a sweep, and the textbook loop."""
     offset = OFFSET[: robot.n_arms]
-    assert compiled.encode(law, model or robot) is not None
+    assert compiled.encode(law, prepare(robot, path, rk.Sensors(), model)) is not None
     run = rk.simulate(robot, law, path, offset, model=model, **options)
     slow = rk.simulate(robot, Textbook(law), path, offset, model=model, **options)
     for name in ("x", "xd", "q_a", "qd_a", "c"):

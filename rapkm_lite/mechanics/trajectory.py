@@ -164,7 +164,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace, the times are not equidistant from zero (to 1e-6 of a step),
-    or xd and xdd are not the derivatives of x and xd; a few jumps are allowed.
+    or xd and xdd are not the derivatives of x and xd; a few jumps are allowed, and xdd = 0 for laws without a model.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)

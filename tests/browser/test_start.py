@@ -128,6 +128,14 @@ class Fingers:
         self.send("touchEnd")
 
 
+def at_rest(page):
+    """Wait until neither the picture nor the page has moved for a while."""
+    seen, last = "[scrollY, document.querySelector('.rapkm').dataset.drawn]", None
+    while (now := page.evaluate(seen)) != last:
+        last = now
+        page.wait_for_timeout(300)
+
+
 def middle(page, selector):
     box = page.locator(selector).first.bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -137,12 +145,14 @@ def test_a_finger_along_the_time_sets_it_and_one_across_scrolls(browser, address
     seen = Page(browser, address, 390, has_touch=True)
     plot = ".rapkm-plot:has(.rapkm-knob.bare)"
     seen.page.locator(plot).scroll_into_view_if_needed()
+    at_rest(seen.page)
     fingers, before, top = Fingers(seen.page), seen.places(), seen.page.evaluate("scrollY")
     fingers.down(1, *middle(seen.page, plot))
     fingers.move(1, 0, -150)
     fingers.up()
-    seen.page.wait_for_timeout(300)
-    assert seen.places() == before and seen.page.evaluate("scrollY") > top
+    seen.page.wait_for_function(f"scrollY > {top}")
+    at_rest(seen.page)
+    assert seen.places() == before
     fingers.down(1, *middle(seen.page, plot))
     fingers.move(1, 40, 0)
     fingers.up()
@@ -157,6 +167,7 @@ def test_a_second_finger_takes_nothing_from_the_first(browser, address):
     fingers.move(1, 40, 0)
     seen.page.wait_for_function(f"JSON.parse(document.querySelector('.rapkm').dataset.places).x > {before['x'] + 10}")
     fingers.up()
+    at_rest(seen.page)
     assert {name: v for name, v in seen.places().items() if "offset" in name} == {
         name: v for name, v in before.items() if "offset" in name
     }
