@@ -51,13 +51,15 @@ def own_pd(name: str) -> str:
 
 def single(robot, law, path):
     """One run of the kernel, without making results."""
-    setup, code = prepare(robot, path, Sensors(OFFSET)), compiled.encode(law, robot)
+    setup = prepare(robot, path, Sensors(OFFSET))
+    code = compiled.encode(law, setup)
     return lambda: compiled.single(setup, code)
 
 
 def block(robot, law, path):
     """As many runs as the kernel takes side by side, in one thread."""
-    setup, code = prepare(robot, path, Sensors()), compiled.encode(law, robot)
+    setup = prepare(robot, path, Sensors())
+    code = compiled.encode(law, setup)
     return lambda: compiled.many(setup, [code] * len(BLOCK), BLOCK)
 
 
