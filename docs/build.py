@@ -102,7 +102,7 @@ def prepare(notebooks: Path, repository: str) -> None:
         write(WORK / f"lessons/solutions/{name}.ipynb", page)
     write(WORK / "lessons/solutions/index.md", SOLUTIONS.format(pages="\n".join(solved)))
     write(WORK / "lessons/equations.md", lessons.index_page(index, reference.page_of()))
-    write(WORK / "lessons/errata.md", lessons.linked((notebooks / "errata.md").read_text(encoding="utf-8")))
+    write(WORK / "lessons/errata.md", lessons.errata_page((notebooks / "errata.md").read_text(encoding="utf-8")))
     # In the repository a README, on the site the first page for teachers, in a folder beside the teaching pages.
     instructor = (notebooks / "README.md").read_text(encoding="utf-8").replace("](../docs/teaching/", "](../teaching/")
     write(WORK / "lessons/instructor.md", lessons.linked(instructor))

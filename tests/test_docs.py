@@ -116,3 +116,16 @@ def test_links_to_the_index_stand_in_the_order_of_the_equations(depth):
     cells = ["".join(cell["source"]) for cell in json.loads(page)["cells"] if cell["cell_type"] == "markdown"]
     numbers = [list(map(int, re.findall(rf'href="{depth}equations.html#eq-(\d+)"', cell))) for cell in cells]
     assert max(map(len, numbers)) > 2 and all(found == sorted(found) for found in numbers)
+
+
+def test_errata_and_index_on_the_site_have_a_block_for_every_row():
+    from pages.lessons import errata_page, index_page
+
+    for name, page, row, mark in [
+        ("errata.md", errata_page, r"^\| (?:<a id|\d)", "**Section "),
+        ("equations.md", lambda text: index_page(text, {}), r"^\| <a id=\"(?:eq|table)-", ":::{container} formula"),
+    ]:
+        text = (ROOT / "notebooks" / name).read_text(encoding="utf-8")
+        made = page(text)
+        assert made.count(mark) == len(re.findall(row, text, re.M)) > 30
+        assert set(re.findall(r'id="[\w-]+"', text)) == set(re.findall(r'id="[\w-]+"', made))

@@ -49,7 +49,23 @@ def _block(number, printed, meaning, names, lesson, test, functions) -> list[str
     formulas = [f"{formula.strip()}\n" for formula in printed.split("<br>")]
     links = re.sub(r"`([\w.]+)`", lambda name: _to_reference(name[1], functions), names)
     place = f'<a href="{lesson}.html#{anchor}">lesson {lesson[:2]}</a>'
-    return ["", f"{number} **{meaning}**", "", *formulas, f"{place} · {links} · {test}", ""]
+    return ["", f"{number} **{meaning}**", "", ":::{container} formula", *formulas, ":::", "", f"{place} · {links} · {test}", ""]
+
+
+def errata_page(text: str) -> str:
+    """The errata, a block per row instead of a table of six columns, which no screen is wide enough for."""
+    lines = []
+    for line in linked(text).splitlines():
+        if re.match(r"\| where \||\|(---\|)+$", line):
+            continue
+        lines += _erratum(*line.strip("| ").split(" | ")) if line.startswith("|") else [line]
+    return "\n".join(lines) + "\n"
+
+
+def _erratum(where, mark, printed, why, correct, test) -> list[str]:
+    """One place of the print: what stands there, why not or what is sharper, what is right, and the test."""
+    said = {"Printed": printed, "Why" if mark == "✗" else "Sharper": why, "Correct": correct, "Test": test}
+    return ["", f"**Section {where}** {mark}", "", *(f"- *{k}:* {v}" for k, v in said.items() if v != "–"), ""]
 
 
 def _to_reference(name: str, functions: dict[str, str]) -> str:
