@@ -12,7 +12,7 @@ author = "the rapkm_lite authors"
 copyright = "2026, the rapkm_lite authors; lessons under CC-BY-4.0, code under BSD-3-Clause"
 version = release = rapkm_lite.__version__
 language = "en-GB"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "pages.hooks"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx_copybutton", "pages.hooks"]
 root_doc = "contents"
 exclude_patterns = ["**/LICENSE*"]
 default_role = "py:obj"
@@ -25,6 +25,9 @@ nb_render_markdown_format = "myst"
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
+# What can be run, not what it printed; examples without their prompts.
+copybutton_selector = "div:not(.output) > div.highlight pre"
+copybutton_prompt_text = ">>> "
 # The stored Python version of a lesson is not that of the reader.
 suppress_warnings = ["mystnb.unknown_mime_type", "myst.header"]
 mathjax_path = "tex-svg.js"

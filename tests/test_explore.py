@@ -600,6 +600,7 @@ def test_controls_snap_to_their_steps():
     assert snap(whole, 30.9) == 30 and isinstance(snap(whole, 30.9), int)
     log = explore.log_slider("K_P in N m/rad", 1.0, 50.0, 7.05)
     assert moved(log, 1) == pytest.approx(7.05 * 50 ** (1 / 40)) and snap(log, 7.1) == pytest.approx(7.05)
+    assert moved(log, 9990) == pytest.approx(log.base**log.max) and moved(log, -999) == pytest.approx(log.base**log.min)
     assert snap(explore.switch("friction"), True) is True
 
 

@@ -177,7 +177,7 @@ function picture(dt) {
   const words = lost
     ? `With these offsets the machine is lost after ${number(lost.lost)} s.`
     : `One lap costs ${number(total(here.off))} J without the filter and ${number(total(here.on))} J with it, ` +
-      (saved > 0.005 ? `${number(100 * saved, 0)} % less` : number(total(here.on)) < number(total(here.off)) ? "hardly less" : "no less") +
+      (saved > 0.005 ? `${number(100 * saved, 0)} % less` : Number(number(total(here.on))) < Number(number(total(here.off))) ? "hardly less" : "no less") +
       ` (the chapter measured ${number(100 * measured, 0)} % less), and the two motions are never more than ${number(1e3 * apart)} mm apart.`;
   if ($("said").textContent !== words) $("said").textContent = words;
   return {
@@ -344,6 +344,8 @@ for (const [name, c] of Object.entries(controls)) {
 }
 $("filter").onchange = () => ((state.filter = $("filter").value), update());
 $("play").onclick = play;
+// A hand that takes hold of something ends the play; the stage has focused it by now.
+$("stage").addEventListener("pointerdown", () => playing && document.activeElement.matches(".rapkm-knob") && (stop(), update()));
 // The address that was asked for: the page may have written its own in the meantime.
 addEventListener("hashchange", (event) => (fromAddress(event.newURL), update()));
 

@@ -168,9 +168,9 @@ def snap(widget, value):
 
 
 def moved(widget, steps: int):
-    """The value `steps` steps further on a slider."""
+    """The value `steps` steps further on a slider, or at its end."""
     base, way = getattr(widget, "base", None), steps * widget.step
-    return snap(widget, widget.value + way if base is None else widget.value * base**way)
+    return snap(widget, widget.value + way if base is None else widget.value * base ** min(max(way, -99), 99))
 
 
 def moving(handles: list[dict], controls: dict) -> None:

@@ -71,9 +71,8 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
   const right = box.left + box.width, foot = box.top + box.height, thin = spec.small ? Math.min(box.width / 120, 1) : 1;
   const up = spec.yscale === "log" ? (y) => Math.log(y / y0) / Math.log(y1 / y0) : (y) => (y - y0) / (y1 - y0);
   const at = (x, y) => [box.left + (box.width * (x - x0)) / (x1 - x0), box.top + box.height * (1 - up(y))];
-  const texts = [], strokes = [];
-  const put = (words, x, y, ha, va) => texts.push({ words, x, y, size: font, color: "ink", ha, va });
-  const rule = (color, ...points) => strokes.push([{ color, width: 0.75 }, points]);
+  const texts = [], put = (words, x, y, ha, va) => texts.push({ words, x, y, size: font, color: "ink", ha, va });
+  const strokes = [], rule = (color, ...points) => strokes.push([{ color, width: 0.75 }, points]);
   for (const t of x) {
     const [px] = at(t.at, y0);
     rule("faint", px, box.top, px, foot);
@@ -312,11 +311,12 @@ export function wish({ along, set }, x, y) {
   return remade(set, (v) => v[k] + (place - k) * (v[k + 1] - v[k]));
 }
 
-/** Steps of its controls for an arrow key, ten with shift; null for another key. */
+/** Steps of its controls for an arrow key, ten with shift, or to either end; null for another key. */
 export function steps({ along, set, at }, key, shift) {
   const [dx, dy] = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key] ?? [];
-  if (dx === undefined) return null;
-  const count = (v) => (along || at[1] === null ? dx + dy : Math.sign(v[0]) * dx + Math.sign(v[1]) * dy);
+  const end = { Home: -999, End: 999 }[key]; // further than any slider goes
+  if (dx === undefined && !end) return null;
+  const count = (v) => end ?? (along || at[1] === null ? dx + dy : Math.sign(v[0]) * dx + Math.sign(v[1]) * dy);
   return Object.fromEntries(Object.entries(remade(set, (v) => (shift ? 10 : 1) * count(v))).filter(([, n]) => n));
 }
 

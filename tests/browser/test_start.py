@@ -354,6 +354,34 @@ def test_playing_shows_numbers_from_the_first_frame_on_and_a_hand_stops_it(brows
     assert seen.errors == []
 
 
+def test_a_press_on_what_moves_stops_it(browser, address):
+    seen = Page(browser, address)
+    seen.page.click("#play")
+    seen.page.wait_for_function("JSON.parse(document.querySelector('.rapkm').dataset.places).time > 0.1")
+    seen.page.evaluate("""() => {
+      const knob = document.querySelector('.rapkm-knob'), box = knob.getBoundingClientRect();
+      const [clientX, clientY] = [box.left + box.width / 2, box.top + box.height / 2], plot = knob.parentElement;
+      plot.setPointerCapture = () => {};
+      plot.dispatchEvent(new PointerEvent('pointerdown',
+        { clientX, clientY, button: 0, pointerId: 1, pointerType: 'mouse', bubbles: true }));
+    }""")
+    assert seen.page.inner_text("#play") == "Play the run"
+    assert seen.places()["moving"] and seen.errors == []
+
+
+def test_home_and_end_lead_to_the_ends(browser, address):
+    seen = Page(browser, address)
+    time = seen.page.locator(".rapkm-knob.bare")
+    for key, wanted in (("End", 5), ("Home", 0)):
+        time.focus()
+        seen.page.keyboard.press(key)
+        seen.wait("time", wanted)
+    offset = seen.page.locator(".rapkm-knob").nth(1)
+    offset.focus()
+    seen.page.keyboard.press("End")
+    seen.wait("offset_1", 8)
+
+
 def test_the_address_after_a_pause_is_what_is_seen(browser, address):
     seen = Page(browser, address)
     seen.page.click("#play")
