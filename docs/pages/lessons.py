@@ -49,7 +49,17 @@ def _block(number, printed, meaning, names, lesson, test, functions) -> list[str
     formulas = [f"{formula.strip()}\n" for formula in printed.split("<br>")]
     links = re.sub(r"`([\w.]+)`", lambda name: _to_reference(name[1], functions), names)
     place = f'<a href="{lesson}.html#{anchor}">lesson {lesson[:2]}</a>'
-    return ["", f"{number} **{meaning}**", "", ":::{container} formula", *formulas, ":::", "", f"{place} · {links} · {test}", ""]
+    return [
+        "",
+        f"{number} **{meaning}**",
+        "",
+        ":::{container} formula",
+        *formulas,
+        ":::",
+        "",
+        f"{place} · {links} · {test}",
+        "",
+    ]
 
 
 def errata_page(text: str) -> str:
