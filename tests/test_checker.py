@@ -121,11 +121,15 @@ def test_a_design_is_judged_by_its_numbers_beside_their_limits():
     def judge(gain):
         return [Measured("error", 2.0 / gain, "mm", 1.0), Measured("margin", 10.0 - gain, "dB", 5.0, at_most=False)]
 
-    design = Exercise(3.0, ("a", "b", "c"), judge=judge, close=0.05, mistakes={"a gain below zero": lambda g: g < 0})
+    design = Exercise(3.0, ("a", "b", "c"), judge=judge, close=0.05, mistakes={"a gain below one": lambda g: g < 1})
     assert judged(design, 3.0).word == "ok"
     assert "error 2 mm (at most 1 mm: missed)" in judged(design, 1.0).sentence
     assert judged(design, 1.95).word == "close"
-    assert judged(design, -1.0).sentence == "a gain below zero"
+    assert judged(design, 0.5).sentence.startswith("a gain below one; error 4 mm")
+    assert judged(design, 0.5).mistake == "a gain below one"
+    # A kind of design is a reason, not a verdict.
+    kind = Exercise(3.0, ("a", "b", "c"), judge=judge, close=0.05, mistakes={"any": lambda g: True})
+    assert judged(kind, 3.0).word == "ok" and judged(kind, 1.95).word == "close"
     assert judged(design, [1.0, 2.0]).word == "wrong" and judged(design, ...).word == "todo"
 
 

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..simulation.runs import SimulationError
+
 NOTHING = "no value is returned: is a return missing, or has a solver found nothing?"
 
 
@@ -98,6 +100,8 @@ def guarded(action: Callable, *arguments) -> Any:
     except BaseException as error:
         if _unfinished(error):
             raise Ended("todo", "not yet") from None
+        if isinstance(error, SimulationError) and error.__cause__ is None:
+            raise Ended("wrong", f"a run is lost: {_words(error).partition(': ')[2]}", "a lost run") from None
         kind = f"stops with {type(error).__name__}"
         raise Ended("wrong", f"your code stops with {_words(error)}", kind) from None
 
@@ -150,14 +154,15 @@ def numbers(got: Any) -> np.ndarray:
 
 def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """The numbers in the expected shape, and finite; a single number may come as an array of one."""
-    if shape == () and got.shape == (1,):
+    if shape == () and got.size == 1:
         got = got.reshape(())
     if got.shape != shape:
         if got.ndim == 2 and got.shape == shape[::-1]:
             raise Ended("wrong", f"the answer is transposed: shape {got.shape}, expected {shape}", "transposed")
-        extra = "; the number of entries is right, their order in rows and columns is not" * (
-            got.size == int(np.prod(shape)) and got.size > 1
+        layout = (
+            "; a flat array is wanted" if len(shape) == 1 else "; their number is right, the rows and columns are not"
         )
+        extra = layout * (got.size == int(np.prod(shape)) and got.size > 1)
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
     if not np.all(np.isfinite(got)):
         raise Ended("wrong", "the answer holds NaN or infinity", "NaN or infinity")

@@ -58,18 +58,20 @@ def _near_and_far(exercise: Exercise, answer: Any) -> Result:
         all_of_them = _numbers(exercise, answer, cases)
     except Ended as end:
         kinds = sorted({case.label for case in far})
-        fails = [kind for kind in kinds if _fails(exercise, answer, [case for case in far if case.label == kind])]
-        short = f"it is right, but not for {', '.join(fails or kinds)}, where {end.result.sentence}"
+        said = {kind: _failure(exercise, answer, [case for case in far if case.label == kind]) for kind in kinds}
+        said = {kind: words for kind, words in said.items() if words} or dict.fromkeys(kinds, end.result.sentence)
+        short = f"it is right, but not for {', '.join(said)}, where {next(iter(said.values()))}"
         return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
     return all_of_them if result.word == "ok" else result
 
 
-def _fails(exercise: Exercise, answer: Any, cases: list[tuple]) -> bool:
-    """True where the answer is wrong for these cases, taken alone."""
+def _failure(exercise: Exercise, answer: Any, cases: list[tuple]) -> str:
+    """What is wrong with the answer for these cases, taken alone; "" where nothing is."""
     try:
-        return _numbers(exercise, answer, cases).word != "ok"
-    except Ended:
-        return True
+        result = _numbers(exercise, answer, cases)
+    except Ended as end:
+        result = end.result
+    return "" if result.word == "ok" else result.sentence
 
 
 def _seen(exercise: Exercise, answer: Any, cases: list[tuple]) -> Seen:
@@ -184,11 +186,11 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> N
     scale = max(map(_size, seen.want), default=0.0) or 1.0
     loose = min(0.2, max(1e-6, exercise.close, 1.5 * exercise.tolerance / scale))
     rough = Seen(seen.got, seen.want, seen.cases, seen.names, loose)
-    if loose > 1e-6:
+    words = named(seen)
+    if not words and loose > 1e-6:
         _known_mistake(exercise, rough)
-    for trial in (seen, rough):
-        if words := named(trial):
-            raise Ended("wrong", f"{words}; {off}", words)
+    if words := words or named(rough):
+        raise Ended("wrong", f"{words}; {off}", words)
     if words := where(seen, right):
         raise Ended("wrong", f"{words}; {off}", words)
 
@@ -197,17 +199,22 @@ def _behaviour(exercise: Exercise, answer: Any) -> Result:
     """The verdict on a design: its measured numbers beside their limits."""
     assert exercise.judge
     answer = _design(exercise, answer)
-    for sentence, made in exercise.mistakes.items():
-        if _true(made, answer):
-            raise Ended("wrong", sentence, sentence)
-    measured: list[Measured] = guarded(exercise.judge, answer)
-    text = ", ".join(map(str, measured))
-    miss = max((m.miss if m.value == m.value else np.inf) for m in measured)
-    if miss == 0.0:
-        return Result("ok", text)
-    if miss <= exercise.close:
-        return Result("close", f"{text}. To improve: {exercise.improve}")
-    raise Ended("wrong", text, "; ".join(f"{m.what} misses its limit" for m in measured if m.miss > 0.0))
+    try:
+        measured: list[Measured] = guarded(exercise.judge, answer)
+        text = ", ".join(map(str, measured))
+        miss = max((m.miss if m.value == m.value else np.inf) for m in measured)
+        if miss == 0.0:
+            return Result("ok", text)
+        if miss <= exercise.close:
+            return Result("close", f"{text}. To improve: {exercise.improve}")
+        raise Ended("wrong", text, "; ".join(f"{m.what} misses its limit" for m in measured if m.miss > 0.0))
+    except Ended as end:
+        # Which kind of design it is explains why it misses a limit; one that misses none is right, whatever its kind.
+        if end.result.word == "wrong":
+            for sentence, made in exercise.mistakes.items():
+                if _true(made, answer):
+                    raise Ended("wrong", f"{sentence}; {end.result.sentence}", sentence) from None
+        raise
 
 
 def _design(exercise: Exercise, answer: Any) -> Any:

@@ -282,15 +282,31 @@ def not_noticed(robot):
     return law
 
 
+def latching(robot):
+    """What never moves is dead for good: the law remembers it, with its last reading, from call to call."""
+    seen = {"last": None, "dead": np.zeros(robot.n_arms, dtype=bool)}
+
+    def law(t, q_a, qd_a, d):
+        if seen["last"] is not None and t > 0.1:
+            seen["dead"] |= q_a == seen["last"]
+        seen["last"] = q_a.copy()
+        feedback = 7.05 * (q_a - d.q_a) + 0.225 * (qd_a - d.qd_a)
+        return rk.inverse_dynamics(robot, d.q, d.qd, d.qdd) - ~seen["dead"] * feedback
+
+    return law
+
+
 SURVIVORS = [
     ("right", "feed-forward and the living", feed_forward(7.05, 0.225)),
     ("right", "softer", feed_forward(3.0, 0.15)),
     ("right", "rebuilt error", rebuilt),
     ("right", "readings compared", Remembering),
+    ("right", "a dead drive stays dead", latching),
     ("wrong", "PD", lambda robot: rk.PD(7.05, 0.225), "frozen"),
     ("wrong", "the filter", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225)), "force"),
     ("wrong", "redundant", lambda robot: rk.RedundantCTC(1000.0, 60.0), "all encoders"),
     ("wrong", "redundant APD", lambda robot: rk.RedundantAPD(2.0, 0.08), "all encoders"),
+    ("wrong", "the end-effector", lambda robot: rk.CTC(900.0, 60.0, None), "all encoders"),
     ("wrong", "a pair", lambda robot: rk.CTC(1000.0, 60.0, (0, 1)), "pair"),
     ("wrong", "switching", lambda robot: rk.SwitchedCTC(1000.0, 60.0), "health"),
     ("wrong", "open loop", open_loop, "not used"),

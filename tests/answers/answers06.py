@@ -84,12 +84,13 @@ FORMS = [
     ("right", "in place", form_in_place),
     ("right", "the package", rk.antagonism_form),
     (
-        "right",
-        "trapezoidal rule on a closed path",
+        "close",
+        "trapezoidal rule, the same on a closed path",
         lambda robot, path, K_P: (
             weight(robot) * K_P**2 * np.trapezoid(null(rk.control_matrix(robot, path.q)), dx=path.dt, axis=0)
         ),
     ),
+    ("close", "all samples but the first, the same on a closed path", lambda *case: form(*case, keep=slice(1, None))),
     ("close", "every tenth sample", lambda robot, path, K_P: 10 * form(robot, path, K_P, keep=slice(0, -1, 10))),
     ("close", "single precision, rounded", lambda *case: np.float32(form(*case)).round(0)),
     ("wrong", "three drives only, np.eye(3)", lambda *case: form(*case, matrix=three_drives), ""),

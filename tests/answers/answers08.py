@@ -115,6 +115,7 @@ ANSWERS = {
         ("right", "a list", fixed((np.round(tasks.ring(PAIRS + 1.5, 0.119), 4)).tolist())),
         ("wrong", "hexagon", fixed(tasks.ring(60 * np.arange(6), 0.12)), "evenly"),
         ("wrong", "turned hexagon", fixed(tasks.ring(60 * np.arange(6) + 30, 0.12)), "evenly"),
+        ("wrong", "evenly on a part of a circle", fixed(tasks.ring(20 * np.arange(6), 0.12)), "condition"),
         ("wrong", "the other triangle", fixed(tasks.ring(PAIRS - 60, 0.12)), "condition"),
         ("wrong", "near the middle", fixed(tasks.ring(PAIRS, 0.07)), "condition"),
         ("wrong", "three places twice", fixed(tasks.ring([60, 60, 180, 180, 300, 300], 0.12)), "nearest two places"),

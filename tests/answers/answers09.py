@@ -129,6 +129,7 @@ ANSWERS = {
         ("wrong", "least size", tasks.smallest, "no prestress"),
         ("wrong", "within limits only", lambda A, f: rk.allocate_torques(A, f, 85e-3), "no prestress"),
         ("wrong", "constant prestress", constant(0.095), "constant"),
+        ("wrong", "a constant one, too small", constant(0.03), "smallest torque"),
         ("wrong", "too little", little(1e-3), "smallest"),
         ("wrong", "too hot", in_the_middle, "heat"),
         ("wrong", "clipped from below", lambda A, f: clipped(A, f, 5e-3), "force"),

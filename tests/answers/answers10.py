@@ -1,6 +1,7 @@
 """Answers to the exercises of lesson 10, as students would give them."""
 
 import numpy as np
+from scipy.optimize import least_squares
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.lesson10 import tasks
@@ -25,6 +26,13 @@ def three_only(robot, model, x, K_P):
     wanted = rk.inverse_kinematics(model, x)[:3]
     n = rk.null_vector(robot, rk.inverse_kinematics(robot, x))
     return K_P * n * (n @ (wanted - rk.inverse_kinematics(robot, x)[:3]))
+
+
+def by_a_solver(robot, model, x, K_P):
+    """The place where the drives agree best, to 1e-9 rad."""
+    wanted = rk.inverse_kinematics(model, x)[: model.n_arms]
+    gap = least_squares(lambda y: rk.inverse_kinematics(robot, y)[: robot.n_arms] - wanted, x)
+    return K_P * (wanted - rk.inverse_kinematics(robot, gap.x)[: robot.n_arms])
 
 
 def scaled(factor):
@@ -79,7 +87,8 @@ ANSWERS = {
         ),
         ("close", "first order, projector at x", by_projection),
         ("close", "the null vector of three arms", three_only),
-        ("wrong", "sign", scaled(-1), "sign"),
+        ("right", "a solver that stops early", by_a_solver),
+        ("wrong", "sign", scaled(-1), "opposite sign"),
         ("wrong", "half", scaled(0.5), "factor"),
         ("wrong", "mN m", scaled(1e3), "1000"),
         ("wrong", "degrees", scaled(180 / np.pi), "180"),
@@ -125,6 +134,8 @@ ANSWERS = {
         ("right", "with critical damping", law(rk.AntagonismFilter(rk.PD(21.0, 0.39)))),
         ("right", "feed-forward and filtered feedback", with_feed_forward),
         ("right", "command form", law(rk.CommandFilter(rk.PD(20.0, 0.6)))),
+        ("right", "bare drives, strongly damped", law(rk.PD(4.5, 2.2))),
+        ("wrong", "pushes away", law(lambda t, q, qd, d: 50.0 * (q - d.q_a)), "lost"),
         ("wrong", "the gains of the lessons", law(rk.AntagonismFilter(rk.PD(7.05, 0.225))), "gain"),
         ("wrong", "PD of the lessons", law(rk.PD(7.05, 0.225)), "fight"),
         ("wrong", "stiff PD", law(rk.PD(19.0, 0.55)), "fight"),

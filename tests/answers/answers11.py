@@ -235,6 +235,8 @@ ANSWERS = {
             "gains on the drives, 2.4 Hz",
             at(2.4, lambda k, d: rk.RedundantCTC([k * 7 / 3] * 3, [d * 7 / 3] * 3)),
         ),
+        ("right", "a pair that never switches", at(2.6, lambda k, d: rk.SwitchedCTC(k, d / 2, 5.0))),
+        ("close", "PD and filter, a shade too costly", lambda robot: rk.AntagonismFilter(rk.PD(14.0, 0.16))),
         ("wrong", "5 Hz", at(5.0, lambda k, d: rk.CTC(k, d, None)), "counts"),
         ("wrong", "1 Hz", at(1.0, lambda k, d: rk.CTC(k, d, None)), "100 g"),
         ("wrong", "switched", at(2.2, rk.SwitchedCTC), "switch"),

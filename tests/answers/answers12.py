@@ -105,6 +105,7 @@ ANSWERS = {
         ("wrong", "bent alike, wide", machine(0.29, mode=(1, 1, 1)), "bent"),
         ("wrong", "the wrong arm", machine(0.29, mode=(1, -1, 1)), "cost of the offsets"),
         ("wrong", "singular on the way", machine(0.2, (0.2, 0.2)), "torque"),
+        ("wrong", "lost on its way", machine(0.2, (0.25, 0.25)), "lost"),
         ("wrong", "does not reach", machine(0.29, (0.1, 0.1)), ""),
         ("wrong", "too wide", machine(0.4, (0.26, 0.34)), "farthest drive"),
         ("wrong", "four arms", lambda: rk.load("four_arms"), "3"),

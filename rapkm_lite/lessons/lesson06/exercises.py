@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from ...machine.manipulator import Manipulator, load
-from ...mechanics.trajectory import circle, polygon, triangle
+from ...mechanics.trajectory import Trajectory, circle, follow, polygon, triangle
 from ...simulation.energy import antagonism_form
 from ..checker import Case, Exercise
 from . import mistakes, places
@@ -16,6 +16,12 @@ from . import mistakes, places
 def _four_arms() -> Manipulator:
     square = 0.25 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return Manipulator(base=square, lengths=[0.25, 0.3], masses=[0.1, 0.2], resistance=1.2, torque_constant=0.04)
+
+
+def _line(robot, start, end) -> Trajectory:
+    """Straight on at one speed: first and last sample differ."""
+    t, velocity = np.linspace(0.0, 1.0, 101), end - start
+    return follow(robot, t, start + t[:, None] * velocity, np.tile(velocity, (101, 1)), np.zeros((101, 2)))
 
 
 def _paths(rng) -> list[tuple]:
@@ -27,6 +33,7 @@ def _paths(rng) -> list[tuple]:
         Case("the testbed", robot, circle(robot, 0.05, dt=5e-3), 7.05),
         Case("the testbed", robot, polygon(robot, corners, dt=1e-2), rng.uniform(2, 9)),
         Case("unequal arms", unequal, triangle(unequal, side=0.1, duration=4.0, dt=5e-3), rng.uniform(2, 9)),
+        Case("an open path", robot, _line(robot, *corners[:2]), rng.uniform(2, 9), beyond=True),
         Case("four arms", _four_arms(), circle(_four_arms(), 0.08, dt=5e-3), rng.uniform(2, 9)),
     ]
 

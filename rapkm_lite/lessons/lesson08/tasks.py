@@ -133,7 +133,7 @@ def is_hexagon(answer) -> bool:
     """True for six places evenly on a circle about the middle."""
     places = chosen(answer)
     angle = np.sort(np.arctan2(places[:, 1], places[:, 0]))
-    return bool(np.ptp(np.linalg.norm(places, axis=-1)) < 2e-3 and np.ptp(np.diff(angle)) < 0.03)
+    return bool(np.ptp(np.linalg.norm(places, axis=-1)) < 2e-3 and np.abs(np.diff(angle) - np.pi / 3).max() < 0.03)
 
 
 def calibration_drive(robot) -> Trajectory:

@@ -105,11 +105,11 @@ EXERCISES = {
         improve="let the prestress follow what the force takes from each drive, a little above the least",
         points=10.0,
         mistakes={
-            "these torques do not make the force f: clipping and adding to single drives changes A^T c": (
+            "these torques do not make the force f: A^T c is another one, as after clipping single drives": (
                 tasks.another_force
             ),
             "there is no prestress in this choice, so drives change their sign with the force": tasks.without_prestress,
-            "a constant prestress: enough for the worst moment is too much for the limit and the heat": (
+            "a constant prestress: what is enough for the worst moment is too much for the limit and the heat": (
                 tasks.with_a_constant_one
             ),
         },

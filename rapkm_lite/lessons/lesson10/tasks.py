@@ -7,7 +7,7 @@ import numpy as np
 from ...control.laws import PD, AntagonismFilter
 from ...machine.manipulator import Manipulator, load
 from ...mechanics.actuation import control_matrix, prestress_projector
-from ...mechanics.antagonism import null_basis
+from ...mechanics.antagonism import antagonism_filter, null_basis
 from ...mechanics.closure import estimate_pose
 from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import hold, triangle
@@ -52,7 +52,7 @@ def wrong_models(rng) -> list[tuple]:
 def pushes(got, robot, model, x, K_P) -> tuple[float, str]:
     """At rest the torques move nothing: A^T c = 0 at the pose where the drives have come to stand."""
     q = estimate_pose(robot, demanded(model, x), x)
-    return float(np.abs(control_matrix(robot, q).T @ got).max()), "push on the end-effector (N)"
+    return float(np.abs(antagonism_filter(control_matrix(robot, q)) @ got).max()), "torque that moves it (N m)"
 
 
 def force_left(A, fight, limit) -> float:
@@ -105,11 +105,11 @@ def gains_of_the_lessons(law) -> bool:
 def survives(make) -> list[Measured]:
     """The law that `make(drawing)` returns, on the small triangle with each drive dead in turn, and healthy."""
     built, drawing = machine()
-    law, path = given(make, (drawing,)), triangle(drawing, side=0.12, duration=2.5, dt=2e-3)
+    path = triangle(drawing, side=0.12, duration=2.5, dt=2e-3)
 
     def run(path, *broken):
         faults = [TorqueLimit(WEAK), *broken]
-        return simulate(built, law, path, encoder=COUNTS, model=drawing, faults=faults)
+        return simulate(built, given(make, (drawing,)), path, encoder=COUNTS, model=drawing, faults=faults)
 
     healthy, still = run(path), run(hold(drawing, [0.03, 0.02], 1.0, 2e-3))
     found = [

@@ -1,0 +1,38 @@
+"""The benchmarks run: each job once, without a word about times."""
+
+import pytest
+
+import rapkm_lite as rk
+from rapkm_lite.simulation.compiled import COMPILED
+from tests.bench import kernels, user_laws, yardsticks
+from tests.bench.turns import Times
+
+ROBOT = rk.load()
+
+
+def once(repeats, clock=None, **jobs):
+    for job in jobs.values():
+        job()
+    return {name: Times(1.0, 1.0) for name in jobs}
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    for module in (kernels, user_laws):
+        monkeypatch.setattr(module, "in_turns", once)
+
+
+@pytest.mark.skipif(not COMPILED, reason="benchmarks are of the compiled engine")
+def test_benchmarks_of_the_kernels_do_the_job_of_the_c_code(quick, tmp_path, capsys):
+    if yardsticks.compile_c(tmp_path, 1):
+        kernels.check_c(tmp_path, ROBOT)
+    kernels.single_runs(ROBOT, tmp_path)
+    kernels.studies(ROBOT, tmp_path)
+    said = capsys.readouterr().out
+    assert all(said.count(f"\n{name}") == 4 for name in kernels.LAWS if "," not in name and name != "PD")
+
+
+@pytest.mark.skipif(not COMPILED, reason="benchmarks are of the compiled engine")
+def test_benchmarks_of_laws_that_a_user_writes_compare_equal_torques(quick, capsys):
+    user_laws.laws(ROBOT, rk.triangle(ROBOT, duration=0.5))
+    assert capsys.readouterr().out.count("1.0000 (1.0000)") == 4
