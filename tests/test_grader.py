@@ -3,12 +3,14 @@
 import csv
 import json
 import re
+from pathlib import Path
 
 import pytest
 
 from rapkm_lite.__main__ import main
+from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.grading.grader import Grade, grade
-from rapkm_lite.lessons.grading.submission import found, needed, statements
+from rapkm_lite.lessons.grading.submission import called, found, needed, statements
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
 
 SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
@@ -52,6 +54,7 @@ SUBMISSIONS = {
     "ivy": checked(["def filtered_torques(A, c):\n    raise NotImplementedError\n", *RIGHT[1:]]),
     "jon": checked(["from rapkm_lite.lessons.lesson04.exercises import filtered_torques\n", *RIGHT[1:]]),
     "kim": [SETUP, "while True: pass", *checked(RIGHT)[1:]],
+    "lou": [SETUP, *RIGHT, *(f'hint("04.{name}")' for name in ("filtered_torques", "filtered_command"))],
 }
 # Student -> verdicts of the three exercises.
 VERDICTS = {
@@ -66,6 +69,7 @@ VERDICTS = {
     "ivy": ["todo", "ok", "ok"],
     "jon": ["todo", "ok", "ok"],
     "kim": ["ok", "ok", "ok"],
+    "lou": ["ok", "ok", "ok"],
 }
 
 
@@ -160,6 +164,21 @@ def test_names_of_a_function_are_its_own():
         "print(answer(1))\n",
     ]
     assert [s.key for s in needed(statements(texts)[0], {"answer"})] == ["0.0", "0.3", "1.0"]
+
+
+def test_answers_without_a_check_are_looked_for_by_the_names_that_the_lessons_use():
+    known = exercises()
+    for path in sorted((Path(__file__).parents[1] / "notebooks").glob("[0-9]*.ipynb")):
+        for name, given in re.findall(r'check\(\\"(\d\d\.\w+)\\", (\w+)\)', path.read_text(encoding="utf-8")):
+            assert called(name, known[name]) == given or name[:2] != path.name[:2], name
+
+
+def test_notebooks_without_the_number_of_a_lesson_are_named(tmp_path, capsys):
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [SETUP])
+    write(tmp_path / "gus" / "homework.ipynb", [SETUP])
+    write(tmp_path / "gus" / "00_start_here.ipynb", [SETUP])
+    assert main(["grade", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.endswith(f"like 04_title.ipynb: {Path('gus', 'homework.ipynb')}\n")
 
 
 def test_folders_without_submissions_are_refused(tmp_path, capsys):

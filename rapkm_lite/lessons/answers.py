@@ -31,6 +31,10 @@ class Ended(Exception):
         self.result = Result(word, sentence, mistake)
 
 
+class NotYet(np.ndarray):
+    """NaN in place of numbers that are secret and that the student does not have yet."""
+
+
 def copied(value: Any) -> Any:
     """A copy of what could be changed in place; machines, paths and laws cannot, and stay."""
     if isinstance(value, np.ndarray):

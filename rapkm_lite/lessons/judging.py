@@ -9,7 +9,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from ..machine.manipulator import Manipulator
-from .answers import NOTHING, Answer, Ended, Result, copied, fitting, given, guarded, numbers
+from .answers import NOTHING, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
 from .seen import Seen, alike
@@ -32,7 +32,7 @@ def _unwrapped(answer: Any) -> Any:
     """What the student wrote, also when it is what `check` returned before; ends where there is nothing."""
     if isinstance(answer, Answer):
         answer = answer.own
-    if answer is None or answer is Ellipsis or answer is NotImplemented:
+    if answer is None or answer is Ellipsis or answer is NotImplemented or isinstance(answer, NotYet):
         raise Ended("todo", "not yet")
     if inspect.iscoroutinefunction(answer):  # a run would call it and leave what it gets unawaited
         raise Ended("wrong", "the answer is a coroutine: write def, not async def", "not numeric")

@@ -44,21 +44,30 @@ class Submission:
 def found(folder: Path, known: set[str]) -> list[Submission]:
     """All submissions under a folder: STUDENT/.../04_title.ipynb, or loose notebooks, whose names are the student's.
 
-    known : numbers of the lessons that have exercises.  Notebooks without such a number in their name are left out.
+    known : numbers of the lessons that have exercises; for notebooks without such a number in their name see `unnamed`.
     Raises ValueError when the folder does not exist or holds none.
     """
     if not os.path.isdir(folder):  # also where the name is longer than a name can be
         raise ValueError(f"submissions = {short(str(folder))}; allowed: a folder that exists")
     submissions = []
-    for path in sorted(folder.rglob("*.ipynb")):
-        parts = path.relative_to(folder).parts
-        numbers = [n for n in _NUMBER.findall(path.name) if n in known]
-        if numbers and not any(part.startswith(".") for part in parts):
+    for path, parts in _notebooks(folder):
+        if numbers := [n for n in _NUMBER.findall(path.name) if n in known]:
             student = parts[0] if len(parts) > 1 else path.stem
             submissions.append(Submission(student, path, numbers[-1]))
     if not submissions:
         raise ValueError(f"submissions = {str(folder)!r}; allowed: a folder with notebooks named like 04_title.ipynb")
     return submissions
+
+
+def unnamed(folder: Path) -> list[str]:
+    """The notebooks under a folder whose names tell no lesson, so that nobody grades them."""
+    return [str(Path(*parts)) for path, parts in _notebooks(folder) if not _NUMBER.search(path.name)]
+
+
+def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
+    """All notebooks with the parts of their place, but those of hidden folders, as checkpoints are."""
+    places = [(path, path.relative_to(folder).parts) for path in sorted(folder.rglob("*.ipynb"))]
+    return [(path, parts) for path, parts in places if not any(part.startswith(".") for part in parts)]
 
 
 def sources(path: Path) -> list[str]:

@@ -94,21 +94,20 @@ class Bench:
         self.tell(done=True)
 
     def without_check(self, name: str, texts: list[str]) -> Result:
-        """The verdict on what bears the answer's name: the last of its cell, else the best anywhere."""
+        """The verdict on what bears the answer's name: the last where the exercise is named, else the best anywhere."""
         cells = {i for i, text in enumerate(texts) if f'"{name}"' in text or f"'{name}'" in text}
         near = [value for cell, value in self.bound[name] if cell in cells]
         for value in reversed(near):
             result = self.judged(name, value)
             if result.word != "todo":
                 return result
-        order = ["ok", "close", "wrong", "todo"]
-        tried = [self.judged(name, value) for _, value in self.bound[name][:5] if not cells]
-        if tried:
-            return min(tried, key=lambda result: order.index(result.word))
         stopped = [self.failed[cell] for cell in sorted(cells) if cell in self.failed]
         if stopped:
             return Result("wrong", f"its cell: {stopped[0]}", "its cell stops")
-        return Result("todo", "not yet")
+        # Hints and pictures name an exercise, too; its answer may stand in a cell of its own.
+        tried = [self.judged(name, value) for cell, value in self.bound[name] if cell not in cells][:5]
+        order = ["ok", "close", "wrong", "todo"]
+        return min(tried, key=lambda result: order.index(result.word), default=Result("todo", "not yet"))
 
 
 def quiet() -> contextlib.ExitStack:

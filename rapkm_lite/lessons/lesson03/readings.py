@@ -48,7 +48,8 @@ def _log_exercise(name: str, hints: tuple[str, ...], tolerance: float, close: fl
         close=close,
         secret=True,
         improve="average over a whole rest, and use the angles: they are cleaner than the torques",
-        mistakes=_log_mistakes(name) | more.get("mistakes", {}),
+        mistakes=_log_mistakes(name) | more.pop("mistakes", {}),
+        **more,
     )
 
 
@@ -75,6 +76,7 @@ READINGS = {
         ),
         3e-4,
         0.08,
+        called="offsets_b",
     ),
     "03.offset_c": Exercise(
         np.full(3, np.nan),
@@ -87,6 +89,7 @@ READINGS = {
         judge=tasks.refusal,
         raw=True,
         secret=True,
+        called="offsets_c",
     ),
     "03.gains": Exercise(
         lambda: hidden("gain")[1],
@@ -118,6 +121,7 @@ READINGS = {
         ),
         3e-4,
         0.07,
+        called="offsets_g",
         mistakes={
             "the nominal gain is used with the torques: fit the gain first, or use the angles": (
                 tasks.from_rests("gain", lambda n, e, c: np.linalg.solve(n, -np.sum(n * c, axis=1) / K_P))

@@ -98,4 +98,5 @@ DEAD_ENCODER = Exercise(
         ),
     },
     points=10,
+    called="survivor",
 )
