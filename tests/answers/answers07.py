@@ -82,7 +82,7 @@ ANSWERS = {
         ("right", "along the null basis", along_the_null_basis),
         ("right", "row by row, a list", row_by_row),
         ("right", "in place", in_place),
-        ("close", "null space at the guess, first order", with_the_guess),
+        ("wrong", "null space at the guess, first order", with_the_guess, "at the guess"),
         ("wrong", "only three drives", null_vector_of_three, "4 arms"),
         ("wrong", "squares", lambda r, q, g: ((q - best(r, q, g)) ** 2).sum(axis=1), "root"),
         ("wrong", "largest entry", lambda r, q, g: np.abs(q - best(r, q, g)).max(axis=1), "largest"),

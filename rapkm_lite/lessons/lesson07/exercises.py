@@ -43,6 +43,9 @@ EXERCISES = {
                     q_a - inverse_kinematics(robot, guess)[:, : robot.n_arms], axis=-1
                 )
             ),
+            "this is the part along the null space at the guess, which turns until the pose that fits best": (
+                tasks.seen_from_the_guess
+            ),
             "one number for all rows: the norm goes over the drives only (axis=1)": (
                 lambda robot, q_a, guess: np.full(len(q_a), np.linalg.norm(tasks.left_over(robot, q_a, guess)))
             ),

@@ -33,13 +33,21 @@ def left_over(robot, q_a, guess) -> np.ndarray:
     return q_a - estimate_pose(robot, q_a, guess)[..., : robot.n_arms]
 
 
+def seen_from_the_guess(robot, q_a, guess) -> np.ndarray:
+    """The contradiction to first order, with the null space at the guess."""
+    q = inverse_kinematics(robot, guess)
+    n = null_basis(control_matrix(robot, q))
+    return np.linalg.norm(matvec(n.mT, q_a - q[:, : robot.n_arms]), axis=-1)
+
+
 def contradiction_cases(rng) -> list[tuple]:
     cases = []
     for name, label in (("testbed", "the testbed"), ("asymmetric", "three different arms"), ("four_arms", "four arms")):
         robot = load(name)
         x = rng.uniform(-0.06, 0.06, (5, 2))
         q_a = inverse_kinematics(robot, x)[:, : robot.n_arms]
-        cases.append(Case(label, robot, q_a + rng.normal(0, 5e-3, q_a.shape), x))
+        near = x + rng.normal(0, 2e-3, x.shape)
+        cases.append(Case(label, robot, q_a + rng.normal(0, 5e-3, q_a.shape), near))
     return cases
 
 

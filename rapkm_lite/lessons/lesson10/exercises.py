@@ -101,11 +101,11 @@ EXERCISES = {
     "10.spare_law": Exercise(
         tasks.spare_law,
         hints=(
-            "Which of the three limits forbids low gains, which one high gains, and which one a law without filter?",
-            "The energy is the fight, and the filter takes it away. Then raise the gain until every dead drive costs "
-            "less than 5 mm, and stop before the steps K_P times one count shake the machine at rest.",
-            "return rk.AntagonismFilter(rk.PD(K_P, K_D)) with K_P near 19 N m/rad, and more damping than "
-            "0.225 * np.sqrt(K_P / 7.05)",
+            "What does each of the three limits ask of the gain, and on what is the energy spent?",
+            "Most of the energy is the fight, and a filter takes it away. Then raise the gain until every dead drive "
+            "costs less than 5 mm, and stop before the steps K_P times one count shake the machine at rest.",
+            "return rk.AntagonismFilter(rk.PD(K_P, K_D)) with K_P near 19 N m/rad, and half as much damping "
+            "again as 0.225 * np.sqrt(K_P / 7.05)",
         ),
         unit="",
         judge=tasks.survives,
@@ -113,7 +113,7 @@ EXERCISES = {
         improve="move the gain a little, towards the limit that has room",
         points=10.0,
         mistakes={
-            "bare PD drives: with links that are too long they fight, and no gain is both stiff and cheap": (
+            "bare PD drives: with links that are too long they fight, and a stiff gain is dear": (
                 lambda answer: isinstance(answer(tasks.machine()[1]), PD)
             ),
             "the gain is that of the other lessons; three drives may be stiff enough with it, two are not": (

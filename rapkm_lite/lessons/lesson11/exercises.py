@@ -165,7 +165,7 @@ EXERCISES = {
         improve="change the frequency of the loop by a tenth, up where the payload's error is short and down otherwise",
         points=10.0,
         mistakes={
-            "a law that switches its pair: its torques jump at every switch, whatever the gains": (
+            "a law that switches its pair: wherever it does, its torques jump, whatever the gains": (
                 lambda answer: tasks.is_kind(answer, "SwitchedCTC")
             ),
             "PD alone knows nothing of the inertia: what is fast enough for the error is too fast for these encoders; "
