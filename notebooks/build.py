@@ -60,7 +60,8 @@ def main(wanted: list[str]) -> None:
             path.name.startswith(word) for path in HERE.rglob("*.ipynb")
         ):
             sys.exit(
-                f"no notebook begins with {word!r}; allowed: the beginning of a notebook's name, figures, teaching"
+                f"no notebook begins with {word!r}; allowed: the beginning of a notebook's name, figures, teaching, "
+                "new TITLE, nbgrader FOLDER, mystery"
             )
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
     solved = {path.name for path in SOLUTIONS.glob("*.ipynb")}

@@ -484,7 +484,7 @@ def test_what_cannot_be_read_is_refused(tmp_path):
         ({"unknowns": "lengths"}, "unknowns = 'lengths'"),
         ({"use": "both"}, "use = 'both'"),
         ({"noise": -1.0}, "noise"),
-        ({"use": "torques", "log": [[0.0, 0.0, 0.0]]}, "needs logs with torques"),
+        ({"use": "torques", "log": [[0.0, 0.0, 0.0]]}, "no log holds still for 20 records"),
         ({"use": "torques", "K_P": -1.0}, "K_P"),
         ({"use": "torques", "K_P": [1.0, 2.0]}, "K_P"),
     ],
@@ -566,11 +566,12 @@ def test_a_gain_is_another_one_from_five_errors_and_two_hundredths_on():
 def test_cautions_from_their_bounds_on():
     """Three times the noise, a quarter of the longest link, a condition of fifty; half the width of two places."""
     far = 0.3 * TESTBED.lengths.max() * np.array([[1.0, 0.0], [-1.0, 0.0]])
-    assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5) == []
+    assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5, None) == cautions(far, TESTBED, 49.0, 2.9e-5, 0.0, 1e-5) == []
     for given, words in (
-        ((far, TESTBED, 49.0, 3.1e-5, 1e-5), "exceeds the noise"),
-        ((0.8 * far, TESTBED, 49.0, 2.9e-5, 1e-5), "close together"),
-        ((far, TESTBED, 51.0, 2.9e-5, 1e-5), "condition"),
+        ((far, TESTBED, 49.0, 3.1e-5, 0.0, 1e-5), "exceeds the noise 0.01 mrad: something else is wrong"),
+        ((far, TESTBED, 49.0, 3.1e-5, 1e-5, None), "exceeds the steps of the readings, 0.01 mrad: they have more noise"),
+        ((0.8 * far, TESTBED, 49.0, 2.9e-5, 1e-5, None), "close together"),
+        ((far, TESTBED, 51.0, 2.9e-5, 1e-5, None), "condition"),
     ):
         (sentence,) = cautions(*given)
         assert words in sentence

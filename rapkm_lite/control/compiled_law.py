@@ -127,6 +127,7 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
     Random numbers of `numpy.random` would be others in every run: noise belongs into an array, an entry per sample.
+    It is compiled once in every session, in the first run, which takes some seconds: worth it for many runs.
     Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it
     raised, when it gave no finite torques, from the start of the run to there.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.

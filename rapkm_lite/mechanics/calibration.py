@@ -180,7 +180,7 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     used = max(spread, step) if noise is None else noise
     half = basis @ (Vt.T / sigma)
     condition = float(sigma[0] / sigma[-1])
-    notes = [*notes, *cautions(x, robot, condition, spread, step if noise is None else noise)]
+    notes = [*notes, *cautions(x, robot, condition, spread, step, noise)]
     if used == 0.0:
         notes.append("no reading is left over to show the noise, so that the covariance is none: pass noise")
     if unknowns == "all":

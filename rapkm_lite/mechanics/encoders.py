@@ -163,13 +163,17 @@ def gauge(robot: Manipulator) -> np.ndarray:
     return np.linalg.qr(np.stack([arm.ravel(), turned.ravel(), *shifts], axis=-1))[0]
 
 
-def cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, noise: float) -> list[str]:
-    """What to mind: a residual (rad) above the noise where that is known, and places x (k, 2) close together."""
-    said = []
-    if noise and spread > 3 * noise:
+def cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, step: float, noise: float | None):
+    """What to mind: a residual above the noise (rad) or else the steps of the readings, places x (k, 2) close together."""
+    said, wrong = [], "is wrong, such as a length or a base point"
+    if noise is None and step and spread > 3 * step:
         said.append(
-            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else is wrong, "
-            "such as a length or a base point"
+            f"the residual {1e3 * spread:.3g} mrad exceeds the steps of the readings, {1e3 * step:.2g} mrad: they have "
+            f"more noise than that (to be given as noise), or something {wrong}"
+        )
+    elif noise and spread > 3 * noise:
+        said.append(
+            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else {wrong}"
         )
     extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
     if extent < 0.25 * robot.lengths.max():

@@ -17,7 +17,8 @@ _LOOP = 'solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"'
 def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     """The machine as MJCF, a text that ``mujoco.MjModel.from_xml_string`` reads.
 
-    Hinges "base1" .. "baseN" and "elbow1" .. "elbowN" in the order of q, with the same angles; sites "tip1" .. "tipN",
+    Hinges "base1" .. "baseN" and "elbow1" .. "elbowN" with the angles of q, which stand arm by arm in MuJoCo: base1,
+    elbow1, base2, ..., so look them up by name; sites "tip1" .. "tipN",
     tied to tip 2 by equality constraints; motors "drive1" .. "driveN" whose control is the torque c in N m; sensors:
     angles and rates of the base joints, in rad and rad/s, and the position of tip 2 in m.  The load is lumped into the
     distal link of arm 2.  Not exported: Coulomb friction (another model there), resistance and torque constant.

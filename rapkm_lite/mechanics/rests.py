@@ -13,6 +13,10 @@ from .at import at
 from .encoders import closure, poses
 
 
+# Records of the later half of a rest, over which its means are taken.
+SHORTEST = 10
+
+
 class Rests(NamedTuple):
     """Means over each rest: desired and measured angles, torques, each (k, N), and the standard error of the torques.
 
@@ -41,18 +45,15 @@ class Gain(NamedTuple):
         ]
 
 
-def rests(logs: list[Log], shortest: int = 10) -> Rests | None:
-    """The rests of all logs, each the later half of a stretch of equal desired angles; None where there is none.
-
-    shortest : records of such a half.
-    """
+def rests(logs: list[Log]) -> Rests | None:
+    """The rests of all logs, each the later half of a stretch of equal desired angles; None where there is none."""
     found = []
     for log in logs:
         moves = np.flatnonzero(np.any(np.diff(log.q_a_desired, axis=0) != 0.0, axis=-1)) + 1
         for start, stop in zip([0, *moves], [*moves, len(log.t)], strict=True):
             half = slice(start + (stop - start) // 2, stop)
             count = stop - half.start
-            if count >= shortest:
+            if count >= SHORTEST:
                 c = log.c[half]
                 error = c.std(axis=0, ddof=1) / np.sqrt(count)
                 found.append((log.q_a_desired[half.start], log.q_a[half].mean(axis=0), c.mean(axis=0), error, count))
@@ -95,7 +96,10 @@ def fitted_gain(stand: Rests) -> Gain | None:
 def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]) -> tuple[np.ndarray, float]:
     """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
     if stand is None:
-        raise ValueError("use = 'torques' needs logs with torques; allowed: a Log, a path, or a list of these")
+        raise ValueError(
+            f"use = 'torques', and no log holds still for {2 * SHORTEST} records with torques; allowed: a Log, a path of "
+            "one, or a list of these, with such rests"
+        )
     if K_P is None:
         if gain is None:
             raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
