@@ -563,13 +563,24 @@ def test_a_gain_is_another_one_from_five_errors_and_two_hundredths_on():
     assert len(vague) == 2 and "drive 1" in vague[0] and "drive 2" in vague[1]
 
 
+def test_a_log_of_six_digits_with_noise_is_not_said_to_have_wrong_lengths():
+    rng = np.random.default_rng(2)
+    q_a = rk.inverse_kinematics(TESTBED, rng.uniform(-0.1, 0.1, (500, 2)))[:, :3] + OFFSET[:3]
+    noisy = np.round(q_a + rng.normal(0, 2e-4, q_a.shape), 6)
+    assert "more noise than that (to be given as noise), or" in rk.calibrate(TESTBED, noisy).note
+    assert rk.calibrate(TESTBED, noisy, noise=2e-4).note == ""
+
+
 def test_cautions_from_their_bounds_on():
     """Three times the noise, a quarter of the longest link, a condition of fifty; half the width of two places."""
     far = 0.3 * TESTBED.lengths.max() * np.array([[1.0, 0.0], [-1.0, 0.0]])
     assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5, None) == cautions(far, TESTBED, 49.0, 2.9e-5, 0.0, 1e-5) == []
     for given, words in (
         ((far, TESTBED, 49.0, 3.1e-5, 0.0, 1e-5), "exceeds the noise 0.01 mrad: something else is wrong"),
-        ((far, TESTBED, 49.0, 3.1e-5, 1e-5, None), "exceeds the steps of the readings, 0.01 mrad: they have more noise"),
+        (
+            (far, TESTBED, 49.0, 3.1e-5, 1e-5, None),
+            "exceeds the steps of the readings, 0.01 mrad: they have more noise",
+        ),
         ((0.8 * far, TESTBED, 49.0, 2.9e-5, 1e-5, None), "close together"),
         ((far, TESTBED, 51.0, 2.9e-5, 1e-5, None), "condition"),
     ):

@@ -230,6 +230,10 @@ def managed(t, q_a, qd_a, d):
         return -7.0 * (q_a - d.q_a)
 
 
+def compared(t, q_a, qd_a, d):
+    return q_a > d.q_a
+
+
 def square(t, q_a, qd_a, d):
     return np.zeros((3, 3))
 
@@ -244,6 +248,7 @@ REFUSED = {
     twofold: "c is once a number and once an array, line # of test_compiled_law.py:",
     managed: 'such a with statement is not known here, line # of test_compiled_law.py: with np.errstate(all="ignore"):',
     square: "it returns an array with 2 dimensions",
+    compared: "it returns truth values",
 }
 
 

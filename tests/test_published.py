@@ -31,3 +31,10 @@ def test_a_published_number_is_what_the_package_computes(row):
 @pytest.mark.parametrize("row", [row for row in KEPT if "quoted" in row], ids=lambda row: row["quoted"])
 def test_a_lesson_quotes_its_number(row):
     assert row["quoted"] in lesson(row["lesson"])
+
+
+def test_what_another_processor_rounds_otherwise_stays_as_it_was():
+    old = {"lesson": "03", "name": "a", "value": 1.0, "tolerance": 1e-3}
+    for moved, wanted in ((1e-9, 1.0), (2e-3, 1.002)):
+        assert published.kept([old | {"value": 1.0 + moved}], [old])[0]["value"] == wanted
+    assert published.kept([old], []) == [old]

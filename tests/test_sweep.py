@@ -103,6 +103,22 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
+@pytest.mark.parametrize("offset", [(-5e-3, 5e-3, 0.0), (0.0, 0.0, 0.0)])
+def test_a_law_that_fails_at_the_last_sample_has_failed_in_a_study_too(offset):
+    """The place that the law is told is out of its model's reach there, and earlier it was not."""
+    robot = ROBOT.replace(friction=0.0)
+    law, model = rk.CTC(400.0, 40.0, (0, 1), pose="true"), robot.replace(lengths=0.198)
+    for duration in (0.037, 0.038):
+        path = rk.hold(robot, [0.0, -0.1645], duration)
+        row = rk.sweep(robot, law, path, [offset], model=model, failed="mask")
+        try:
+            rk.simulate(robot, law, path, offset, model=model)
+            assert not row.failed[0]
+        except rk.SimulationError as lost:
+            assert row.failed[0] and row.failure_time[0] == lost.time
+    assert row.failed[0] or not any(offset)
+
+
 def test_pythagoras():
     """reference.md, fact 6: of every torque c a true-pose filter R saves (R / k_t^2) int ||c_null||^2 dt."""
     study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])

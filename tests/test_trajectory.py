@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from samples import MACHINES, TESTBED
 
 import rapkm_lite as rk
@@ -198,6 +198,23 @@ def test_accelerations_that_are_held_between_samples_are_taken():
         v = np.vstack([[0.0, 0.0], np.cumsum(a[:-1] * dt, axis=0)])
         x = np.vstack([[0.0, 0.0], np.cumsum(v[:-1] * dt + a[:-1] * dt * dt / 2, axis=0)])
         rk.follow(TESTBED, np.arange(len(a)) * dt, x, v, a)
+
+
+def test_rounded_times_are_the_multiples_of_their_step():
+    """As a log has them; laws in Python and in the engine are told the same time, and a path made of them is equal."""
+    robot, zeros = rk.load(), np.zeros((101, 2))
+    path = rk.follow(robot, np.round(np.arange(101) * 1e-3, 6), zeros, zeros, zeros)
+    assert_array_equal(path.t, np.arange(101) * path.dt)
+    assert_array_equal(rk.follow(robot, path.t, zeros, zeros, zeros).t, path.t)
+
+    def late(t, q_a, qd_a, d):
+        c = -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
+        if t > 0.009:
+            c[0] += 0.05
+        return c
+
+    runs = [rk.simulate(robot, law, path).c for law in (late, rk.compiled(late))]
+    assert_allclose(*runs, atol=1e-12)
 
 
 def test_times_that_are_not_equidistant_say_where():

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import compiled
 
 COMPILED = compiled()
@@ -62,7 +64,7 @@ power: Callable[..., Any] = intrinsic(_power_by_bits) if COMPILED else _power
 def kernel(function) -> Callable[..., Any]:
     """Compile a function that Python calls: cached on disk, and running without the interpreter lock."""
     if not COMPILED:
-        return function
+        return np.errstate(all="ignore")(function)  # the judgement of a run finds what is not finite, as in the kernel
     # Numba's cache looks at the file of the kernel only, but its parts live in all files of this folder.
     function.__qualname__ += "_" + _sources()
     try:

@@ -223,11 +223,6 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
         find_pose(lanes, drives, arms, posed, modelled, history, study, law, table, o, w, k)
-        if study is not None:
-            # A user's law is asked once more, as in a single run.
-            if user is None:
-                if k + 1 == clock.samples:
-                    return
 
         # Command: the law, the filter around it, and what is left of both in broken drives.
         command(lanes, drives, arms, modelled, user, law, table, o, w, k * dt, dt, buffer)
@@ -239,7 +234,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         if history is not None:
             record(arms, history, w, k)
         if k + 1 == clock.samples:
-            last_torque(drives, arms, w, k)
+            last_torque(lanes, drives, arms, w, k)
             return
         if study is not None:
             add_up(lanes, drives, arms, w)
@@ -260,12 +255,13 @@ def over(lanes, arms, extra, history, w, k):
 
 
 @outlined
-def last_torque(drives, arms, w, k):
-    """Mark a single run whose last torques, which nothing follows, are not finite."""
-    W = len(arms)
-    size = 0.0
-    for i in range(len(drives)):
-        size += abs(w[C * W + i])
-    running = w[of(STATUS, 0, W, 1)] == DONE
-    w[of(SAMPLE, 0, W, 1)] = k if running else w[of(SAMPLE, 0, W, 1)]
-    w[of(STATUS, 0, W, 1)] = SINGULAR if running and not size < 1e300 else w[of(STATUS, 0, W, 1)]
+def last_torque(lanes, drives, arms, w, k):
+    """Mark runs whose last torques, which nothing follows, are not finite."""
+    L, W = len(lanes), len(arms)
+    for j in range(L):
+        size = 0.0
+        for i in range(len(drives)):
+            size += abs(w[at(C, i, j, W, L)])
+        running = w[of(STATUS, j, W, L)] == DONE
+        w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
+        w[of(STATUS, j, W, L)] = SINGULAR if running and not size < 1e300 else w[of(STATUS, j, W, L)]

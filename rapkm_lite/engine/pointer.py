@@ -34,6 +34,7 @@ def pointer(function, N: int, matrices: bool, memory: int):
     Raises ValueError with a sentence on what is not allowed when it does not compile.
     """
     from numba import cfunc, njit, types
+    from numba.core import errors
 
     # What the user writes stays inside its arrays.
     law: Any = njit(error_model="numpy", boundscheck=True)(function) if isfunction(function) else function
@@ -114,7 +115,10 @@ def pointer(function, N: int, matrices: bool, memory: int):
             pass
 
     try:
-        return cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
+        made = cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
+        if any("bool" in str(signature.return_type) for signature in law.nopython_signatures):
+            raise errors.TypingError("a truth value is no torque, though C would take it for one")
+        return made
     except Exception as error:
         found = [signature.return_type for signature in getattr(law, "nopython_signatures", ())]
         words = refusal(function, error, found[0] if found else None)

@@ -65,6 +65,8 @@ def _returned(answer) -> str:
         return "it returns nothing: is a return missing?"
     if "generator" in kind:
         return "it yields: a return is needed"
+    if "bool" in kind:
+        return "it returns truth values"
     size = re.match(r"array\((\w+), (\d)d", kind)
     if size and "complex" in kind:
         return "it returns complex numbers"

@@ -164,7 +164,7 @@ def gauge(robot: Manipulator) -> np.ndarray:
 
 
 def cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, step: float, noise: float | None):
-    """What to mind: a residual above the noise (rad) or else the steps of the readings, places x (k, 2) close together."""
+    """What to mind: a residual above the noise, or else above the steps of the readings (rad), places (k, 2) close."""
     said, wrong = [], "is wrong, such as a length or a base point"
     if noise is None and step and spread > 3 * step:
         said.append(

@@ -12,7 +12,6 @@ from ..machine.manipulator import Manipulator
 from .at import at
 from .encoders import closure, poses
 
-
 # Records of the later half of a rest, over which its means are taken.
 SHORTEST = 10
 
@@ -97,8 +96,8 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
     """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
     if stand is None:
         raise ValueError(
-            f"use = 'torques', and no log holds still for {2 * SHORTEST} records with torques; allowed: a Log, a path of "
-            "one, or a list of these, with such rests"
+            f"use = 'torques', and no log holds still for {2 * SHORTEST} records with torques; allowed: a Log, a path "
+            "of one, or a list of these, with such rests"
         )
     if K_P is None:
         if gain is None:

@@ -35,7 +35,7 @@ def sample_times(duration: float, dt: float) -> np.ndarray:
 
 
 def equidistant(t) -> np.ndarray:
-    """Times (k,) in s, after a check that they rise equidistantly from zero."""
+    """Times (k,) in s, the multiples of their mean step, after a check that they rise equidistantly from zero."""
     t = real_array("t", t)
     if t.ndim != 1 or len(t) < 2:
         raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
@@ -49,7 +49,7 @@ def equidistant(t) -> np.ndarray:
             f"t[{k + 1}] - t[{k}] = {t[k + 1] - t[k]:.9g} s, on average {step:.9g} s; allowed: equidistant times, to "
             "1e-6 of a step (rounded ones: np.arange(k) * dt)"
         )
-    return t
+    return np.arange(len(t)) * step
 
 
 def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:

@@ -30,7 +30,7 @@ from .setup import Setup
 REASONS = {
     LEFT_WORKSPACE: "the machine left the workspace",
     NO_POSE: "the measured base angles fit no pose of the controller's model",
-    SINGULAR: "the independent coordinates of the law became singular: its torques are not finite",
+    SINGULAR: "the torques of the law are not finite, as where its coordinates become singular or its model ends",
     TOO_STIFF: "friction is too stiff for the sampling time",
 }
 _NONE = np.empty((0, 2))
