@@ -14,6 +14,7 @@ import pytest
 GROUPS = {
     "slow": [
         "test_answers",
+        "test_bench",
         "test_colab",
         "test_colours",
         "test_compiled_law",

@@ -27,22 +27,11 @@ def compile_c(folder: Path, lanes: int, friction: bool = False):
         "COLUMNS": tables.motion_table(still, 3).shape[1],
         **{name: getattr(tables, name) for name in ("ANGLE", "RATE", "COS", "SIN")},
     }
-    subprocess.run(
-        [
-            compiler,
-            "-O3",
-            "-march=native",
-            "-ffast-math",
-            *(f"-D{k}={v}" for k, v in known.items()),
-            "-shared",
-            "-fPIC",
-            "-o",
-            str(library),
-            str(source),
-            "-lm",
-        ],
-        check=True,
-    )
+    options = "-O3", "-march=native", "-ffast-math", "-fPIC", "-Wno-psabi", *(f"-D{k}={v}" for k, v in known.items())
+    part = library.with_suffix(".o")
+    subprocess.run([compiler, *options, "-c", "-o", str(part), str(source)], check=True)
+    # Linked without -ffast-math, which would make numbers below 1e-308 zero in the whole process.
+    subprocess.run([compiler, "-shared", "-o", str(library), str(part), "-lm"], check=True)
     function = ctypes.CDLL(str(library)).closed_loop
     function.restype = ctypes.c_long
     return function
