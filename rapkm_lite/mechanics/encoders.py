@@ -163,7 +163,9 @@ def gauge(robot: Manipulator) -> np.ndarray:
     return np.linalg.qr(np.stack([arm.ravel(), turned.ravel(), *shifts], axis=-1))[0]
 
 
-def cautions(x: np.ndarray, robot: Manipulator, condition: float, spread: float, step: float, noise: float | None):
+def cautions(
+    x: np.ndarray, robot: Manipulator, condition: float, spread: float, step: float, noise: float | None
+) -> list[str]:
     """What to mind: a residual above the noise, or else above the steps of the readings (rad), places (k, 2) close."""
     said, wrong = [], "is wrong, such as a length or a base point"
     if noise is None and step and spread > 3 * step:
