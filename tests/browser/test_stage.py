@@ -218,6 +218,8 @@ def agree(notebook):
     # Keys on the knob, while the notebook is in command mode.
     again = changed(notebook, lambda: notebook.page.keyboard.press("ArrowLeft"))
     assert {k for k in again if again[k] != places[k]} <= set(moved)
+    ends = [changed(notebook, lambda key=key: notebook.page.keyboard.press(key)) for key in ("Home", "End")]
+    assert {k for k in moved if ends[0][k] < ends[1][k]}
     notebook.check()
 
 
