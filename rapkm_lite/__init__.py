@@ -14,7 +14,7 @@ from .control.sample import Controller, Sample
 from .control.stability import closed_loop_projector, effective_gain, feedback_norm, lyapunov_function
 from .machine.arguments import ConvergenceError
 from .machine.datafiles import data_path
-from .machine.logs import Log, mystery_run, read_log
+from .machine.logs import Log, mystery_run, read_log, write_log
 from .machine.manipulator import Manipulator, load
 from .mechanics.actuation import (
     actuation_type,
@@ -122,7 +122,7 @@ __all__ = [
     "projector_dot", "reachable", "read_log", "redundant_control_matrix", "redundant_dynamics", "redundant_terms",
     "required_wrench", "rest_exists", "sampling_box", "select_independent", "simulate", "singular_values",
     "steady_state_error", "steady_state_torque", "sweep", "switching_map", "table1", "tips", "to_mjcf", "triangle",
-    "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid",
+    "weighted_pseudoinverse", "working_mode", "working_modes", "workspace_grid", "write_log",
 ]  # fmt: skip
 
 

@@ -97,6 +97,25 @@ def test_numbers_of_a_log_hold_no_underscore(tmp_path, number):
         rk.read_log(file)
 
 
+@pytest.mark.parametrize("N", [2, 3, 5])
+def test_a_log_written_is_the_log_read_to_the_last_bit(tmp_path, N):
+    random = np.random.default_rng(N)
+    columns = random.normal(0.0, 1.0, (3, 40, N)) * 10.0 ** random.integers(-12, 12, (3, 40, N))
+    log = rk.Log("own", np.arange(40) / 3.0, *columns)
+    rk.write_log(log, tmp_path / "own.csv")
+    assert rk.read_log(str(tmp_path / "own.csv")) == log
+
+
+@pytest.mark.parametrize("target", ["", "no/such/folder/own.csv", ".", "a\0b", None, 3, b"own.csv"])
+def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=r"target = .*; allowed: "):
+        rk.write_log(rk.mystery_run("gain"), target)
+    with pytest.raises(ValueError, match=r"log = .*; allowed: a Log"):
+        rk.write_log([1.0], "own.csv")
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_key_of_every_table_is_tried():
     assert {t: set(keys) for t, keys in GOOD.items()} == {t: set(k) for t, k in UNITS_OF.items() if t != "fault"}
     assert {"kind"}.union(*FAULTS.values()) == set(UNITS_OF["fault"])

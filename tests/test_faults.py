@@ -40,6 +40,24 @@ def observed(faults, **options):
     return run, readings[:, :3], readings[:, 3:]
 
 
+def test_a_log_holds_what_the_controller_read():
+    broken = [rk.EncoderDropout(0, 0.05, 0.1), rk.OffsetJump(1, 0.12, 2e-3), rk.TorqueLimit(0.02)]
+    for faults, options in ((), {}), (broken, {"encoder": 2000, "velocity_filter": 5e-3}):
+        run, q, _ = observed(faults, **options)
+        log = run.log("mine")
+        assert_array_equal(log.q_a, q)
+        assert_array_equal(log.c, run.c)
+        assert_array_equal(log.error, q - PATH.q_a)
+        assert log.name == "mine" and np.array_equal(log.t, PATH.t)
+
+
+def test_a_log_of_a_lost_run_ends_where_it_was_lost():
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(ROBOT, rk.PD(7.05, 30.0), PATH, OFFSET)
+    part = caught.value.partial
+    assert_allclose(part.log().q_a, part.q_a + OFFSET, rtol=0, atol=1e-15)
+
+
 def commanded(q, qd):
     return -7.05 * (q - PATH.q_a) - 0.225 * (qd - PATH.qd_a)
 

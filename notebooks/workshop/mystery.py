@@ -14,16 +14,15 @@ import numpy as np
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import K_D, hidden, random_numbers
+from rapkm_lite.machine.logs import columns
 
 LOGS = Path(__file__).resolve().parents[2] / "data" / "mystery_runs"
 SIDES = {"offset_a": 0.24, "offset_b": 0.06, "offset_c": 0.0, "gain": 0.24}
 SETTLING = 1.5
-COLUMNS = ["t in s"] + [f"q{i} measured in rad" for i in (1, 2, 3)] + [f"q{i} desired in rad" for i in (1, 2, 3)]
-COLUMNS += [f"c{i} in N m" for i in (1, 2, 3)]
 
 
 def record(name: str) -> np.ndarray:
-    """The table (records, 10) of one log, columns as in `COLUMNS`."""
+    """The table (records, 10) of one log, columns as in `rk.read_log`."""
     robot = rk.load()
     if SIDES[name]:
         # A corner named twice is an edge of no length: 1.5 s of rest in each corner, 1.5 s on each edge.
@@ -47,7 +46,7 @@ def write(folder: Path = LOGS) -> None:
             folder / f"{name}.csv",
             record(name),
             delimiter=",",
-            header=",".join(COLUMNS),
+            header=",".join(columns(3)),
             comments="",
             fmt=["%.2f"] + 6 * ["%.5f"] + 3 * ["%.4f"],
         )

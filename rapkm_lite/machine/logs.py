@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .arguments import one_of, real_array, short
+from .arguments import of_kind, one_of, real_array, short
 from .datafiles import data_path
 from .values import Array, Value
 
@@ -98,6 +98,29 @@ def read_log(source: str | Path) -> Log:
         raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
     _without_gaps(path, t[:, 0])
     return Log(path.stem, t[:, 0], q_a, q_a_desired, c)
+
+
+def write_log(log: Log, target: str | Path) -> None:
+    """Write a log as the CSV file that `read_log` reads: header, then a line for each record, all digits.
+
+    Raises ValueError for what is no log, and for a path that cannot be written.
+
+    >>> import rapkm_lite as rk, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     rk.write_log(rk.mystery_run("gain"), f"{folder}/mine.csv")
+    ...     rk.read_log(f"{folder}/mine.csv")
+    Log('mine', 901 records, 9 s, 3 drives)
+    """
+    of_kind("log", log, Log, "a Log, such as run.log() returns")
+    of_kind("target", target, str | Path, "the path of a CSV file")
+    try:
+        with Path(target).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns(log.c.shape[1]))
+            writer.writerows(np.column_stack([log.t, log.q_a, log.q_a_desired, log.c]).tolist())
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ValueError(f"target = {short(str(target))} cannot be written ({reason}); allowed: a CSV file") from None
 
 
 def _without_gaps(path: Path, t: np.ndarray) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
 from ..machine.arguments import matvec, real_array, short
+from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default, frozen
 from ..mechanics.kinematics import ee_complement, inverse_kinematics
@@ -20,10 +21,10 @@ from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
 from .energy import electric_energy
 from .explain import explain
-from .faults import Fault, FaultsLike, check_faults
+from .faults import Fault, FaultsLike, check_faults, fault_table
 from .loop import again_in_python, closed_loop, own_copy
 from .patience import patience
-from .sensors import Sensors
+from .sensors import Encoders, Sensors
 from .setup import Outcome, Setup, friction_steps, prepare
 
 MANY_STEPS = 50
@@ -148,6 +149,21 @@ class Run(Value):
     def switches(self) -> int:
         """How often the pair of independent joints was changed."""
         return int(np.count_nonzero(np.any(np.diff(self.pairs, axis=0) != 0, axis=-1)))
+
+    def log(self, name: str = "run") -> Log:
+        """What a laboratory would have of this run: measured and desired base angles (k, N) in rad, and torques in N m.
+
+        The angles are those that the controller read, with offsets, counts and faults; the torques those that acted.
+
+        >>> import rapkm_lite as rk
+        >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), offset=[4e-3, 0.0, 0.0])
+        >>> np.allclose(rk.calibrate(rk.load(), run.log()).offset, run.offset)
+        True
+        """
+        N, t = self.robot.n_arms, self.trajectory.t
+        encoders = Encoders(self.sensors.of_drives(N), fault_table(self.faults, t, N), self.dt)
+        read = [encoders.read(k, q_a, qd_a)[0] for k, (q_a, qd_a) in enumerate(zip(self.q_a, self.qd_a, strict=True))]
+        return Log(name, self.t, np.reshape(read, self.q_a.shape), self.trajectory.q_a[: len(self)], self.c)
 
     def __len__(self) -> int:
         return len(self.t)
