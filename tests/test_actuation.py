@@ -622,3 +622,9 @@ def test_a_matrix_for_each_pose():
         rk.inverse_dynamics(TESTBED, q, qd, qdd, W=K[:3])
     with pytest.raises(ValueError, match=r"motion \(4,\), W \(3,\); allowed: equal ones"):
         rk.inverse_dynamics(TESTBED, q[0], qd[0], qdd, W=K[:3])
+
+
+@pytest.mark.parametrize("third", [[0.0, 1.0], [1.0, 2.0]])
+def test_two_opposite_drives_leave_the_third_without_a_load(third):
+    """A^T n = (n_1 - n_2 [+ n_3], k n_3) = 0 asks for n_3 = 0."""
+    assert not rk.common_sign([[1.0, 0.0], [-1.0, 0.0], third])

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import fsolve
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.explain import _difference
 from rapkm_lite.simulation.growth import growth, magnified
 from rapkm_lite.simulation.setup import prepare
 
@@ -369,3 +370,10 @@ def test_what_is_seen_of_sensors_is_named_from_a_bound_on(options, words, named)
     """Ten samples of delay, a tenth of a radian: a law of a user, lost for its sign, is not run again."""
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, **({"offset": OFFSET} | options))
     assert (words in said) == named
+
+
+@pytest.mark.parametrize("name", ["lengths", "masses", "friction"])
+def test_a_model_that_is_too_small_is_named_like_one_that_is_too_large(name):
+    own = getattr(rk.load(), name)
+    for factor in (0.95, 1.05):
+        assert f"{name} that are off by 5 %" in _difference(rk.load().replace(**{name: factor * own}), rk.load())

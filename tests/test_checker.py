@@ -207,3 +207,8 @@ def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):
     draw_own(name, lambda f: ([0], f(A, c)), plt.subplots()[1])
     assert "cannot be drawn here (ZeroDivisionError)" in capsys.readouterr().out
     plt.close("all")
+
+
+def test_two_cases_are_enough_to_see_that_an_answer_is_constant():
+    two = Exercise(lambda v: 2.0 * v, ("a", "b", "c"), "N m", lambda rng: [(v,) for v in rng.normal(size=(2, 3))])
+    assert "same for every case" in judged(two, lambda v: np.ones(3)).sentence

@@ -533,3 +533,13 @@ def test_a_filter_has_its_own_pose_and_weights_and_so_has_the_law_inside(law, op
         for kind in (rk.AntagonismFilter, Slowly)
     )
     assert_allclose(fast.c, slow.c, rtol=0, atol=1e-9 * np.abs(slow.c).max())
+
+
+def test_one_measurement_or_many_and_one_desired_state_or_many():
+    law, path = rk.PD([7.0, 5.0, 3.0], 0.2), rk.circle(TESTBED, 0.05, 1.0, dt=0.1)
+    d, rng = path[0], np.random.default_rng(1)
+    q_a, qd_a = rng.normal(size=(2, 5, 3))
+    rows = [law.torque(TESTBED, d.q, d.qd, a, b, d) for a, b in zip(q_a, qd_a, strict=True)]
+    assert_allclose(law.torque(TESTBED, d.q, d.qd, q_a, qd_a, d), rows, rtol=1e-14)
+    rows = [law.torque(TESTBED, d.q, d.qd, q_a[0], qd_a[0], one) for one in path]
+    assert_allclose(law.torque(TESTBED, d.q, d.qd, q_a[0], qd_a[0], path[:]), rows, rtol=1e-14)

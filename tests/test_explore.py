@@ -665,3 +665,14 @@ def test_drawing_leaves_the_readers_style_alone():
 @pytest.mark.parametrize("name", NAMES)
 def test_explorers_take_a_machine_and_nothing_else(name):
     assert list(inspect.signature(getattr(explore, name)).parameters) == ["robot"]
+
+
+def test_labels_that_stay_stand_in_their_panels():
+    found = 0
+    for name in NAMES:
+        picture = getattr(explore, name)().picture
+        for label in (mark for mark in picture.fixed if mark.kind == "label"):
+            low, high = picture.xlim(label.panel)
+            assert np.all((low <= label.data[:, 0]) & (label.data[:, 0] <= high)), (name, label.words)
+            found += 1
+    assert found

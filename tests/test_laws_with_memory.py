@@ -507,3 +507,11 @@ def test_what_a_class_sets_is_copied_in_slots_and_in_circles():
     twin = copy.deepcopy(law)
     assert law == Looped(1e-3) == twin != Looped(2e-3) and twin.kicked.__self__ is twin
     assert "kick=0.001" in repr(law) and pickle.loads(pickle.dumps(Louder(still))) == Louder(still)
+
+
+def test_a_controller_without_dt_samples_at_a_millisecond():
+    """A constant error e adds -K_I e dt per sample."""
+    hold, e = rk.hold(ROBOT, [0.0, 0.0]), 0.01
+    controller = rk.Controller(rk.PID(K_P=1.0, K_I=8.0, K_D=0.1), ROBOT)
+    first, second = (controller(t, hold.q_a[0] + e, hold.qd_a[0], hold[0]) for t in (0.0, 1e-3))
+    assert_allclose(second - first, -8.0 * e * 1e-3, rtol=1e-6)

@@ -497,3 +497,44 @@ def test_sums_of_a_failed_run_are_zeros():
     assert status[0] == compiled.DONE != status[1] and time[0] == 0.0 < time[1]
     for column in sums:
         assert np.all(column[0] != 0.0) and np.all(column[1] == 0.0)
+
+
+@pytest.mark.parametrize("law", [rk.APD(7.0, 0.2, (0, 1)), rk.CTC(400.0, 40.0, (0, 1))])
+@pytest.mark.parametrize("aside", [0.0, 1e-14])
+def test_singular_coordinates_are_refused_like_those_of_the_textbook(law, aside):
+    """|d_1 x d_2| = 0 at the desired pose."""
+    robot = rk.load()
+    still = rk.hold(robot, [-0.00785686747112148 + aside, -0.12], 0.02)
+    with pytest.raises(ValueError, match="independent = \\(0, 1\\) is singular"):
+        law.torque(robot, still.q[0], still.qd[0], still.q_a[0], still.qd_a[0], still[0])
+    with pytest.raises(rk.SimulationError, match="near a parameterization singularity") as caught:
+        rk.simulate(robot, law, still)
+    assert caught.value.time == 0.0
+
+
+ENDS = """
+import numpy as np
+import rapkm_lite as rk
+LAW = rk.CTC(400, 40, (0, 1))
+class Textbook(rk.Law):
+    def step(self, memory, sample):
+        return LAW.step(memory, sample)
+robot, given = rk.load("five_bar"), {"encoder": 6, "velocity_filter": 0.0}
+path = rk.circle(robot, 0.02, 0.2, centre=(0.0, 0.12))
+for law in (LAW, Textbook()):
+    try:
+        rk.simulate(robot, law, path, **given)
+    except rk.SimulationError as error:
+        print(error.time, len(error.partial), np.abs(error.partial.c).max() < 1e5)
+print(*rk.sweep(robot, LAW, path, np.zeros((2, 2)), failed="mask", **given).failure_time)
+"""
+
+
+@pytest.mark.parametrize("numba", ["0", "1"])
+def test_a_run_ends_at_the_sample_at_which_its_textbook_law_does(numba):
+    """Angles that no pose of a two-arm machine has: the least-squares pose is singular."""
+    environment = {**os.environ, "RAPKM_LITE_NUMBA": numba}
+    done = subprocess.run([sys.executable, "-c", ENDS], env=environment, capture_output=True, text=True, check=True)
+    own, textbook, study = (line.split() for line in done.stdout.splitlines())
+    assert own == textbook == ["0.03", "30", "True"]
+    assert study == ["0.03", "0.03"]

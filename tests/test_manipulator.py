@@ -217,3 +217,14 @@ def test_the_package_lists_what_people_call_and_no_modules():
     assert set(dir(rk)) == {*rk.__all__, "__version__"}
     things = [name for name, thing in vars(rk).items() if not isinstance(thing, ModuleType) and name[0] != "_"]
     assert sorted(things) == sorted(rk.__all__)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5, np.pi / 2, 2.5])
+def test_arms_meet_where_their_circles_cross_in_any_frame(turn):
+    """Base points 0.2 m from the origin: there, and with a smaller reach nowhere, a reach of 0.2 m meets."""
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    angle = 2 * np.pi * np.arange(3) / 3
+    for base in (BASE, 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)):
+        assert rk.reachable(rk.Manipulator(base=base @ R.T, lengths=0.1025, masses=1.0), [0.0, 0.0])
+        with pytest.raises(ValueError, match="arms that can meet"):
+            rk.Manipulator(base=base @ R.T, lengths=0.0975, masses=1.0)

@@ -180,3 +180,10 @@ def test_numbers_of_poses_that_do_not_fit_are_named():
 def test_a_machine_without_moments_of_inertia_is_refused_for_mujoco():
     with pytest.raises(ValueError, match=r"inertias of arm 1 are 0 and .*; allowed: 1e-14"):
         rk.to_mjcf(rk.load().replace(inertias=0.0, load=0.0))
+
+
+def test_stiffness_of_a_path_is_that_of_its_poses():
+    path = rk.circle(FRICTIONLESS, 0.05, 1.0, dt=0.1)
+    c = np.random.default_rng(2).normal(size=(len(path), 3))
+    rows = [rk.endeffector_stiffness(FRICTIONLESS, *pose, 7.05, c_k) for *pose, c_k in zip(path.q, c, strict=True)]
+    assert_allclose(rk.endeffector_stiffness(FRICTIONLESS, path.q, 7.05, c), rows, rtol=1e-12, atol=1e-9)

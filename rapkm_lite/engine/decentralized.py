@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .jit import leaf, outlined
-from .leaves import solve2
+from .leaves import solve_regular
 from .rows import *
 
 
@@ -57,7 +57,7 @@ def force_filter(lanes, drives, arms, w):
             )
             m11, m12, m22 = m11 + ease * a1 * a1, m12 + ease * a1 * a2, m22 + ease * a2 * a2
             fx, fy = fx + a1 * c, fy + a2 * c
-        gx, gy = solve2(m11, m12, m22, fx, fy)
+        gx, gy = solve_regular(m11, m12, m22, fx, fy)
         for i in range(N):
             w[at(C, i, j, W, L)] = w[at(EASE, i, j, W, L)] * (w[at(A1, i, j, W, L)] * gx + w[at(A2, i, j, W, L)] * gy)
 
@@ -79,8 +79,8 @@ def command_filter(lanes, drives, arms, w):
             m11, m12, m22, fx, fy = m11 + pp * a1 * a1, m12 + pp * a1 * a2, m22 + pp * a2 * a2, fx + a1 * e, fy + a2 * e
             n11, n12, n22 = n11 + dd * a1 * a1, n12 + dd * a1 * a2, n22 + dd * a2 * a2
             hx, hy = hx + a1 * ed, hy + a2 * ed
-        gx, gy = solve2(m11, m12, m22, fx, fy)
-        rx, ry = solve2(n11, n12, n22, hx, hy)
+        gx, gy = solve_regular(m11, m12, m22, fx, fy)
+        rx, ry = solve_regular(n11, n12, n22, hx, hy)
         for i in range(N):
             p, d = w[at(GAIN_P, i, j, W, L)], w[at(GAIN_D, i, j, W, L)]
             w[at(C, i, j, W, L)] = -(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .jit import leaf, outlined
-from .leaves import accelerations, inertia, small_angle, solve2, tanh, weight
+from .leaves import accelerations, inertia, small_angle, solve2, solve_regular, tanh, weight
 from .minimal import best_pair, minimal_feedback, reference
 from .pose import kept
 from .rows import *
@@ -228,7 +228,7 @@ def distribute(lanes, drives, arms, w):
             a1, a2, ease = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)], w[at(EASE, i, j, W, L)]
             n11, n12, n22 = n11 + ease * a1 * a1, n12 + ease * a1 * a2, n22 + ease * a2 * a2
         wx, wy = w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)]
-        gx, gy = solve2(n11, n12, n22, fx + m11 * wx + m12 * wy, fy + m12 * wx + m22 * wy)
+        gx, gy = solve_regular(n11, n12, n22, fx + m11 * wx + m12 * wy, fy + m12 * wx + m22 * wy)
         for i in range(N):
             w[at(C, i, j, W, L)] = w[at(EASE, i, j, W, L)] * (w[at(A1, i, j, W, L)] * gx + w[at(A2, i, j, W, L)] * gy)
 

@@ -26,6 +26,14 @@ def solve2(m11, m12, m22, fx, fy):
 
 
 @leaf
+def solve_regular(m11, m12, m22, fx, fy):
+    """The same with A^T A; not a number at an input singularity, where nothing but rounding would be left."""
+    det, trace = m11 * m22 - m12 * m12, m11 + m22
+    scale = 1.0 / (det if det > 1e-15 * (trace * trace) else math.nan)
+    return (m22 * fx - m12 * fy) * scale, (m11 * fy - m12 * fx) * scale
+
+
+@leaf
 def small_angle(s):
     """arcsin(s) for |s| < 0.1 by its series: the next term is below 2e-18 of the first."""
     z = s * s

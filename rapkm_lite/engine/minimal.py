@@ -3,6 +3,8 @@ the feedback of (19)-(20)."""
 
 from __future__ import annotations
 
+import math
+
 from .jit import index, leaf, outlined
 from .leaves import solve2
 from .rows import *
@@ -115,7 +117,9 @@ def minimal_feedback(lanes, drives, arms, law, table, o, w):
         s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
         force = law.form == APD
         v1, v2 = v1 if force else v1 - s1, v2 if force else v2 - s2
-        det = a11 * a22 - a12 * a21
+        det, size = a11 * a22 - a12 * a21, (a11 * a11 + a12 * a12) * (a21 * a21 + a22 * a22)
+        # At a parameterization singularity nothing but rounding is left.
+        det = det if det * det > 1e-24 * size else math.nan
         w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = (a22 * v1 - a12 * v2) / det, (a11 * v2 - a21 * v1) / det
         w[of(PUSH_X, j, W, L)] = -(a11 * s1 + a21 * s2) if force else 0.0
         w[of(PUSH_Y, j, W, L)] = -(a12 * s1 + a22 * s2) if force else 0.0

@@ -6,7 +6,7 @@ import math
 
 from .arms import placed
 from .jit import kernel, leaf, outlined
-from .leaves import curvature, moved, pose_terms, solve2, turned
+from .leaves import curvature, moved, pose_terms, solve2, solve_regular, turned
 from .rows import *
 from .tables import *
 
@@ -255,7 +255,7 @@ def measured_rate(lanes, drives, arms, table, o, w):
             a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
             rate = w[at(ED, i, j, W, L)] + want(table, o, RATE, i, W)
             m11, m12, m22, fx, fy = m11 + a1 * a1, m12 + a1 * a2, m22 + a2 * a2, fx + a1 * rate, fy + a2 * rate
-        w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve2(m11, m12, m22, fx, fy)
+        w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = solve_regular(m11, m12, m22, fx, fy)
 
 
 @leaf

@@ -126,15 +126,17 @@ def over_lever_dot(tree: Tree, v, lever, over, rates, qd) -> np.ndarray:
     return (linear(v, tree.turn) * rates - over * lever_dot) / lever
 
 
-def joint_complement(J: np.ndarray, independent) -> np.ndarray:
+def joint_complement(J: np.ndarray, independent, of_pose: bool = True) -> np.ndarray:
     """F of (5) for delta = n - r joints as q2: the identity in their rows, -J1^-1 J2 in the others, (..., n, delta)."""
     dependent, delta = _others(J.shape[-1], independent), len(independent)
     J1 = J[..., dependent]
-    measure = np.linalg.svd(J1, compute_uv=False)[..., -1] / np.linalg.svd(J, compute_uv=False)[..., 0]
-    if not np.all(measure >= 1e-12):  # also where J is zero
+    largest = np.linalg.svd(J, compute_uv=False)[..., 0]
+    measure = np.linalg.svd(J1, compute_uv=False)[..., -1] / np.where(largest > 0.0, largest, 1.0)
+    if not np.all(measure >= 1e-12):
+        other = "other joints, or None for the end-effector position" if of_pose else "other joints"
         raise ValueError(
             f"independent = {tuple(independent)} is singular here: its measure sigma_min(J1)/sigma_max(J) is "
-            f"{np.min(measure):.3g}, needed: >= 1e-12; choose other joints, or None for the end-effector position"
+            f"{np.min(measure):.3g}, needed: >= 1e-12; choose {other}"
         )
     F = np.zeros((*J.shape[:-2], J.shape[-1], delta))
     F[..., independent, np.arange(delta)] = 1.0

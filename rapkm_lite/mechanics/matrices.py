@@ -27,7 +27,7 @@ def complement(J, independent) -> np.ndarray:
            [ 0.,  1.]])
     """
     J = _jacobian(J)
-    return cores.joint_complement(J, _independent(J, independent))
+    return cores.joint_complement(J, _independent(J, independent), of_pose=False)
 
 
 def complement_dot(J, J_dot, independent) -> np.ndarray:
@@ -42,7 +42,7 @@ def complement_dot(J, J_dot, independent) -> np.ndarray:
     """
     J, J_dot = _jacobians(J, J_dot)
     independent = _independent(J, independent)
-    return cores.joint_complement_dot(J, J_dot, cores.joint_complement(J, independent), independent)
+    return cores.joint_complement_dot(J, J_dot, cores.joint_complement(J, independent, of_pose=False), independent)
 
 
 def projector(J) -> np.ndarray:

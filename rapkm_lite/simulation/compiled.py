@@ -192,9 +192,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             clock = tables.Clock(first, samples, trajectory.dt)
             try:
                 loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, log, buffer)
-            except (ArithmeticError, ValueError):
-                # Without a compiler a division by zero or an infinite angle ends the run here.
-                w[(rows.BLOCKS * W + rows.STATUS) * L] = SINGULAR
+            except (ArithmeticError, ValueError) as error:  # only without a compiler, where runs are alone
+                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = tables.stopped(error)
             finally:
                 if history is not None and log is not None and log is not history:
                     for column, values in zip(history[:-1], log, strict=False):

@@ -104,6 +104,7 @@ def progress(items) -> Iterator:
     """
     try:
         total = len(items)
+        iter(items)
     except TypeError:
         raise ValueError(f"items = {short(items)}; allowed: a list, tuple, array, dict or range") from None
     return _counted(items, total)
