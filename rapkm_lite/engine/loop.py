@@ -8,6 +8,7 @@ company it runs.
 from __future__ import annotations
 
 import math
+import traceback
 
 from . import plant, single
 from .decentralized import command_filter, force_filter, integral, proportional
@@ -265,3 +266,15 @@ def last_torque(lanes, drives, arms, w, k):
         running = w[of(STATUS, j, W, L)] == DONE
         w[of(SAMPLE, j, W, L)] = k if running else w[of(SAMPLE, j, W, L)]
         w[of(STATUS, j, W, L)] = SINGULAR if running and not size < 1e300 else w[of(STATUS, j, W, L)]
+
+
+def stopped(error):
+    """How and when a run without a compiler ended by a division by zero or at an infinite angle: status and sample.
+
+    In the hold of finite torques it is the machine that fails, before it the law.
+    """
+    frames = {frame.f_code.co_name: frame.f_locals for frame, _ in traceback.walk_tb(error.__traceback__)}
+    loop = frames["closed_loops"]
+    W, k = len(loop["kind"].arms), loop.get("k", loop["clock"].first)
+    finite = all(abs(c) < 1e300 for c in loop["w"][C * W : C * W + W])
+    return (LEFT_WORKSPACE if "hold" in frames and finite else SINGULAR), k

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import functools
-import traceback
 from collections import namedtuple
 
 import numpy as np
 
 from . import compiled
-from .rows import C
 
 # What a run ended with; laws; filters; pose sources: base angles that move smoothly, or by counts, or the truth.
 DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF = range(5)
@@ -111,19 +109,6 @@ def aligned(numbers: np.ndarray) -> np.ndarray:
 def plain(array: np.ndarray):
     """The array for compiled code; nested lists of Python numbers without a compiler, which are faster then."""
     return array if compiled() else array.tolist()
-
-
-def stopped(error: Exception) -> tuple[int, int]:
-    """How and at which sample a run without a compiler ended, by a division by zero or at an infinite angle: where it
-    was in the loop tells.
-
-    What fails in the hold of finite torques is the machine, and what fails before it the law.
-    """
-    frames = {frame.f_code.co_name: frame.f_locals for frame, _ in traceback.walk_tb(error.__traceback__)}
-    loop = frames["closed_loops"]
-    W, k = len(loop["kind"].arms), loop.get("k", loop["clock"].first)
-    finite = all(abs(c) < 1e300 for c in loop["w"][C * W : C * W + W])
-    return (LEFT_WORKSPACE if "hold" in frames and finite else SINGULAR), k
 
 
 def sensor(sensors, dt: float) -> Sensor:

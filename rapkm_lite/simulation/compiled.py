@@ -193,7 +193,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             try:
                 loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, log, buffer)
             except (ArithmeticError, ValueError) as error:  # only without a compiler, where runs are alone
-                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = tables.stopped(error)
+                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = loop.stopped(error)
             finally:
                 if history is not None and log is not None and log is not history:
                     for column, values in zip(history[:-1], log, strict=False):
