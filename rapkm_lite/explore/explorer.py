@@ -218,11 +218,14 @@ class Explorer:
         self._send(note=said)
 
     def _step(self) -> None:
-        """Update for the browser, where a mistake in the draw function would be seen by nobody."""
+        """Update for the browser, where nobody sees a mistake of the draw function, nor that a slow one is at work."""
+        if self._slow:
+            self.widget.add_class("rapkm-busy")
         try:
             self.update()
         except Exception as error:
             self.problem, self.numbers = f"The picture cannot be drawn: {type(error).__name__}: {error}", {}
+        self.widget.remove_class("rapkm-busy")
 
     def _message(self, content: dict) -> None:
         """A page asks: "hello" from a new view, "grab" with values or steps for controls from a hand on a handle."""

@@ -282,6 +282,10 @@ def test_slow_answer_is_announced_and_awaited(shown):
     said = "() => stage.root().querySelector('.rapkm-note').textContent"
     notebook.wait(f"() => ({said})().startsWith('No answer yet')", 15)
     notebook.wait(f"() => stage.places().slope === 4 && ({said})() === ''", 15)
+    # The next one is expected to be slow, too.
+    notebook.page.keyboard.press("ArrowDown")
+    notebook.wait("() => stage.box().classList.contains('rapkm-busy')", 5)
+    notebook.wait("() => stage.places().slope < 4 && !stage.box().classList.contains('rapkm-busy')", 15)
     assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
 
 
