@@ -178,7 +178,7 @@ class Panel {
     const font = 0.92 * this.size(10.5);
     const plan = layout(this.spec, palette, frame, [wide, high], font, (words) => this.pieces(words, font));
     const { box, bar: [x, y, w, h], aside } = Object.assign(this, plan);
-    this.ylabel.style.translate = `${aside[0]}px ${aside[1]}px`;
+    [this.ylabel, this.head].forEach((e, k) => (e.style.translate = `${k ? 0 : aside[0]}px ${aside[1] * (k + 1)}px`));
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     ctx.clearRect(0, 0, wide, high);
     for (const [style, points] of plan.strokes) stroke(this, points, style);
