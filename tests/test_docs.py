@@ -107,6 +107,36 @@ def test_reference_pages_print_characters_of_markup_as_they_are_and_stress_a_wor
     assert escaped(written) == wanted
 
 
+def test_arguments_in_the_reference_are_items_with_all_of_their_words():
+    from pages.hooks import readable
+
+    docstring = """What it does.
+
+    use : "angles", or "torques" of which
+    each says where it stood: c / K_P : see there.
+    a, b : (k,) m.  c : N m,
+        at rest. d : default none.
+    Returns 1 : 1.
+
+    >>> f(a : b)
+    1
+    """
+    lines = readable([line.removeprefix("    ") for line in docstring.splitlines()])
+    assert [line for line in lines if line.strip()] == [
+        "What it does.",
+        '* **use**: "angles", or "torques" of which each says where it stood: c / K_P : see there.',
+        "* **a, b**: (k,) m.",
+        "* **c**: N m, at rest.",
+        "* **d**: default none.",
+        "Returns 1 : 1.",
+        "::",
+        "    >>> f(a : b)",
+        "    1",
+    ]
+    # A list ends before what is not one of its items.
+    assert lines[lines.index("Returns 1 : 1.") - 1] == ""
+
+
 @pytest.mark.parametrize("depth", ["", "../"])
 def test_links_to_the_index_stand_in_the_order_of_the_equations(depth):
     from pages.lessons import lesson_page
