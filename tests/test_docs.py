@@ -152,10 +152,24 @@ def test_errata_and_index_on_the_site_have_a_block_for_every_row():
     from pages.lessons import errata_page, index_page
 
     for name, page, row, mark in [
-        ("errata.md", errata_page, r"^\| (?:<a id|\d)", "**Section "),
+        ("errata.md", errata_page, r"^\| (?:<a id|\d)", "\n## Section "),
         ("equations.md", lambda text: index_page(text, {}), r"^\| <a id=\"(?:eq|table)-", ":::{container} formula"),
     ]:
         text = (ROOT / "notebooks" / name).read_text(encoding="utf-8")
         made = page(text)
         assert made.count(mark) == len(re.findall(row, text, re.M)) > 30
-        assert set(re.findall(r'id="[\w-]+"', text)) == set(re.findall(r'id="[\w-]+"', made))
+        targets = re.findall(r"^\(([\w-]+)\)=$", made, re.M)
+        assert set(re.findall(r'id="([\w-]+)"', text)) == {*targets, *re.findall(r'id="([\w-]+)"', made)}
+        assert not re.search(r"\| \d\d_\w+ \|", made), "a lesson without a link"
+
+
+def test_links_on_the_site_have_words_where_the_repository_has_names_of_files():
+    from pages.lessons import linked
+
+    assert linked("in [errata.md](errata.md), [a.md](b.md)") == "in [the errata](errata.md), [a.md](b.md)"
+    assert (
+        linked("[notebooks/equations.md](../notebooks/equations.md)") == "[the equation index](../lessons/equations.md)"
+    )
+    for path in (ROOT / "docs").rglob("[!_]*.md"):
+        named = re.search(r"\[\w+\.(md|ipynb)\]\(", text(path))
+        assert not named, f"{path.name}: {named[0]}"
