@@ -45,7 +45,7 @@ def index_page(text: str, functions: dict[str, str]) -> str:
             continue
         else:
             # The lesson of a figure or a section.
-            lines.append(re.sub(r"\| (\d\d_\w+) \|$", r"| [\1](\1.ipynb) |", line))
+            lines.append(re.sub(r"\| ((\d\d)_\w+) \|$", r"| [lesson \2](\1.ipynb) |", line))
     return "\n".join(lines) + "\n"
 
 
