@@ -36,7 +36,7 @@ away, and control the robot where minimal coordinates fail.
 
 run
 {lessons}
-lessons/dashboard
+Dashboard <lessons/dashboard>
 lessons/solutions/index
 ```
 

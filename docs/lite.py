@@ -1,8 +1,8 @@
 """Put the lessons into the browser: python docs/lite.py --pyodide FOLDER, after docs/build.py.
 
-FOLDER is an unpacked distribution of Pyodide with NumPy, SciPy and Matplotlib.  The result, docs/_site/lite, asks for
-nothing from elsewhere: our wheel and what it needs stand in the distribution's lock file, so that `import rapkm_lite`
-installs them, and the notebooks stay as they are.
+Needs docs/requirements.txt and docs/requirements-lite.txt.  FOLDER is an unpacked distribution of Pyodide with NumPy,
+SciPy and Matplotlib.  The result, docs/_site/lite, asks for nothing from elsewhere: our wheel and what it needs stand
+in the distribution's lock file, so that `import rapkm_lite` installs them, and the notebooks stay as they are.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ SITE = {
     "jupyter-lite-schema-version": 0,
     "jupyter-config-data": {"litePluginSettings": {PLUGIN: {"pyodideUrl": "./static/pyodide/pyodide.js"}}},
 }
-FIRST = "lab/index.html?path=00_start_here.ipynb"
+FIRST = "00_start_here"
+MINUTE = "the first start takes a minute"
 SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
 
 
@@ -97,12 +98,30 @@ def distribution(source: Path, target: Path) -> None:
     (target / "pyodide-lock.json").write_text(text, encoding="utf-8")
 
 
+def ways(lite: str, lesson: str, words: str) -> str:
+    """A link to a lesson that runs: JupyterLab, or on a narrow screen, where it leaves no room, the notebook alone."""
+    place = f"index.html?path={lesson}.ipynb"
+    return "".join(
+        f'<a class="{screen}" href="{lite}/{form}/{place}">{words}</a>'
+        for screen, form in (("on-wide", "lab"), ("on-narrow", "notebooks"))
+    )
+
+
 def link(lite: Path) -> None:
-    """The pages of the site around `lite` that offer the lessons lead to them."""
-    here = f"{lite.name}/{FIRST}"
-    offer = f'<p><a href="{here}">Run lesson 00 here</a>, in this browser; the first start takes a minute.</p>'
-    for name, old, new in (("index.html", 'href="run.html"', f'href="{here}"'), ("run.html", "<!-- here -->", offer)):
-        page = lite.parent / name
+    """The pages of the site around `lite` lead to the lessons that run in it."""
+    site = lite.parent
+    start = ways(lite.name, FIRST, f"Run the lessons <small>({MINUTE})</small>")
+    first = f"<p>{ways(lite.name, FIRST, 'Run lesson 00 here')}, in this browser; {MINUTE}.</p>"
+    places = {
+        site / "index.html": ('<a href="run.html">Run the lessons</a>', start),
+        site / "run.html": ("<!-- here -->", first),
+    }
+    for notebook in (lite / "files").glob("*.ipynb"):
+        what = "dashboard" if notebook.stem == "dashboard" else "lesson"
+        here = ways(f"../{lite.name}", notebook.stem, f"Run this {what} in the browser")
+        still = f"<p>{here}; {MINUTE}. On this page pictures are still, there they answer.</p>"
+        places[site / f"lessons/{notebook.stem}.html"] = "<!-- here -->", still
+    for page, (old, new) in places.items():
         if page.exists():
             page.write_text(page.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 

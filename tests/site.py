@@ -1,7 +1,8 @@
 """All pages of a built site in headless Chromium, from disk and from a web server: python -m tests.site docs/_site
 
 Fails on an outside request, a console error, a raw formula, a broken link or anchor, a picture without words,
-horizontal scrolling at 360 px, an open answer, and a search that finds nothing.  --shots FOLDER takes screenshots.
+horizontal scrolling and broken words of tables at 360 px, an open answer, and a search that finds nothing.  --shots
+FOLDER takes screenshots.
 """
 
 from __future__ import annotations
@@ -29,6 +30,14 @@ LOOK = r"""() => {
   words.querySelectorAll('pre, code, script, style, mjx-container').forEach((e) => e.remove());
   const raw = words.textContent.match(/\$[^$\n]{1,60}\$|\\[a-zA-Z]{3,}|\\\(/);
   if (raw) wrong.push(`raw formula ${raw[0]}`);
+  for (const cell of all('article table :is(th, td)')) {
+    const texts = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), range = document.createRange();
+    for (let text; (text = texts.nextNode()); ) for (const word of text.data.matchAll(/[\p{L}\p{N}]+/gu)) {
+      range.setStart(text, word.index);
+      range.setEnd(text, word.index + word[0].length);
+      if (new Set([...range.getClientRects()].map((box) => box.top)).size > 1) wrong.push(`broken word ${word[0]}`);
+    }
+  }
   if (all('details.hide[open], details.dig-deeper[open], article details[open]').length) wrong.push('an open answer');
   return wrong;
 }"""

@@ -107,6 +107,36 @@ def test_reference_pages_print_characters_of_markup_as_they_are_and_stress_a_wor
     assert escaped(written) == wanted
 
 
+def test_arguments_in_the_reference_are_items_with_all_of_their_words():
+    from pages.hooks import readable
+
+    docstring = """What it does.
+
+    use : "angles", or "torques" of which
+    each says where it stood: c / K_P : see there.
+    a, b : (k,) m.  c : N m,
+        at rest. d : default none.
+    Returns 1 : 1.
+
+    >>> f(a : b)
+    1
+    """
+    lines = readable([line.removeprefix("    ") for line in docstring.splitlines()])
+    assert [line for line in lines if line.strip()] == [
+        "What it does.",
+        '* **use**: "angles", or "torques" of which each says where it stood: c / K_P : see there.',
+        "* **a, b**: (k,) m.",
+        "* **c**: N m, at rest.",
+        "* **d**: default none.",
+        "Returns 1 : 1.",
+        "::",
+        "    >>> f(a : b)",
+        "    1",
+    ]
+    # A list ends before what is not one of its items.
+    assert lines[lines.index("Returns 1 : 1.") - 1] == ""
+
+
 @pytest.mark.parametrize("depth", ["", "../"])
 def test_links_to_the_index_stand_in_the_order_of_the_equations(depth):
     from pages.lessons import lesson_page
@@ -122,10 +152,24 @@ def test_errata_and_index_on_the_site_have_a_block_for_every_row():
     from pages.lessons import errata_page, index_page
 
     for name, page, row, mark in [
-        ("errata.md", errata_page, r"^\| (?:<a id|\d)", "**Section "),
+        ("errata.md", errata_page, r"^\| (?:<a id|\d)", "\n## Section "),
         ("equations.md", lambda text: index_page(text, {}), r"^\| <a id=\"(?:eq|table)-", ":::{container} formula"),
     ]:
         text = (ROOT / "notebooks" / name).read_text(encoding="utf-8")
         made = page(text)
         assert made.count(mark) == len(re.findall(row, text, re.M)) > 30
-        assert set(re.findall(r'id="[\w-]+"', text)) == set(re.findall(r'id="[\w-]+"', made))
+        targets = re.findall(r"^\(([\w-]+)\)=$", made, re.M)
+        assert set(re.findall(r'id="([\w-]+)"', text)) == {*targets, *re.findall(r'id="([\w-]+)"', made)}
+        assert not re.search(r"\| \d\d_\w+ \|", made), "a lesson without a link"
+
+
+def test_links_on_the_site_have_words_where_the_repository_has_names_of_files():
+    from pages.lessons import linked
+
+    assert linked("in [errata.md](errata.md), [a.md](b.md)") == "in [the errata](errata.md), [a.md](b.md)"
+    assert (
+        linked("[notebooks/equations.md](../notebooks/equations.md)") == "[the equation index](../lessons/equations.md)"
+    )
+    for path in (ROOT / "docs").rglob("[!_]*.md"):
+        named = re.search(r"\[\w+\.(md|ipynb)\]\(", text(path))
+        assert not named, f"{path.name}: {named[0]}"

@@ -9,6 +9,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import rapkm_lite as rk
 from rapkm_lite.lessons.copies import bare, shipped
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
 
@@ -122,8 +124,32 @@ def test_every_lesson_of_the_index_is_there():
     assert named <= {path.stem for path in NOTEBOOKS}
 
 
+def test_pages_of_a_site_lead_to_lessons_that_run_in_it_as_wide_as_the_screen(tmp_path):
+    lesson = NOTEBOOKS[3].stem
+    (tmp_path / "lite/files").mkdir(parents=True)
+    (tmp_path / "lite/files" / NOTEBOOKS[3].name).touch()
+    page = json.loads(module("pages/lessons.py").lesson_page(NOTEBOOKS[3], []))
+    sources = {
+        "index.html": module("pages/start.py").page("contents.html", "run.html"),
+        "run.html": (ROOT / "docs/build.py").read_text(encoding="utf-8"),
+        f"lessons/{lesson}.html": "".join(page["cells"][0]["source"]),
+    }
+    for name, text in sources.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    module("lite.py").link(tmp_path / "lite")
+    for name in sources:
+        made = (tmp_path / name).read_text(encoding="utf-8")
+        lite, first = ("../lite", lesson) if "/" in name else ("lite", "00_start_here")
+        assert f'<a class="on-wide" href="{lite}/lab/index.html?path={first}.ipynb">Run ' in made
+        assert f'<a class="on-narrow" href="{lite}/notebooks/index.html?path={first}.ipynb">Run ' in made
+        assert "the first start takes a minute" in made and "<!-- here -->" not in made
+
+
 def test_every_public_name_has_its_place_in_the_reference(tmp_path):
     module("pages/reference.py").write(tmp_path / "reference")
     pages = "\n".join(path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.rst"))
     for name in rk.__all__:
         assert len(re.findall(rf":: rapkm_lite\.{name}$", pages, re.MULTILINE)) == 1, name
+        assert re.search(rf"^\* :py:obj:`{name} <rapkm_lite\.{name}>`: \S", pages, re.MULTILINE), name
+    assert "guarded" not in pages

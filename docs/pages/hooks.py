@@ -5,34 +5,43 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-# "name : what it is" begins a paragraph about an argument; longer ones go on with an indent.
-ARGUMENT = re.compile(r"([A-Za-z_]\w*(?:, [A-Za-z_]\w*)*) : (.*)")
+# "name : what it is" begins an item about an argument or several; a line may hold more of them, a full stop between.
+NAMES = r"[A-Za-z_]\w*(?:, [A-Za-z_]\w*)*"
+ARGUMENT = re.compile(rf"{NAMES} : .*")
+NEXT = re.compile(rf"(?:(?<=\.)\s+|\s{{2,}})(?={NAMES} : )")
 
 
 def readable(lines: list[str]) -> list[str]:
     """A docstring of this package as reStructuredText: lists of arguments, examples, no accidental markup."""
     made: list[str] = []
-    example = listed = False
-    for line in lines:
-        if line.startswith(">>>") and not example:
-            made += ["", "::", ""] if made else ["::", ""]
-            example, listed = True, False
-        elif not line.strip():
-            example = listed = False
-        if example:
-            made.append("    " + line)
+    item = ""
+    example = False
+    for line in [*lines, ""]:
+        begins = line.startswith(">>>") and not example
+        argument = not example and ARGUMENT.fullmatch(line) is not None
+        # A sentence that has come to its end is gone on with by an indent only.
+        goes_on = bool(item and line.strip()) and not (begins or argument)
+        if goes_on and (line.startswith(" ") or not item.endswith(".")):
+            item += " " + line.strip()
             continue
-        argument = ARGUMENT.fullmatch(line)
+        made += items(item)
+        made += [""] if goes_on else []
+        item = ""
+        if begins:
+            made += ["", "::", ""] if made else ["::", ""]
+            example = True
+        example = example and bool(line.strip())
         if argument:
-            made += ["", f"* **{argument[1]}**: {escaped(argument[2])}"]
-            listed = True
-        elif listed and line.startswith(" "):
-            made.append("  " + escaped(line.strip()))
+            item = line
         else:
-            made += [""] if listed and line.strip() else []
-            listed = False
-            made.append(escaped(line))
-    return made
+            made.append("    " + line if example else escaped(line))
+    return made[:-1]
+
+
+def items(text: str) -> list[str]:
+    """The arguments of one line or paragraph, each as an item of a list."""
+    pairs = [part.split(" : ", 1) for part in NEXT.split(text) if part]
+    return [line for names, words in pairs for line in ("", f"* **{names}**: {escaped(words.strip())}")]
 
 
 def escaped(text: str) -> str:

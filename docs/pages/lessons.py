@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
+WORDS = {"equations.md": "the equation index", "errata.md": "the errata", "dashboard.ipynb": "the dashboard"}
 # A row of the index: its anchor and number, and further on the lesson that explains it.
 ROW = re.compile(r'<a id="(eq-\d+|table-1)"></a>.*?\| (\d\d_\w+) \|')
 
@@ -18,7 +19,11 @@ def lesson_of_equation(index: str) -> dict[str, str]:
 
 
 def linked(text: str) -> str:
-    """Links to an anchor inside another page, as HTML: the anchors are no headings, which MyST would look for."""
+    """Links to an anchor inside another page, as HTML: the anchors are no headings, which MyST would look for.
+
+    A link whose words are the name of a file in the repository says on the site what the page is.
+    """
+    text = re.sub(r"\[(?:\w+/)*(\w+\.\w+)\](?=\([\w./]*\1\))", lambda name: f"[{WORDS.get(name[1], name[1])}]", text)
     # In the repository the lessons are in notebooks, one or two folders up; on the site in lessons, one up.
     text = re.sub(r"\]\((?:\.\./)+notebooks/(?=\w+\.(?:md|ipynb))", "](../lessons/", text)
     pattern = re.compile(r"\[([^\]\n]+)\]\(([\w./-]+)\.(?:md|ipynb)#([\w-]+)\)")
@@ -39,7 +44,8 @@ def index_page(text: str, functions: dict[str, str]) -> str:
         elif lines and lines[-1] == "" and re.match(r"\|---\|---\|---\|---\|---\|---\|", line):
             continue
         else:
-            lines.append(line)
+            # The lesson of a figure or a section.
+            lines.append(re.sub(r"\| ((\d\d)_\w+) \|$", r"| [lesson \2](\1.ipynb) |", line))
     return "\n".join(lines) + "\n"
 
 
@@ -74,8 +80,11 @@ def errata_page(text: str) -> str:
 
 def _erratum(where, mark, printed, why, correct, test) -> list[str]:
     """One place of the print: what stands there, why not or what is sharper, what is right, and the test."""
+    # As targets of MyST the anchors take precedence over those that Sphinx makes of the headings.
+    targets = [f"({anchor})=" for anchor in re.findall(r'<a id="([\w-]+)"></a>', where)]
+    title = f"## Section {re.sub('<.*>', '', where)} {mark}"
     said = {"Printed": printed, "Why" if mark == "✗" else "Sharper": why, "Correct": correct, "Test": test}
-    return ["", f"**Section {where}** {mark}", "", *(f"- *{k}:* {v}" for k, v in said.items() if v != "–"), ""]
+    return ["", *targets, title, "", *(f"- *{k}:* {v}" for k, v in said.items() if v != "–"), ""]
 
 
 def _to_reference(name: str, functions: dict[str, str]) -> str:
@@ -129,7 +138,10 @@ def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
                 text = re.sub(r"\A# ", "# Solution ", text)
             # A heading stays the first line of its cell.
             head, rest = re.match(r"(#[^\n]*\n?)?(.*)", text, re.DOTALL).groups()
-            cell["source"] = f'{head or ""}\n<div class="to-index">\n{marks}</div>\n\n{rest}' if marks else text
+            below = f'<div class="to-index">\n{marks}</div>\n\n' if marks else ""
+            # Where a link to the lesson in the browser goes, if the site gets them.
+            below = f"<!-- here -->\n\n{below}" if k == 0 and not depth else below
+            cell["source"] = f"{head or ''}\n{below}{rest}" if below else text
         else:
             _outputs(cell, _next_words(cells, k))
     return json.dumps(notebook, ensure_ascii=False)

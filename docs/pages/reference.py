@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 
 import rapkm_lite
+from pages.hooks import escaped
 from rapkm_lite import checks, explore, plotting
 
 ROOMS = {
@@ -35,10 +37,17 @@ def page_of() -> dict[str, str]:
 
 
 def _names(module) -> list[str]:
-    """What a door offers: functions and classes of this package."""
-    listed = getattr(module, "__all__", None) or [n for n in dir(module) if not n.startswith("_")]
+    """What a door offers: functions and classes of this package, without what the door itself is made with."""
+    listed = getattr(module, "__all__", None) or [n for n in dir(module) if not n.startswith("_") and n != "guarded"]
     values = {name: getattr(module, name) for name in listed}
     return [n for n, v in values.items() if callable(v) and getattr(v, "__module__", "").startswith("rapkm_lite")]
+
+
+def _line(module: str, source, name: str) -> str:
+    """A name that leads to its entry, and the first sentence of its docstring."""
+    paragraph = " ".join(inspect.getdoc(getattr(source, name)).split("\n\n")[0].split())
+    first = re.split(r"(?<=[.?])\s+(?=[A-Z])", paragraph)[0]
+    return f"* :py:obj:`{name} <{module}.{name}>`: {escaped(first)}"
 
 
 def _page(title: str, module: str, source, names: list[str]) -> str:
@@ -52,15 +61,22 @@ def _page(title: str, module: str, source, names: list[str]) -> str:
 def write(folder: Path) -> None:
     """All pages, and the page that lists them."""
     folder.mkdir(parents=True)
-    for room, names in rooms().items():
-        (folder / f"{room}.rst").write_text(_page(ROOMS[room], "rapkm_lite", rapkm_lite, names), encoding="utf-8")
-    for door, (title, module) in DOORS.items():
-        text = _page(title, f"rapkm_lite.{door}", module, _names(module))
-        (folder / f"{door}.rst").write_text(text, encoding="utf-8")
-    listed = "\n".join([*ROOMS, *DOORS])
-    title = "Reference"
-    (folder / "index.md").write_text(
-        f"# {title}\n\nEvery public name, by the room of the package where it lives; `rk` stands for `rapkm_lite`.\n\n"
-        f"```{{toctree}}\n{listed}\n```\n",
-        encoding="utf-8",
-    )
+    parts = {room: (ROOMS[room], "rapkm_lite", rapkm_lite, names) for room, names in rooms().items()}
+    parts |= {door: (title, f"rapkm_lite.{door}", module, _names(module)) for door, (title, module) in DOORS.items()}
+    words = "Every public name, by the room of the package where it lives; ``rk`` stands for ``rapkm_lite``."
+    lines = [
+        "Reference",
+        "=========",
+        "",
+        words,
+        "",
+        ".. toctree::",
+        "   :hidden:",
+        "",
+        *(f"   {p}" for p in parts),
+        "",
+    ]
+    for part, (title, module, source, names) in parts.items():
+        (folder / f"{part}.rst").write_text(_page(title, module, source, names), encoding="utf-8")
+        lines += [title, "-" * len(title), "", *(_line(module, source, name) for name in names), ""]
+    (folder / "index.rst").write_text("\n".join(lines), encoding="utf-8")
