@@ -616,6 +616,8 @@ def test_a_small_singular_value_counts_down_to_ten_times_the_noise():
     assert rk.calibrate(TESTBED, angles, noise=smallest / 15).rank == 3
     with pytest.raises(rk.CalibrationError, match="of 3 unknowns"):
         rk.calibrate(TESTBED, angles, noise=smallest / 7)
+    with pytest.raises(ValueError, match="noise = 1 rad .* below 0.1 rad"):
+        rk.calibrate(TESTBED, angles, noise=1.0)
 
 
 def test_torques_under_a_filter_show_no_gain():

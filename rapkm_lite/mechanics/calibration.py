@@ -137,8 +137,8 @@ def calibrate(
     one_of("use", use, ("angles", "torques"))
     K_P = None if K_P is None else bounded("K_P", drive_values("K_P", K_P, robot.n_arms), 0.0, strict=True)
     noise = None if noise is None else positive_number("noise", noise)
-    if noise is not None and noise > 0.01:
-        raise ValueError(f"noise = {noise:g} rad of a reading lets nothing be seen; allowed: up to 0.01 rad")
+    if noise is not None and noise >= 0.1:
+        raise ValueError(f"noise = {noise:g} rad of a reading lets nothing be seen; allowed: below 0.1 rad")
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
     angles, logs = measured(robot, log)
