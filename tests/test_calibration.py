@@ -616,7 +616,7 @@ def test_a_small_singular_value_counts_down_to_ten_times_the_noise():
     assert rk.calibrate(TESTBED, angles, noise=smallest / 15).rank == 3
     with pytest.raises(rk.CalibrationError, match="of 3 unknowns"):
         rk.calibrate(TESTBED, angles, noise=smallest / 7)
-    with pytest.raises(ValueError, match="noise = 1 rad .* below 0.1 rad"):
+    with pytest.raises(ValueError, match=r"noise = 1 rad .* below 0.1 rad"):
         rk.calibrate(TESTBED, angles, noise=1.0)
 
 
