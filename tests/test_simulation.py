@@ -79,6 +79,27 @@ def test_a_jump_over_the_boundary_is_seen():
     assert "unstable gain" not in end.reason
 
 
+@pytest.mark.parametrize("push", [[0.369, 0.18, 0.033], [-0.237, -0.19, 0.2], [0.008, 0.009, 0.202]])
+def test_torques_that_stay_the_same_lose_the_machine_at_one_time_however_often_they_are_held(push):
+    """The motion is one: the boundary is reached at an instant, and no hold jumps over it, alone or in a study."""
+    # All drives at their limits, whatever they read.
+    options = {"offset": -100.0 * np.sign(push), "faults": rk.TorqueLimit(np.abs(push))}
+
+    def end(dt):
+        path = rk.hold(ROBOT, (0.0, 0.0), 0.6, dt)
+        with pytest.raises(rk.SimulationError, match="left the workspace") as caught:
+            rk.simulate(ROBOT, PD, path, **options)
+        np.testing.assert_array_equal(caught.value.partial.c, np.broadcast_to(push, caught.value.partial.c.shape))
+        row = rk.sweep(ROBOT, PD, path, options["offset"], faults=options["faults"], failed="mask")
+        assert row.failure_time[0] == caught.value.time
+        return caught.value.time
+
+    instant = end(1e-4)
+    for dt in (2e-3, 4e-3):
+        # The hold in which it is, or the one before, of whose end nothing is known.
+        assert end(dt) <= instant < end(dt) + 2 * dt
+
+
 def test_a_run_keeps_what_repeats_it():
     robot = rk.load()
     model, path = robot.replace(lengths=0.201, masses=0.2), rk.circle(robot, 0.05, duration=0.2)
@@ -239,8 +260,9 @@ def test_work_of_drives_that_fall_turns_behind_is_the_energy_of_the_machine(wrap
     assert np.abs(run.error).max() > np.pi and np.abs(np.diff(run.q_a, axis=0)).max() < 0.1
     kinetic = rk.kinetic_energy(ROUND, run.q[-1], run.qd[-1]) - rk.kinetic_energy(ROUND, run.q[0], run.qd[0])
     assert rk.mechanical_work(run).sum() == pytest.approx(kinetic, abs=1e-9)
-    # Beside a run that is never a turn behind.
-    laws = [wrap(rk.PD(0.02, 0.001)), wrap(rk.PD(200.0, 20.0))]
+    # Beside a run that is never a turn behind, and one that hardly moves: in the end all its drives are a whole turn
+    # behind, and each of them is near its path but for that.
+    laws = [wrap(rk.PD(0.02, 0.001)), wrap(rk.PD(200.0, 20.0)), wrap(rk.PD(1e-6, 1e-6))]
     study = rk.sweep(ROUND, laws, LAP, [0.0, 0.0, 0.0])
     for law, energy in zip(laws, study.energies, strict=True):
         np.testing.assert_allclose(energy, rk.simulate(ROUND, law, LAP).energy, rtol=1e-9)
