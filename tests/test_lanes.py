@@ -18,7 +18,13 @@ from rapkm_lite.simulation.setup import prepare
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
 PD = rk.PD(7.05, 0.225)
 MACHINE = MACHINES["testbed"].replace(gravity=(0.3, -1.0), load=0.05)
-MODEL = MACHINE.replace(lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]], load=0.02, friction=3e-3)
+MODEL = MACHINE.replace(
+    lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]],
+    load=0.02,
+    friction=3e-3,
+    gravity=(-0.2, -0.9),
+    friction_velocity=2.0,
+)
 COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_path_error", "largest_path_error")
 
 
@@ -173,6 +179,19 @@ def test_faults(name, sensors):
 def test_other_machines(machine, name):
     robot = MACHINES[machine].replace(gravity=(0.0, -2.0))
     agree(robot, laws(robot.n_arms)[name], rk.circle(robot, radius=0.03, duration=0.12))
+
+
+@pytest.mark.parametrize("law", [rk.CTC(400.0, 40.0, (3, 4)), rk.RedundantCTC(400.0, 40.0), rk.RedundantAPD(5.0, 0.2)])
+def test_elbows_far_from_their_path(law):
+    """Readings that are wrong by half a radian, and with them elbows: too far for a series of the arcsine."""
+    path, offset = cut(rk.circle(MACHINE, radius=0.05, duration=0.4), 100, 21), np.array([0.6, 0.4, -0.5])
+    run = rk.simulate(MACHINE, law, path, offset)
+    read = rk.estimate_pose(MACHINE, run.q_a + offset, run.x)
+    assert np.abs(read - path.q)[:, 3:].max() > 0.8
+    assert_allclose(run.c, rk.simulate(MACHINE, Textbook(law), path, offset).c, rtol=0, atol=1e-9)
+    study = rk.sweep(MACHINE, law, path, [0 * offset, offset])
+    assert_allclose(study.energies[1], run.energy, rtol=1e-11, atol=1e-11)
+    assert_allclose(study.x_final[1], run.x[-1], rtol=0, atol=1e-11)
 
 
 # Company.
