@@ -194,6 +194,18 @@ def test_elbows_far_from_their_path(law):
     assert_allclose(study.x_final[1], run.x[-1], rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("size", [0.3, -0.3])
+def test_the_pose_of_mirrored_readings_is_on_the_axis_of_the_machine(size):
+    """A machine that is its own mirror image: no step across its axis ends the search for the place along it."""
+    robot = MACHINES["five_bar"].replace(mode=[1, -1])
+    path, offset = rk.hold(robot, (0.0, 0.1), 0.005), np.array([size, -size])
+    for law in (rk.CTC(400.0, 40.0, None), rk.CTC(400.0, 40.0, (0, 1))):
+        run = rk.simulate(robot, law, path, offset)
+        assert_allclose(run.x[:, 0], 0.0, rtol=0, atol=1e-12)
+        assert_allclose(run.c, -run.c[:, ::-1], rtol=0, atol=1e-10)
+        assert_allclose(run.c, rk.simulate(robot, Textbook(law), path, offset).c, rtol=0, atol=1e-9)
+
+
 # Company.
 @pytest.mark.skipif(not COMPILED, reason="a row is filled up for vector registers, in compiled runs only")
 @pytest.mark.parametrize("law", [rk.PD(5.0, 0.5), rk.CTC(400.0, 40.0, (0, 4)), rk.RedundantCTC(400.0, 40.0)])
