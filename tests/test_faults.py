@@ -96,6 +96,13 @@ def test_a_limit_is_felt_where_a_torque_of_any_drive_reaches_it():
     assert not rk.TorqueLimit([0.3, 0.3, 0.5]).felt(np.array([0.1, 0.0, -0.4]))
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_jump_is_felt_where_it_is_far_above_the_offsets_of_a_calibrated_machine(sign):
+    """Those are some milliradians, as in the chapter; a slipping coupling loses degrees."""
+    for size, felt in ((5e-3, False), (np.deg2rad(3.0), True), (np.deg2rad(30.0), True)):
+        assert rk.OffsetJump(0, 0.1, sign * size).felt(np.zeros((9, 3))) == felt
+
+
 def test_dead_drive():
     run, q, qd = observed([rk.DeadDrive(1, 0.1)])
     wanted = commanded(q, qd)
