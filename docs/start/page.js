@@ -376,3 +376,16 @@ mount($("stage"), {
   },
   layout: [["machine", "offset", "torque"], ["machine", "forces", "energy"], ["run", "run", "run"]], widths: [1.7, 1, 1], size: [12, 9.6],
 }, link);
+
+// On a narrow page, where panels stand below each other, a slider stands below what it moves.
+const narrow = matchMedia("(max-width: 640px)"), movers = [["machine", /^[xy]$/], ["offset", /^offset/], ["run", /^time$/]];
+function arrange() {
+  const panels = Object.fromEntries(Array.from(document.querySelectorAll(".rapkm-panel"), (el) => [el.style.gridArea.split(" ")[0], el]));
+  for (const [panel, names] of movers) {
+    const rows = Object.keys(controls).filter((name) => names.test(name)).map((name) => $(name).parentElement);
+    if (narrow.matches) panels[panel].after(...rows);
+    else $("controls").append(...rows);
+  }
+}
+narrow.addEventListener("change", arrange);
+arrange();
