@@ -676,3 +676,20 @@ def test_labels_that_stay_stand_in_their_panels():
             assert np.all((low <= label.data[:, 0]) & (label.data[:, 0] <= high)), (name, label.words)
             found += 1
     assert found
+
+
+def test_the_label_of_the_colours_belongs_to_no_small_panel():
+    drawn = figure(explore.machine().picture)
+    drawn.canvas.draw()
+    machine, *small, colours = drawn.axes
+    label = colours.yaxis.label.get_window_extent()
+    assert label.x0 - colours.bbox.x1 < min(ax.bbox.x0 for ax in small) - label.x1
+    assert not any(spine.get_visible() for ax in small for spine in ax.spines.values())
+    assert machine.spines["left"].get_visible()
+
+
+def test_curves_of_a_law_that_works_are_seen():
+    explorer = explore.computed_torque()
+    for panel in ("torque", "error"):
+        curves = [m.data[:, 1] for m in explorer.picture.marks if (m.kind, m.panel) == ("line", panel)]
+        assert 0.15 * explorer.picture.ylim(panel)[1] < np.abs(np.concatenate(curves)).max()

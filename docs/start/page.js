@@ -7,7 +7,8 @@ const given = JSON.parse(document.getElementById("values").textContent);
 const robot = machine(given.machine);
 const { K_P, K_D, corners, duration, table1, colours, dashes } = given;
 const N = robot.N;
-const PER_NEWTON = 180; // mm in the picture
+const PER_NEWTON = 180; // mm in the picture, less where an arrow would leave it
+const FRAME = { machine: [-275, 365, -332, 376] };
 const LIMIT = 0.04; // N m per drive, of the polygon of forces
 const BASE = given.machine.base;
 const FILTERED = "#1B7F79";
@@ -81,10 +82,17 @@ function arrow(panel, x, y, dx, dy, style, size = 1) {
   return [["line", panel, style, [x, y, bx, by]], ["polygon", panel, area(style.color, style.color, { z: 4 }), tip]];
 }
 
+/** The scale at which the arrows of forces [fx, fy] from a place stay in the picture. */
+const scaleOf = (forces, place) => Math.min(PER_NEWTON, ...forces.flatMap((force) => force.map((f, k) => {
+  const [low, high] = FRAME.machine.slice(2 * k, 2 * k + 2);
+  return (f > 0 ? high - 8 - place[k] : place[k] - low - 8) / Math.max(Math.abs(f), 1e-9);
+})));
+
 /** The machine on its path, with the forces that its drives can make and those that they do make. */
 function drawMachine({ pose, torque }) {
   const [x, y] = [1e3 * pose.x, 1e3 * pose.y];
-  const reach = pose.forcePolygon(LIMIT).flatMap(([fx, fy]) => [x + PER_NEWTON * fx, y + PER_NEWTON * fy]);
+  const forces = Array.from(torque, (c, i) => [pose.bx[i] * c, pose.by[i] * c]), scale = scaleOf(forces, [x, y]);
+  const reach = pose.forcePolygon(LIMIT).flatMap(([fx, fy]) => [x + scale * fx, y + scale * fy]);
   const marks = [["polygon", "machine", area("#E4E8EE", "#8A94A6"), reach]];
   for (let i = 0; i < N; i++) {
     const [bx, by] = BASE[i].map((v) => 1e3 * v), elbow = [bx + 1e3 * pose.ax[i], by + 1e3 * pose.ay[i]];
@@ -94,11 +102,12 @@ function drawMachine({ pose, torque }) {
     const words = `drive ${i + 1}`;
     marks.push(["label", "machine", text("#222222", { va: by > 0 ? "bottom" : "top" }), [bx, by + (by > 0 ? 20 : -20)], words]);
   }
-  for (let i = 0; i < N; i++) {
-    const force = [pose.bx[i], pose.by[i]].map((b) => PER_NEWTON * b * torque[i]);
-    marks.push(...arrow("machine", x, y, ...force, line(colours[i], 2.4, { z: 4 })));
-  }
+  for (let i = 0; i < N; i++)
+    marks.push(...arrow("machine", x, y, ...forces[i].map((f) => scale * f), line(colours[i], 2.4, { z: 4 })));
   marks.push(["line", "machine", dot("#222222", "s", 7, "#ffffff"), [x, y]]);
+  const newtons = [0.2, 0.5, 1, 2].find((n) => n * scale > 25) ?? 5, end = FRAME.machine[1] - 20;
+  marks.push(["line", "machine", line("#222222", 2.4), [end - newtons * scale, -305, end, -305]]);
+  marks.push(["label", "machine", text("#222222", { ha: "right" }), [end, -295], `${newtons} N`]);
   return marks;
 }
 
@@ -118,13 +127,14 @@ function drawForces({ pose, torque }) {
 const limit = (values, levels) => levels.find((level) => values.every((v) => Math.abs(v) < 0.93 * level)) ?? levels.at(-1);
 
 function drawBars(at, unit) {
-  const marks = [["line", "offset", line("#555555", 1), [0.4, 0, N + 1.3, 0]], ["line", "torque", line("#555555", 1), [0.4, 0, N + 0.6, 0]]];
+  const marks = [["line", "offset", line("#555555", 1), [0.4, 0, N + 0.6, 0]], ["line", "torque", line("#555555", 1), [0.4, 0, N + 0.6, 0]]];
   for (let i = 0; i < N; i++) {
     const value = state[`offset_${i + 1}`], torque = 1e3 * at.torque[i];
     marks.push(bar("offset", i + 1, value, area(colours[i]), 0.5), bar("torque", i + 1, torque, area(colours[i]), 0.5));
-    const place = (v) => text("#222222", { va: v < 0 ? "top" : "bottom" });
-    marks.push(["label", "torque", place(torque), [i + 1, torque + (torque < 0 ? -unit : unit)], number(torque, 1)]);
-    marks.push(["label", "offset", text("#222222", { ha: "left", va: "center" }), [i + 1.45, value], number(value, 1)]);
+    for (const [panel, v, gap] of [["torque", torque, unit], ["offset", value, 2.4]]) { // 2.4 mrad: off the ring
+      const words = number(v, 1), way = words.startsWith("−") ? -1 : 1;
+      marks.push(["label", panel, text("#222222", { va: way < 0 ? "top" : "bottom" }), [i + 1, v + way * gap], words]);
+    }
   }
   return marks;
 }
@@ -160,10 +170,10 @@ function picture(dt) {
   const run = state.filter === "off" ? off : on, at = now(run, dt);
   const here = { off: off.energy, on: on.energy };
   const [bars, highest] = drawEnergy(here), [chain, size] = drawForces(at);
-  const scale = limit(at.torque.map((c) => 1e3 * c), [30, 60, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
+  const scale = limit(at.torque.map((c) => 1e3 * c), [30, 45, 60, 90, 120]), whole = limit(run.torque.map((c) => 1e3 * c), [65, 130, 260]);
   const frames = {
-    machine: [-275, 365, -332, 376], offset: [0.4, N + 1.3, -8.8, 8.8], torque: [0.4, N + 0.6, -1.25 * scale, 1.25 * scale],
-    forces: [-1.3 * size, 1.3 * size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
+    ...FRAME, offset: [0.4, N + 0.6, -12.5, 12.5], torque: [0.4, N + 0.6, -1.25 * scale, 1.25 * scale],
+    forces: [-size, size, -size, size], energy: [0.3, 5.3, -0.25, 1.32 * Math.max(highest, 5)], run: [0, duration, -whole, whole],
   };
   const saved = 1 - total(here.on) / total(here.off), measured = 1 - total(table1[1]) / total(table1[0]);
   let apart = 0;
@@ -178,7 +188,7 @@ function picture(dt) {
     ? `With these offsets the machine is lost after ${number(lost.lost)} s.`
     : `One lap costs ${number(total(here.off))} J without the filter and ${number(total(here.on))} J with it, ` +
       (saved > 0.005 ? `${number(100 * saved, 0)} % less` : Number(number(total(here.on))) < Number(number(total(here.off))) ? "hardly less" : "no less") +
-      ` (the chapter measured ${number(100 * measured, 0)} % less), and the two motions are never more than ${number(1e3 * apart)} mm apart.`;
+      ` (the chapter measured ${number(100 * measured, 0)} % less), and the two motions are never more than ${number(Math.max(Math.ceil(1e5 * apart) / 100, 0.01))} mm apart.`;
   if ($("said").textContent !== words) $("said").textContent = words;
   return {
     kind: "picture", styles: {}, frames,
@@ -366,3 +376,16 @@ mount($("stage"), {
   },
   layout: [["machine", "offset", "torque"], ["machine", "forces", "energy"], ["run", "run", "run"]], widths: [1.7, 1, 1], size: [12, 9.6],
 }, link);
+
+// On a narrow page, where panels stand below each other, a slider stands below what it moves.
+const narrow = matchMedia("(max-width: 640px)"), movers = [["machine", /^[xy]$/], ["offset", /^offset/], ["run", /^time$/]];
+function arrange() {
+  const panels = Object.fromEntries(Array.from(document.querySelectorAll(".rapkm-panel"), (el) => [el.style.gridArea.split(" ")[0], el]));
+  for (const [panel, names] of movers) {
+    const rows = Object.keys(controls).filter((name) => names.test(name)).map((name) => $(name).parentElement);
+    if (narrow.matches) panels[panel].after(...rows);
+    else $("controls").append(...rows);
+  }
+}
+narrow.addEventListener("change", arrange);
+arrange();

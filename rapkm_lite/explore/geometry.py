@@ -100,7 +100,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     }
     layout = [["machine", name] for name in "abc"[: len(pairs)]]
     scale = partial(marks.Picture.scale, panel="machine", palette=MAP, label="σ_min in rad/m")
-    return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.4), setup=scale, live=True)
+    return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.0), setup=scale, live=True)
 
 
 @ready_made

@@ -138,4 +138,4 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         "counts": choice("counts a turn", [("2000", 2000), ("20 000", 20_000), ("200 000", 200_000)], 20_000),
     }
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
-    return explorer(draw, controls, panels, size=(11.0, 3.8), setup=space)
+    return explorer(draw, controls, panels, widths=[1, 1, 1.25], size=(11.0, 3.8), setup=space)

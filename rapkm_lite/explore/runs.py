@@ -78,7 +78,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         "encoder": choice("encoder counts per turn", counts),
         "path": choice("path", paths.keys()),
     }
-    return explorer(draw, controls, panels, widths=[1.15, 1.15, 1], size=(9.4, 3.6))
+    return explorer(draw, controls, panels, layout=[["torque", "energy"], ["error", "energy"]], size=(9.4, 4.6))
 
 
 # Metres of arrow for 1 N, and the newtons of the arrow that shows it.

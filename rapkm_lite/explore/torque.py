@@ -84,7 +84,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        for panel, values, least in (("torque", torque, 300.0), ("error", error, 20.0)):
+        for panel, values, least in (("torque", torque, 50.0), ("error", error, 5.0)):
             curves(picture, panel, run.t, values, least, MOST[panel])
             beyond(picture, panel, values)
         if run.switches:

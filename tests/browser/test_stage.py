@@ -67,7 +67,25 @@ window.stage = {
   // How many different colours the canvases show: a blank one has a single one.
   colours: () => [...stage.root().querySelectorAll('canvas')].map(c => c.width ? new Set(
     new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer)).size : 0),
+  // Numbers that lie over a bar, as left, top, right, bottom in px.
+  covered: () => [...stage.root().querySelectorAll('canvas')].flatMap(c => painted.get(c)).flatMap(({ words, bars }) =>
+    words.filter(w => bars.some(b => w[1] < b[2] - 1 && b[0] < w[3] - 1 && w[2] < b[3] - 1 && b[1] < w[4] - 1))),
 };
+// What has been written and which four corners have been filled on each canvas since it was wiped.
+window.painted = new Map();
+for (const [name, note] of Object.entries({
+  clearRect: ({ canvas }) => painted.set(canvas, { words: [], bars: [] }),
+  beginPath: context => (context.path = []),
+  moveTo: ({ path }, x, y) => path?.push([x, y]),
+  lineTo: ({ path }, x, y) => path?.push([x, y]),
+  fill: ({ canvas, path }) => path?.length === 4 && painted.get(canvas)?.bars.push(
+    [Math.min, Math.max].flatMap(end => [0, 1].map(k => end(...path.map(point => point[k]))))),
+  fillText: (context, words, x, y) => painted.get(context.canvas)?.words.push(
+    [words, x, y - 0.7 * parseFloat(context.font.match(/([\\d.]+)px/)[1]), x + context.measureText(words).width, y]),
+})) {
+  const kind = CanvasRenderingContext2D.prototype, once = kind[name];
+  kind[name] = function (...given) { note(this, ...given); return once.apply(this, given); };
+}
 """
 
 
@@ -494,3 +512,25 @@ def test_wrong_setting_is_a_sentence_and_reset_goes_back(shown):
     notebook.page.get_by_role("button", name="Reset").press("Enter")
     still(notebook)
     assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+
+
+@pytest.mark.parametrize("name", ["decentralized_run", "calibration", "allocation", "steady_state"])
+def test_no_number_lies_over_a_bar(name, shown):
+    notebook = shown(name)
+    still(notebook)
+    bars = "() => [...painted.values()].reduce((n, { bars }) => n + bars.length, 0)"
+    assert notebook.ask(bars) >= 6
+    assert notebook.ask("() => stage.covered()") == []
+
+
+def test_the_sentence_of_a_problem_leaves_the_way_back_in_view(shown):
+    notebook = shown("allocation")
+    force = [control["label"] for control in notebook.ask("() => stage.controls()")].index("force fx in N")
+    notebook.ask("i => stage.part(i, '.noUi-handle').focus()", force)
+    changed(notebook, lambda: notebook.page.keyboard.press("End"))
+    boxes = """() => [...stage.root().querySelectorAll('.rapkm-knob:not([hidden]), .rapkm-problem')].map(e => {
+        const { left, top, right, bottom } = e.getBoundingClientRect(); return [left, top, right, bottom]; })"""
+    sentence, *knobs = notebook.ask(boxes)
+    assert len(knobs) == 2 and sentence[2] > sentence[0]
+    for left, top, right, bottom in knobs:
+        assert bottom < sentence[1] or top > sentence[3] or right < sentence[0] or left > sentence[2]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lab import ARGUMENTS, find_browser
 
 import rapkm_lite as rk
 
@@ -278,7 +279,7 @@ kind.fillText = function (words, x, y) {
   wrote.get(this.canvas)?.push([words, x, y - 0.75 * size, x + this.measureText(words).width, y]);
   return fillText.call(this, words, x, y); };
 kind.clearRect = function (...box) { wrote.set(this.canvas, []); return clearRect.apply(this, box); };
-window.covered = () => [...document.querySelectorAll('.rapkm-knob.bare:not([hidden])')].flatMap(knob => {
+window.covered = (which) => [...document.querySelectorAll(which + ':not([hidden])')].flatMap(knob => {
   const plot = knob.parentElement, { left, top } = plot.getBoundingClientRect(), box = knob.getBoundingClientRect();
   return wrote.get(plot.querySelector('canvas')).filter(([, a, b, c, d]) => a < box.right - left && c > box.left - left
     && b < box.bottom - top && d > box.top - top).map(([words]) => words); });"""
@@ -290,7 +291,80 @@ def test_the_handle_of_time_covers_no_number_of_an_axis(browser, address, width)
     for time in (0, 1, 100):
         seen.open(f"{address}#20,50,8,-4,10,{time},0,1")
         assert seen.page.evaluate("wrote.size") == 6
-        assert seen.page.evaluate("covered()") == []
+        assert seen.page.evaluate("covered('.rapkm-knob.bare')") == []
+
+
+@pytest.mark.parametrize("width", [390, 700, 1024, 1400])
+def test_no_ring_of_an_encoder_covers_a_number(browser, address, width):
+    seen = Page(browser, address, width, script=WRITTEN)
+    for offsets in ("0,0,0", "16,16,16", "-16,-16,-16", "16,-16,16", "8,-4,10"):
+        seen.open(f"{address}#20,50,{offsets},0,0,0")
+        ring = ".rapkm-knob[aria-label^=encoder]"
+        assert seen.page.locator(ring).count() == 3
+        assert seen.page.evaluate("which => covered(which)", ring) == []
+        # All three are written, inside their canvas, and none over another.
+        boxes, wide, high = seen.page.evaluate(
+            """which => { const canvas = document.querySelector(which).parentElement.querySelector('canvas');
+            return [wrote.get(canvas).filter(([words]) => words.includes('.')), canvas.clientWidth,
+                    canvas.clientHeight]; }""",
+            ring,
+        )
+        assert len(boxes) == 3
+        assert all(0 <= a and c <= wide and 0 <= b and d <= high for _, a, b, c, d in boxes)
+        assert boxes[0][3] < boxes[1][1] and boxes[1][3] < boxes[2][1]
+
+
+# Triangles filled on the canvas of the machine, as their corners in px: the heads of arrows.
+HEADS = """window.heads = []; { const kind = CanvasRenderingContext2D.prototype;
+for (const [name, note] of Object.entries({
+  clearRect: ({ canvas }) => canvas.ariaLabel === 'Take the end-effector' && (heads = []),
+  beginPath: context => (context.path = []),
+  moveTo: ({ path }, x, y) => path?.push([x, y]),
+  lineTo: ({ path }, x, y) => path?.push([x, y]),
+  fill: ({ canvas, path }) => canvas.ariaLabel === 'Take the end-effector' && path?.length === 3 && heads.push(path),
+})) {
+  const once = kind[name];
+  kind[name] = function (...given) { note(this, ...given); return once.apply(this, given); };
+} }"""
+
+
+def test_no_arrow_of_a_force_leaves_the_picture(browser, address):
+    seen, count = Page(browser, address, script=HEADS), 0
+    for place in RIM:
+        seen.open(f"{address}#{','.join(map(str, place))},0,0,0")
+        heads = np.array(seen.page.evaluate("heads")).reshape(-1, 2)
+        box = seen.page.evaluate("(e => [e.clientWidth, e.clientHeight])(document.querySelector('canvas'))")
+        assert np.all((heads > 0) & (heads < box)), place
+        count += len(heads) // 3
+    assert count >= 2 * len(RIM)
+
+
+def test_on_a_phone_a_slider_stands_below_what_it_moves(browser, address):
+    seen = Page(browser, address, 390)
+    places = seen.page.evaluate("""() => Object.fromEntries(
+        [...document.querySelectorAll('.rapkm-panel, input')].map(e => {
+            const { top, bottom } = e.getBoundingClientRect();
+            return [e.id || e.style.gridArea.split(' ')[0], [top, bottom]]; }))""")
+    for panel, names in {"machine": "xy", "offset": ["offset_1", "offset_2", "offset_3"], "run": ["time"]}.items():
+        for name in names:
+            assert 0 <= places[name][0] - places[panel][1] < 250
+    # What has no handle in the picture stays in sight.
+    seen.page.locator("#time").scroll_into_view_if_needed()
+    assert seen.page.locator("#filter").bounding_box()["y"] >= 0 and seen.page.locator("#play").bounding_box()["y"] >= 0
+    # A window that grows gets its sliders together again.
+    seen.page.set_viewport_size({"width": 1000, "height": 900})
+    seen.page.wait_for_function("document.querySelectorAll('#controls input').length === 6")
+    assert seen.errors == []
+
+
+def test_letters_follow_the_size_that_the_browser_is_set_to(browser, address):
+    size, sizes = "parseFloat(getComputedStyle(document.documentElement).fontSize)", {}
+    for points in (16, 24):
+        arguments = [*ARGUMENTS, f"--blink-settings=defaultFontSize={points}"]
+        other = browser.browser_type.launch(executable_path=find_browser(), args=arguments)
+        sizes[points] = Page(other, address).page.evaluate(size)
+        other.close()
+    assert sizes[24] > 1.2 * sizes[16]
 
 
 def test_the_numbers_are_those_of_the_package(browser, address):
@@ -400,3 +474,12 @@ def test_reduced_motion_steps_instead_of_playing(browser, address):
     seen.wait("time", 0.25)
     seen.page.wait_for_timeout(300)
     assert seen.places()["time"] == 0.25 and seen.places()["moving"]
+
+
+def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address):
+    seen = Page(browser, address, 1400)
+    seen.page.emulate_media(media="print")
+    assert seen.page.evaluate("[...document.querySelectorAll('form')].every(e => !e.getClientRects().length)")
+    # Chromium lays out a page of paper without painting anew; then a canvas must not be stretched.
+    fits = "[...document.querySelectorAll('canvas')].map(e => getComputedStyle(e).objectFit)"
+    assert set(seen.page.evaluate(fits)) == {"contain"}

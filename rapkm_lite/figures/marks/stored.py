@@ -55,6 +55,9 @@ def figure(picture: Picture, problem: str = "") -> Figure:
             frame = picture.frames[name]
             ax.set(**settings | {"xlim": frame[:2], "ylim": frame[2:]})
             ax.set_autoscale_on(False)
+            # As on the canvas, without ticks there are no axes.
+            if len(ax.get_xticks()) == 0:
+                ax.spines[:].set_visible(False)
         for mark in [*picture.fixed, *picture.marks]:
             _PAINT[mark.kind](axes[mark.panel], mark)
         if problem:
@@ -135,6 +138,8 @@ def _legend(ax, mark: Mark) -> None:
 def _scale(ax, mark: Mark) -> None:
     palette, label = mark.words
     ax.figure.colorbar(ScalarMappable(**palette.matplotlib()), ax=ax, shrink=0.85, pad=0.02, label=mathtext(label))
+    # The label belongs to these colours and not to the panel beside it.
+    ax.figure.get_layout_engine().set(wspace=0.06)
 
 
 _PAINT = {
