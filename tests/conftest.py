@@ -1,6 +1,6 @@
 """Where each test belongs: one group per test, chosen by its file, so that ``pytest -m fast`` is the inner loop.
 
-fast      textbook, control, simulation, checks of exercises, rooms: under a minute together
+fast      textbook, control, simulation, checks of exercises, rooms: a minute or two together
 slow      engine, studies, figures, explorers, types, the way of a new lesson
 notebook  cells and stored outputs of the lessons
 oracle    peer engines and symbolic derivations
