@@ -386,6 +386,18 @@ def test_friction_before_a_torque_sensor_biases_one_sided_rests_by_fc_over_KP():
     assert_allclose(rk.calibrate(FRICTIONLESS, log_behind_friction([1.0])).offset, OFFSET[:3], rtol=0, atol=1e-13)
 
 
+def test_small_torques_say_what_large_ones_say():
+    """Offsets and errors of angles have no unit of torque, whose errors weigh the rests against each other."""
+    log = log_behind_friction([1.0])
+    tiny = rk.Log("tiny", log.t, log.q_a, log.q_a_desired, 1e-12 * log.c)
+    found, same = (
+        rk.calibrate(FRICTIONLESS, given, use="torques", K_P=K_P) for given, K_P in ((log, 7.05), (tiny, 7.05e-12))
+    )
+    assert_allclose(same.offset, found.offset, rtol=0, atol=1e-12)
+    assert_allclose(same.K_P, 1e-12 * found.K_P, rtol=1e-12)
+    assert same.note.count("both sides") == 3
+
+
 def test_healthy_torques_are_not_accused_of_friction():
     for name in ("offset_a", "offset_b", "gain"):
         assert "both sides" not in rk.calibrate(TESTBED, rk.mystery_run(name), use="torques").note

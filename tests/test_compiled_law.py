@@ -182,6 +182,8 @@ def test_values():
         rk.compiled(ctc, at="pose")
     with pytest.raises(ValueError, match="memory = -1; allowed: >= 0"):
         rk.compiled(ctc, memory=-1)
+    with pytest.raises(ValueError, match=r"function = compiled\(pid, .*\); allowed: \(t, q_a, qd_a, d"):
+        rk.compiled(pid, memory=3)
 
 
 table = {"gain": 7.0}
@@ -234,6 +236,10 @@ def compared(t, q_a, qd_a, d):
     return q_a > d.q_a
 
 
+def by_name(t, q_a, qd_a, d, *, gain=7.0):
+    return -gain * (q_a - d.q_a)
+
+
 def square(t, q_a, qd_a, d):
     return np.zeros((3, 3))
 
@@ -247,6 +253,7 @@ REFUSED = {
     misspelt: "d has no qa, line # of test_compiled_law.py: return -7.0 * (q_a - d.qa)",
     twofold: "c is once a number and once an array, line # of test_compiled_law.py:",
     managed: 'such a with statement is not known here, line # of test_compiled_law.py: with np.errstate(all="ignore"):',
+    by_name: "arguments after * are not known here",
     square: "it returns an array with 2 dimensions",
     compared: "it returns truth values",
 }

@@ -42,6 +42,11 @@ def test_replace_carries_rods_along_and_keeps_given_inertias():
     assert not TESTBED.replace(mode=-1).same_kinematics(TESTBED)
     with pytest.raises(ValueError, match=r"unknown argument 'frictoin' \(did you mean 'friction'\?\); allowed: "):
         TESTBED.replace(frictoin=0.0)
+    square = [[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]]
+    with pytest.raises(
+        ValueError, match=r"base has 4 points; allowed: 3, or masses, .*friction, mode changed along with"
+    ):
+        TESTBED.replace(base=square, lengths=0.2)
 
 
 def test_arms_can_be_left_out():

@@ -58,6 +58,12 @@ def test_other_kinds_of_numbers_count_as_what_they_are():
         (lambda: rk.Sensors(encoder=1e30), r"encoder = 1e\+30; allowed: whole numbers >= 1, to 1000000000000"),
         (lambda: rk.circle(TESTBED, 0.05, 0.3, turns=100), r"turns = 100 in 0.3 s are up to 3.93 rad per sample; allo"),
         (lambda: rk.allocate_torques(A, [0.1, 0.0], 0.3, None, [1e60] * 3), r"prestress = .* so far beyond limit = "),
+        (lambda: rk.triangle(TESTBED, angle=1e99), r"angle = 1e\+99 rad; allowed: up to 1e6 rad"),
+        (
+            lambda: rk.Desired(1e99, *[[0.0, 0.0]] * 3, *[Q] * 3),
+            r"n_arms = 1e\+99; allowed: whole numbers >= 2, to 1000",
+        ),
+        (lambda: rk.SimulationError("now", "it stopped"), r"time = 'now' is not numeric; allowed: real numbers"),
         (lambda: rk.close_loops(TESTBED, Q + 0.1, 1e-30), r"tolerance = 1e-30 of the longest link; allowed: "),
         (lambda: plotting.plot_prestress_maps(rk.load("four_arms"), n=9), r"robot has 4 arms; allowed: 3, "),
         (lambda: plotting.plane_limits(TESTBED, -1.0), r"margin = -1; allowed: >= 0"),

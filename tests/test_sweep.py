@@ -223,6 +223,10 @@ def test_result_is_an_array_of_energies():
     assert repr(study).startswith("Sweep(3 runs, 0 failed, total energy ")
 
 
+CLOSED = ThreadPoolExecutor(1)
+CLOSED.shutdown()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -234,6 +238,7 @@ def test_result_is_an_array_of_energies():
         ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise', 'mask'"),
         ({"chunk": 0}, "chunk = 0; allowed: >= 1"),
         ({"executor": 3}, "executor = 3; allowed: an executor"),
+        ({"executor": CLOSED}, "executor = .*ThreadPoolExecutor.* was shut down; allowed: one that takes runs"),
         ({"encoder": -5}, "encoder = -5; allowed: >= 1"),
     ],
 )

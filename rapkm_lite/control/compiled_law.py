@@ -34,7 +34,7 @@ class CompiledLaw(LawValue):
     _unasked = UNASKED
 
     def __post_init__(self):
-        if not callable(self.function) or isinstance(self.function, type):
+        if not callable(self.function) or isinstance(self.function, type | LawValue):
             raise ValueError(f"function = {short(self.function)}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
         self._set(memory=_asked(self.at, self.memory))
         super().__post_init__()
@@ -126,6 +126,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     read only: Python refuses to write into them, compiled code does it, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
+    Where Python raises for plain numbers, as at 1.0 / 0.0 or math.sqrt(-1.0), compiled code goes on with infinity, NaN
+    or, for whole numbers, which have 64 bits there, with 0.
     Random numbers of `numpy.random` would be others in every run: noise belongs into an array, an entry per sample.
     It is compiled once in every session, in the first run, which takes some seconds: worth it for many runs.
     Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it

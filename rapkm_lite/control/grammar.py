@@ -103,6 +103,10 @@ class Function(Law):
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
 
+    def torque(self, model, q, qd, q_a, qd_a, desired):
+        given = f"law = {short(self.function)} is a function of time, which torque is not told"
+        raise NotImplementedError(f"{given}; needed: a law with a torque, or a run")
+
 
 def as_law(law) -> Law:
     """The law itself, or a callable in the grammar of a law; raises ValueError for anything else."""

@@ -20,6 +20,7 @@ _WORDS = (
     (r"Cannot unify (.+) and (.+) for '([^.'$]+)(?:\.\d+)?'", r"\3 is once \1 and once \2"),
     (r"unsupported NumPy function '([\w.]+)'", r"\1 is not known here"),
     (r"No implementation of function [^\0]*?>>> (.+)", r"\1 is not known here"),
+    (r"Cannot bind 'args=", "arguments after * are not known here"),
     (r"Unsupported context manager", "such a with statement is not known here"),
     (r"(?:Use of )?(.+ not supported yet|unsupported opcode \(\w+\))", r"\1"),
     (r"The decorated object is not a function", "it is not a function"),

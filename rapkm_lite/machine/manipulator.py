@@ -159,6 +159,10 @@ class Manipulator(Value):
         rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
         middles = np.array_equal(self.centers, self.lengths / 2)
         changes = ({"inertias": None} if rods else {}) | ({"centers": None} if middles else {}) | changes
+        points, N = len(_base_points(changes.get("base", self.base))), self.n_arms
+        kept = [k for k, v in self._fields().items() if np.ndim(v) and k not in ("gravity", *changes)]
+        if points != N and kept:
+            raise ValueError(f"base has {points} points; allowed: {N}, or {', '.join(kept)} changed along with it")
         return self._changed(**changes)
 
     def with_arms(self, arms) -> Manipulator:

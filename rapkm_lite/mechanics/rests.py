@@ -28,6 +28,11 @@ class Rests(NamedTuple):
     c_error: np.ndarray
     records: np.ndarray
 
+    @property
+    def weight(self) -> np.ndarray:
+        """One over the standard error, which is 1e-12 of the largest torque at least."""
+        return 1.0 / np.maximum(self.c_error, 1e-12 * (np.abs(self.c).max() or 1.0))
+
 
 class Gain(NamedTuple):
     """Gains (N,) N m/rad of PD drives as the rests show them, and their standard errors."""
@@ -67,7 +72,7 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
     """
     e, said = stand.q_a - stand.desired, []
     for i in range(e.shape[1]):
-        weight = 1.0 / np.maximum(stand.c_error[:, i], 1e-12)
+        weight = stand.weight[:, i]
         design = np.stack([e[:, i], np.ones(len(e))], axis=-1) * weight[:, None]
         information = design.T @ design
         if np.linalg.cond(information / np.sqrt(np.outer(*2 * [np.diagonal(information)]))) > 1e10:
@@ -85,7 +90,7 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
 def fitted_gain(stand: Rests) -> Gain | None:
     """K_P of c = -K_P (q_a - q_desired) over the rests, drive by drive; None where a drive shows no error."""
     e = stand.q_a - stand.desired
-    weight = 1.0 / np.maximum(stand.c_error, 1e-12) ** 2
+    weight = stand.weight**2
     information = (weight * e * e).sum(axis=0)
     if np.any(information == 0.0):
         return None

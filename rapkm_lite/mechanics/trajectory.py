@@ -33,7 +33,7 @@ class Desired(Value):
     qdd: np.ndarray
 
     def __post_init__(self):
-        N = whole_number("n_arms", self.n_arms, 2)
+        N = whole_number("n_arms", self.n_arms, 2, 10**6)
         self._set(n_arms=N, **{k: real_array(k, getattr(self, k), 2 * N if k[0] == "q" else 2) for k in _MOTION})
         check_leading(**{name: getattr(self, name).shape[:-1] for name in _MOTION})
         super().__post_init__()
@@ -146,13 +146,12 @@ class Trajectory(Desired):
         >>> bool(np.all(late.q_a[1:] == path.q_a[:-1])), late.x is path.x
         (True, True)
         """
-        k, N = len(self), self.n_arms
-        q_a = exact_array("q_a", q_a, k, N)
+        q_a, N = exact_array("q_a", q_a, len(self), self.n_arms), self.n_arms
         before = self._apart["q"][:, :N] if self._apart else 0.0
         if (apart := np.abs(q_a - self.q_a + before)).max() > np.pi:
             words = "away from the path; allowed: up to pi, on the turn of the path (np.unwrap(q_a, axis=0)), in rad"
             raise ValueError(f"q_a = {q_a.flat[apart.argmax()]:g} rad lies {apart.max():.3g} rad {words}")
-        qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, k, N)
+        qd_a = np.gradient(q_a, self.dt, axis=0) if qd_a is None else exact_array("qd_a", qd_a, *q_a.shape)
         q, qd = (np.hstack([new, old[:, N:]]) for new, old in ((q_a, self.q), (qd_a, self.qd)))
         return self._changed(q=q, qd=qd)
 
@@ -236,8 +235,10 @@ def triangle(
     Trajectory(5001 samples, 5 s, 'testbed')
     """
     manipulator(robot)
-    side = positive_number("side", side)
-    turned = exact_array("angle", angle) + np.deg2rad([210.0, 330.0, 90.0])
+    side, angle = positive_number("side", side), float(exact_array("angle", angle))
+    if abs(angle) > 1e6:
+        raise ValueError(f"angle = {angle:g} rad; allowed: up to 1e6 rad, beyond which corners would be rounded")
+    turned = angle + np.deg2rad([210.0, 330.0, 90.0])
     corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
     return _polygon(robot, corners, duration, dt, rest, {"side": side, "centre": centre, "angle": angle})
 
@@ -252,8 +253,7 @@ def circle(
     array([0.05, 0.  ])
     """
     manipulator(robot)
-    radius = positive_number("radius", radius)
-    t = sample_times(duration, dt)
+    radius, t = positive_number("radius", radius), sample_times(duration, dt)
     duration, middle = positive_number("duration", duration), exact_array("centre", centre, 2)[:, None]
     full = 2 * np.pi * slow_turns(t, turns)
 

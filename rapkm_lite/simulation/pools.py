@@ -21,6 +21,16 @@ def pool_of(executor: Executor | None, threads: int):
             pool.shutdown(cancel_futures=True)
 
 
+def handed(pool: Executor, *job) -> Future:
+    """`submit` of an executor; raises ValueError for one that was shut down."""
+    try:
+        return pool.submit(*job)
+    except RuntimeError as error:
+        if "after shutdown" not in str(error):
+            raise
+        raise ValueError(f"executor = {short(pool)} was shut down; allowed: one that takes runs") from error
+
+
 def answer(job: Future, first: int, setup, laws, offsets):
     """What `run_chunk` answers for the runs from `first` on.
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import matvec, real_array, short
+from ..machine.arguments import exact_array, matvec, real_array, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default, frozen
@@ -47,8 +47,9 @@ class SimulationError(RuntimeError):
     """
 
     def __init__(self, time: float, reason: str, partial: Run | None = None, run: int | None = None, sweep=None):
+        time = float(exact_array("time", time))
         super().__init__(f"{'' if run is None else f'run {run}: '}at t = {time:.4f} s {reason}")
-        self.time, self.reason, self.partial, self.run, self.sweep = float(time), reason, partial, run, sweep
+        self.time, self.reason, self.partial, self.run, self.sweep = time, reason, partial, run, sweep
 
     def __reduce__(self):
         cause = self.__cause__ if _picklable(self.__cause__) else None

@@ -19,7 +19,7 @@ from .explain import REASONS
 from .faults import FaultsLike
 from .loop import own_copy
 from .patience import progress_bar
-from .pools import answer, pool_of
+from .pools import answer, handed, pool_of
 from .runs import SimulationError, complete, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
@@ -98,7 +98,7 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
     jobs, errors = {}, {}
     try:
         for i, arguments in chunks.items():
-            jobs[i] = pool.submit(run_chunk, *arguments)
+            jobs[i] = handed(pool, run_chunk, *arguments)
         with progress_bar(len(jobs) if progress else 0) as advance:
             for i, job in jobs.items():
                 errors |= table.enter(i, *answer(job, i, *chunks[i]))
