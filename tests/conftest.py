@@ -1,6 +1,7 @@
 """Where each test belongs: one group per test, chosen by its file, so that ``pytest -m fast`` is the inner loop.
 
 fast      textbook, control, simulation, checks of exercises, rooms: a minute or two together
+long      of the same rooms, seconds each: many draws, many lost runs
 slow      engine, studies, figures, explorers, types, the way of a new lesson
 notebook  cells and stored outputs of the lessons
 oracle    peer engines and symbolic derivations
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 GROUPS = {
+    "long": ["test_causes", "test_self_calibration"],
     "slow": [
         "test_answers",
         "test_bench",
@@ -41,14 +43,24 @@ GROUPS = {
     "browser": ["test_lab", "test_lite", "test_stage", "test_start"],
 }
 # Longer than their file lets one expect.
-SLOW = {
+LONG = {
+    "test_a_corner_of_the_force_polygon_is_reached_exactly",
     "test_a_filter_multiplies_the_torques_of_switching_by_r_at_its_own_pose",
+    "test_a_pose_far_from_all_readings_is_the_same_in_both_loops",
+    "test_a_run_ends_at_the_sample_at_which_its_textbook_law_does",
     "test_blank_answers_are_not_yet",
+    "test_covariance_is_that_of_a_hundred_repetitions",
+    "test_every_pair_stays_inside_the_polygon_of_all",
+    "test_filter_finds_the_pose_of_drives_that_are_turns_behind",
     "test_integral_behind_the_filter_takes_up_the_leak",
+    "test_intervals_from_few_poses_cover_what_they_say",
     "test_lyapunov_function_falls_at_the_rate_of_the_damping",
+    "test_offsets_far_from_zero_are_found_or_refused",
     "test_rests_with_counts_are_no_rests_and_no_better_than_their_rounding",
+    "test_rounded_times_are_the_multiples_of_their_step",
     "test_runs_below_the_threshold_come_to_rest",
     "test_runs_without_a_place_of_rest_keep_moving",
+    "test_share_of_random_machines_with_a_common_sign",
     "test_switching_takes_the_best_pair_and_hysteresis_saves_switches",
     "test_three_best_places",
     "test_wrong_answers_fail_without_a_hint",
@@ -61,8 +73,8 @@ def group(item) -> str:
     """The group of a collected test."""
     if item.path.suffix == ".ipynb" or getattr(item, "originalname", "") in NOTEBOOK:
         return "notebook"
-    if getattr(item, "originalname", "") in SLOW:
-        return "slow"
+    if getattr(item, "originalname", "") in LONG:
+        return "long"
     return _GROUP.get(Path(item.path).stem, "fast")
 
 

@@ -1,8 +1,8 @@
 """Does a test notice when the code is wrong?  ``python -m tests.mutants [--count 200] [--seed 1] [--modules ...]``
 
 Draws places in the rooms mechanics, control and simulation, changes one thing at each (an operator, a comparison, a
-number, a sign, a truth value) in a copy of the package, and runs the fast tests that come by that line: which ones
-those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.  Words
+number, a sign, a truth value) in a copy of the package, and runs the fast and long tests that come by that line: which
+ones those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.  Words
 of errors and docstrings are left alone; changes that change nothing stand with their reason in ``equivalents.txt``.
 
 Exit status 1 when less than nine tenths of the changes that change something are noticed (``--least`` another share),
@@ -37,6 +37,7 @@ SWAPS = {
     ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
     ast.Is: ast.IsNot, ast.IsNot: ast.Is,
 }  # fmt: skip
+GROUPS = "fast or long"
 # What a test that checks the whole house needs besides: it does not read the rooms' code, or not quickly.
 LEFT_OUT = ("test_lessons", "test_storing", "test_nbgrader", "test_grader", "test_rooms", "test_docs", "test_package")
 
@@ -202,7 +203,7 @@ def inside(folder: Path, seconds: float, work) -> int:
 
 
 def tests_by_line(folder: Path, names) -> dict:
-    """Trace the fast tests once: their seconds and lines, without those that fail in an unchanged tree."""
+    """Trace the tests once: their seconds and lines, without those that fail in an unchanged tree."""
     place = folder / "seen.json"
     files = [str(p) for p in sorted((folder / "tests").glob("test_*.py")) if p.stem not in LEFT_OUT]
     files += [str(folder / "rapkm_lite" / room) for room in ROOMS]
@@ -213,13 +214,13 @@ def tests_by_line(folder: Path, names) -> dict:
 
         tracer = Tracer(folder)
         importlib.import_module("rapkm_lite")
-        pytest.main(["-n0", "-q", "-p", "no:cacheprovider", "-m", "fast", *files], plugins=[tracer])
+        pytest.main(["-n0", "-q", "-p", "no:cacheprovider", "-m", GROUPS, *files], plugins=[tracer])
         found = {"seen": tracer.seen(folder), "seconds": tracer.seconds, "failed": tracer.failed}
         place.write_text(json.dumps(found))
         return 0
 
     if inside(folder, 3600.0, work) != 0:
-        sys.exit("the fast tests could not be traced; allowed: a tree in which they run")
+        sys.exit("the fast and long tests could not be traced; allowed: a tree in which they run")
     return json.loads(place.read_text())
 
 
@@ -235,7 +236,7 @@ def killed(mutant: Mutant, folder: Path, found: dict) -> bool:
     def work(names):
         import pytest
 
-        return int(pytest.main(["-n0", "-q", "-x", "-p", "no:cacheprovider", "-m", "fast", *names]) != 0)
+        return int(pytest.main(["-n0", "-q", "-x", "-p", "no:cacheprovider", "-m", GROUPS, *names]) != 0)
 
     place = folder / mutant.module.relative_to(ROOT)
     original = place.read_text(encoding="utf-8")
