@@ -2,8 +2,9 @@
 
 Draws places in the rooms mechanics, control and simulation, changes one thing at each (an operator, a comparison, a
 number, a sign, a truth value) in a copy of the package, and runs the fast and long tests that come by that line: which
-ones those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.  Words
-of errors and docstrings are left alone; changes that change nothing stand with their reason in ``equivalents.txt``.
+ones those are is found once, by tracing them.  A change that no test notices survives, and is listed with its line.
+Words of errors and docstrings are left alone; changes that change nothing stand with their reason in
+``equivalents.txt``.
 
 Exit status 1 when less than nine tenths of the changes that change something are noticed (``--least`` another share),
 or when there were none.
