@@ -152,7 +152,7 @@ class Manipulator(Value):
 
         Inertias and centres of mass that were not given follow changed masses and lengths.  A machine of a class of
         yours stays one, and keeps what the class has set besides.
-        Raises ValueError for an unknown name.
+        Raises ValueError for an unknown name, and for another number of arms that does not go with what is kept.
         """
         for key in changes:
             known("argument", key, [f.name for f in dataclasses.fields(self)])
@@ -160,7 +160,8 @@ class Manipulator(Value):
         middles = np.array_equal(self.centers, self.lengths / 2)
         changes = ({"inertias": None} if rods else {}) | ({"centers": None} if middles else {}) | changes
         points, N = len(_base_points(changes.get("base", self.base))), self.n_arms
-        kept = [k for k, v in self._fields().items() if np.ndim(v) and k not in ("gravity", *changes)]
+        own = [f.name for f in dataclasses.fields(Manipulator) if f.name not in ("gravity", *changes)]
+        kept = [name for name in own if np.ndim(getattr(self, name))]
         if points != N and kept:
             raise ValueError(f"base has {points} points; allowed: {N}, or {', '.join(kept)} changed along with it")
         return self._changed(**changes)
