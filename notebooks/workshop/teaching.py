@@ -111,10 +111,11 @@ def mistakes_page() -> str:
         WRITTEN,
         "# What students get wrong\n",
         "For each exercise the mistakes that its check calls by their name. Besides these every check knows the",
-        "opposite sign, transposed answers, wrong units (factors 1000 and 180/π), rows or entries in another order, a",
-        "forgotten factor, another frame, and the complement of the right answer. Which of them a class makes most",
-        "often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says. The sentences stand",
-        "here as students read them in the notebook, in plain letters: A^T is the transpose, Gbar is $\\bar G$.\n",
+        "opposite sign, transposed answers, wrong units (factors 1000 and $180/\\pi$), rows or entries in another",
+        "order, a forgotten factor, another frame, and the complement of the right answer. Which of them a class",
+        "makes most often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says. The",
+        "sentences stand here as students read them in the notebook, in plain letters: A^T is the transpose, Gbar",
+        "is $\\bar G$.\n",
     ]
     for name, exercise in sorted(exercises().items()):
         points = f"{exercise.points:g} points"
