@@ -119,8 +119,40 @@ def test_numbers_of_the_exam():
     assert without == pytest.approx(4.5605) and with_filter == pytest.approx(2.2385)
     assert 1 - with_filter / without == pytest.approx(0.51, abs=0.005)
     said(20, "4.5605", "2.2385", "51 %")
-    assert (2e-3) ** 2 * (30e3 + 20e3 + 4e3) == pytest.approx(0.22, abs=0.005)
+    S = np.diag([30e3, 20e3, 4e3])
+    assert (2e-3) ** 2 * np.trace(S) == pytest.approx(0.22, abs=0.005) and np.linalg.cond(S) == pytest.approx(7.5)
     said(24, "0.22 J", "7.5")
+
+
+def test_numbers_of_items_on_counting_forces_and_offsets_that_hide():
+    """Items 1, 8, 13, 28 and 33."""
+    for name, numbers in (("testbed", [6, 4, 2, 3]), ("four_arms", [8, 6, 2, 4])):
+        machine = rk.load(name)
+        q = rk.inverse_kinematics(machine, [0.01, 0.02])
+        r, n = rk.constraint_jacobian(machine, q).shape
+        assert [n, r, rk.degree_of_freedom(machine, q), machine.n_arms] == numbers
+        said(1, f"N = {machine.n_arms}: {', '.join(map(str, numbers))}")
+    assert len(rk.working_modes(machine)) == 16
+    A = np.array([[5.0, 0.0], [0.0, 5.0], [5.0, 0.0]])
+    for rows, box in ((A, [0.4, 0.2]), (A[:2], [0.2, 0.2])):
+        np.testing.assert_allclose(np.abs(rk.force_polygon(rows, 0.04)).max(axis=0), box)
+    said(8, "0.4 N", "0.2 N", "±0.2 N")
+    centre = rk.control_matrix(rk.load(), rk.inverse_kinematics(rk.load(), [0.0, 0.0]))
+    np.testing.assert_allclose(rk.steady_state_torque(centre, 7.05, [5e-3, -5e-3, 0.0]), 0.0, atol=1e-15)
+    assert np.abs(rk.steady_state_error(centre, 7.05, [5e-3, -5e-3, 0.0])).max() == pytest.approx(5e-3)
+    said(13, "(5, −5, 0) mrad")
+    robot, turn = rk.load(), 2.4 * np.arange(24)
+    places = 0.03 * np.sqrt((np.arange(24) + 0.5) / 24)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    built = robot.replace(lengths=[[0.2002, 0.2], [0.2, 0.2], [0.2, 0.2]])
+    offset = np.array([4e-3, -2e-3, 5e-3])
+    found = rk.calibrate(robot, rk.inverse_kinematics(built, places)[:, :3] + offset)
+    assert 0.3e-3 < np.abs(found.offset - offset).min() < np.abs(found.offset - offset).max() < 1.5e-3
+    assert found.residual < 0.02e-3
+    said(28, "0.02 mrad", "about a milliradian")
+    limit, taken, held = 120.0, np.array([0.12, 0.15, 0.10]), np.array([60.0, -30.0, 80.0])
+    for room, force, drive in ((limit - np.abs(held), 400, 3), (np.full(3, limit), 800, 2)):
+        assert (room / taken).min() == pytest.approx(force) and np.argmin(room / taken) + 1 == drive
+        said(33, f"{force / 1000:g} N, by drive {drive}")
 
 
 def test_numbers_of_items_on_contradictions():
@@ -132,6 +164,8 @@ def test_numbers_of_items_on_contradictions():
         told = lesson07.set_points(robot, SimpleNamespace(x=line), lesson07.START, lesson07.END, shares)
         gaps.append(1e3 * lesson07.contradiction(robot, told, line).max())
     np.testing.assert_allclose(gaps, [1.7, 0.43, 0.11], atol=0.015)
+    leg = 1e3 * np.linalg.norm(lesson07.END - lesson07.START) / 16
+    assert leg == pytest.approx(15, abs=0.5) and leg * np.sqrt(0.05 / gaps[0]) == pytest.approx(2.6, abs=0.05)
     said(25, "1.7", "0.43", "0.11", "2.6 mm")
     A = rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
     np.testing.assert_allclose(-7.05 * rk.prestress_projector(A) @ [2e-3, 0, 0], -4.7e-3)

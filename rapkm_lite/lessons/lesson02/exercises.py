@@ -187,10 +187,12 @@ EXERCISES = {
         mistakes={
             "this is the other common point of the curves, a base joint: there the arm is folded, a corner of the "
             "workspace and not inside": lambda mode: load().base[tasks.odd(mode)],
-            "this is the midpoint of another side of the base triangle (order of the arms)": (
+            "this is the midpoint of another side of the base triangle, between the arm that bends the other way and "
+            "the first of the two that bend alike (order of the arms)": (
                 lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[0]]].mean(axis=0)
             ),
-            "this is the midpoint of another side of the base triangle, (order of the arms)": (
+            "this is the midpoint of another side of the base triangle, between the arm that bends the other way and "
+            "the second of the two that bend alike (order of the arms)": (
                 lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[1]]].mean(axis=0)
             ),
             "this is the sum of the two base points, not the point midway (a factor of 2)": (
