@@ -27,13 +27,7 @@ from ..mechanics.actuation import (
     redundant_control_matrix,
     weighted_pseudoinverse,
 )
-from ..mechanics.dynamics import (
-    coriolis_matrix,
-    generalized_forces,
-    mass_matrix,
-    minimal_dynamics,
-    redundant_dynamics,
-)
+from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matrix, minimal_dynamics, redundant_dynamics
 from ..mechanics.kinematics import ee_complement, forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import (
-    ConvergenceError,
-    check_leading,
-    matvec,
-    real_array,
-    small_number,
-    solve,
-    whole_number,
-)
+from ..machine.arguments import ConvergenceError, check_leading, matvec, real_array, small_number, solve, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
