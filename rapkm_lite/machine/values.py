@@ -76,7 +76,7 @@ def frozen(array) -> np.ndarray:
     array = np.asarray(array)
     if array.dtype.hasobject or _is_frozen(array):
         return array
-    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape) if array.size else _read_only(array)
+    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape)
 
 
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -120,12 +120,6 @@ def _is_frozen(array: np.ndarray) -> bool:
         root = root.base
     # NumPy leaves a large unpickled array writable, in spite of the bytes below it.
     return isinstance(root, bytes) and array.flags.c_contiguous and not array.flags.writeable
-
-
-def _read_only(array: np.ndarray) -> np.ndarray:
-    array = array.copy()
-    array.setflags(write=False)
-    return array
 
 
 def _frozen(value):
