@@ -179,17 +179,3 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
             f"allowed: {abs(l1 - l2):g} to {l1 + l2:g} m"
         )
     return q
-
-
-def ee_complement(robot: Manipulator, q) -> np.ndarray:
-    """F of (5) for the end-effector position as independent coordinates: qd = F xd, (..., 2N, 2) in rad/m.
-
-    Regular everywhere inside the workspace, in every working mode.
-    Raises ValueError where an arm is stretched or folded (boundary of the workspace).
-    """
-    return at(robot, q).F.copy()
-
-
-def ee_complement_dot(robot: Manipulator, q, qd) -> np.ndarray:
-    """dF/dt of `ee_complement` along qd, (..., 2N, 2) in rad/(m s)."""
-    return at(robot, q, given(qd)).F_dot.copy()

@@ -10,8 +10,9 @@ import numpy as np
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from .actuation import distal_cross_products, drive_pairs
+from .at import at
 from .cores import prestress_shares
-from .kinematics import ee_complement, inverse_kinematics
+from .kinematics import inverse_kinematics
 from .linalg import singular_values
 from .partition import PARTITION_RULES
 
@@ -123,13 +124,13 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
 
 def _redundant_rows(robot: Manipulator, q: np.ndarray) -> np.ndarray:
     """A~ = A (F^T F)^-1 F^T without a decomposition of J, (..., m, 2N)."""
-    F = ee_complement(robot, q)
+    F = at(robot, q).F
     return F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
 
 
 def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
     """Smallest singular value of the rows of A~, which are those of A L^-T with the Cholesky factor F^T F = L L^T."""
-    F = ee_complement(robot, q)
+    F = at(robot, q).F
     f, g = F[..., 0], F[..., 1]
     l11 = np.sqrt((f * f).sum(-1))
     l21 = (f * g).sum(-1) / l11
@@ -141,7 +142,7 @@ def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
 
 
 def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    sigma = singular_values(ee_complement(robot, q)[..., drives, :])
+    sigma = singular_values(at(robot, q).F[..., drives, :])
     return np.divide(sigma[..., 0], sigma[..., 1], out=np.full(sigma.shape[:-1], np.inf), where=sigma[..., 1] > 0)
 
 
@@ -154,7 +155,7 @@ def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} arms, which cannot prestress each other; allowed: 3 or more")
     # At an input singularity every prestress is free: no direction, so the point is masked.
-    return np.moveaxis(prestress_shares(ee_complement(robot, q)[..., : robot.n_arms, :]), -1, 0)
+    return np.moveaxis(prestress_shares(at(robot, q).A), -1, 0)
 
 
 _MEASURES = {"sigma_min": _sigma_min, "condition": _condition, "cross": _cross, "prestress": _prestress}

@@ -16,7 +16,8 @@ from ..machine.arguments import exact_array, matvec, real_array, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default, frozen
-from ..mechanics.kinematics import ee_complement, inverse_kinematics
+from ..mechanics.at import at
+from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
 from .energy import electric_energy
@@ -119,7 +120,7 @@ class Run(Value):
     @cached_property
     def qd(self) -> np.ndarray:
         """All joint rates (k, 2N), rad/s."""
-        return frozen(matvec(ee_complement(self.robot, self.q), self.xd))
+        return frozen(matvec(at(self.robot, self.q).F, self.xd))
 
     @property
     def dt(self) -> float:
