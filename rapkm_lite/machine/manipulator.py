@@ -120,16 +120,9 @@ class Manipulator(Value):
         """
         (l1, l2), (m1, m2), (c1, c2), (i1, i2) = (v.T for v in (self.lengths, self.masses, self.centers, self.inertias))
         load = self._load_per_arm
-        return frozen(
-            np.stack(
-                [
-                    i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia,
-                    i2 + m2 * c2**2 + load * l2**2,
-                    l1 * (m2 * c2 + load * l2),
-                ],
-                axis=-1,
-            )
-        )
+        proximal = i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia
+        distal, coupling = i2 + m2 * c2**2 + load * l2**2, l1 * (m2 * c2 + load * l2)
+        return frozen(np.stack([proximal, distal, coupling], axis=-1))
 
     @cached_property
     def arm_moments(self) -> np.ndarray:
