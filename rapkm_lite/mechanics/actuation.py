@@ -22,8 +22,7 @@ from ..machine.arguments import (
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores, linalg
 from .at import at
-from .kinematics import cross
-from .linalg import many_inverses, product
+from .linalg import many_inverses, minors, product
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -118,9 +117,7 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
     >>> rk.distal_cross_products(robot, q).round(3)
     array([ 0.96 , -0.969,  0.507])
     """
-    d = at(robot, q).d / robot.lengths[:, 1:]
-    j, k = np.triu_indices(robot.n_arms, 1)
-    return cross(d[..., j, :], d[..., k, :])
+    return minors(at(robot, q).d / robot.lengths[:, 1:])
 
 
 def singular_values(A) -> np.ndarray:

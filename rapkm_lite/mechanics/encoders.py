@@ -18,6 +18,7 @@ from . import cores
 from .at import At, at
 from .closure import estimate_pose, misfit
 from .kinematics import cross, unit_vector
+from .linalg import minors
 
 
 def unknown_names(N: int) -> tuple[str, ...]:
@@ -98,8 +99,7 @@ def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndar
     Raises ValueError for angles that fit no pose.
     """
     pose = at(robot, poses(robot, angles))
-    i, j = np.triu_indices(robot.n_arms, 1)
-    side = cross(pose.d[:, i], pose.d[:, j]).T
+    side = minors(pose.d).T
     across = np.concatenate([side < 0.0, side > 0.0])
     second = np.where(across, _fit(robot, angles, _crossings(robot, angles)), np.inf)
     # With residuals r at a pose, those at the crossing of the pair S of largest |det A_S| are r - A A_S^-1 r_S to first
