@@ -86,18 +86,13 @@ def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _spectrum(A1: np.ndarray) -> np.ndarray:
-    """Singular values of the rows A~_1 (..., delta, n), largest first."""
-    return singular_values(A1.mT)
-
-
 def _inverse_condition(A1: np.ndarray) -> np.ndarray:
-    sigma = _spectrum(A1)
+    sigma = singular_values(A1.mT)
     return sigma[..., -1] / np.maximum(sigma[..., 0], 1e-300)
 
 
 PARTITION_RULES = {
-    "sigma_min": lambda A1: _spectrum(A1)[..., -1],
+    "sigma_min": lambda A1: singular_values(A1.mT)[..., -1],
     "condition": _inverse_condition,
     "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
 }
