@@ -81,22 +81,13 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
         code = code if law.projected else f"{code}_LINE2"
         return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
-    (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
-    run = {
-        "PAIR_P1": p1,
-        "PAIR_P2": p2,
-        "PAIR_D1": d1,
-        "PAIR_D2": d2,
-        "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
-        "JOINT_J": -1.0,
-        "JOINT_K": -1.0,
-    }
-    independent = getattr(law, "independent", None)
-    if independent is not None:
-        if max(independent) >= 2 * N:
-            raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
-        run |= {"JOINT_J": float(independent[0]), "JOINT_K": float(independent[1])}
-    return code, {}, run
+    gains = *_per("K_P", law.K_P, 2), *_per("K_D", law.K_D, 2)
+    joints = getattr(law, "independent", None) or (-1, -1)
+    if max(joints) >= 2 * N:
+        raise ValueError(f"independent = {joints}; allowed: joint indices from 0 to {2 * N - 1}")
+    rows = "PAIR_P1", "PAIR_P2", "PAIR_D1", "PAIR_D2", "HYSTERESIS", "JOINT_J", "JOINT_K"
+    values = *gains, getattr(law, "hysteresis", 1.0), *joints
+    return code, {}, dict(zip(rows, map(float, values), strict=True))
 
 
 def _per(name: str, value, size: int) -> np.ndarray:
