@@ -88,7 +88,7 @@ def read_log(source: str | Path) -> Log:
     while lines and not lines[-1]:
         lines.pop()
     header, N = _names(path, header)
-    table = _table(path, header, lines)
+    table = np.array([_numbers(path, header, number, line) for number, line in enumerate(lines, 2)])
     if len(table) == 0:
         raise ValueError(f"the log {path.name!r} has no record; allowed: one line or more below the header")
     t, q_a, q_a_desired, c = np.split(table, [1, 1 + N, 1 + 2 * N], axis=1)
@@ -151,26 +151,15 @@ def _names(path: Path, header: list[str]) -> tuple[list[str], int]:
     return header, N
 
 
-def _table(path: Path, header: list[str], lines: list[list[str]]) -> np.ndarray:
-    """All numbers of a log; one by one only where something is wrong, to say what and where."""
-    try:
-        table = np.array(lines, dtype=float)
-        # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
-        plain = not any("_" in text for line in lines for text in line)
-        if plain and table.shape[1:] == (len(header),) and np.abs(table).max() < 1e100:
-            return table
-    except ValueError:
-        pass
-    return np.array([_numbers(path, header, number, line) for number, line in enumerate(lines, 2)])
-
-
 def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> list[float]:
+    """The numbers of a line; raises ValueError with the column of what is none."""
     if len(line) != len(header):
         raise ValueError(f"the log {path.name!r}, line {number} has {len(line)} columns; allowed: {len(header)}")
     row = []
     for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
         try:
             row.append(float(text))
+            # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
             fine = abs(row[-1]) < 1e100 and "_" not in text
         except ValueError:
             fine = False
