@@ -20,7 +20,7 @@ from ..mechanics.at import at
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
-from .energy import electric_energy
+from .energy import copper_loss, mechanical_work
 from .explain import explain
 from .faults import Fault, FaultsLike, check_faults, fault_table
 from .loop import again_in_python, closed_loop, own_copy
@@ -135,7 +135,7 @@ class Run(Value):
     @property
     def energy(self) -> np.ndarray:
         """Electric energy per drive (N,) in J, regenerative: sum over the holds of R (c/k_t)^2 dt + c (q_k+1 - q_k)."""
-        return electric_energy(self)
+        return copper_loss(self.robot, self.c[:-1], self.dt) + mechanical_work(self)
 
     @property
     def error(self) -> np.ndarray:
