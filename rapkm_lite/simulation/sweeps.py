@@ -60,7 +60,11 @@ def sweep(
     (2, 3)
     """
     manipulator(robot)
-    chunk = _check_options(failed, chunk, executor, progress)
+    one_of("failed", failed, ("raise", "mask"))
+    if executor is not None:
+        having("executor", executor, "an executor of concurrent.futures", "submit")
+    switch("progress", progress)
+    chunk = whole_number("chunk", chunk, 1)
     given, laws, offsets = _rows(law, offsets, robot.n_arms)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
     in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup) is None]
@@ -80,14 +84,6 @@ def sweep(
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
         _raise(i, errors.get(i), own, laws[i], result)
     return result
-
-
-def _check_options(failed, chunk, executor, progress) -> int:
-    one_of("failed", failed, ("raise", "mask"))
-    if executor is not None:
-        having("executor", executor, "an executor of concurrent.futures", "submit")
-    switch("progress", progress)
-    return whole_number("chunk", chunk, 1)
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
