@@ -50,9 +50,8 @@ class Experiment(Value):
 
     def run(self, law=None) -> Run:
         """Simulate it, by default with its own law."""
-        return simulate(
-            self.robot, self.law if law is None else law, self.trajectory, sensors=self.sensors, faults=self.faults
-        )
+        law = self.law if law is None else law
+        return simulate(self.robot, law, self.trajectory, sensors=self.sensors, faults=self.faults)
 
 
 def experiment(source="testbed") -> Experiment:
