@@ -170,9 +170,8 @@ class At(Value):
         if self.independent is not None:
             return cores.joint_complement_dot(self.J, self.J_dot, self.F, self.independent)
         tree = self.robot.tree
-        return cores.complement(
-            tree, cores.over_lever_dot(tree, self._v, self._levers, self._over, self._rates, self.qd)
-        )
+        over_dot = cores.over_lever_dot(tree, self._v, self._levers, self._over, self._rates, self.qd)
+        return cores.complement(tree, over_dot)
 
     @quantity
     def A(self) -> np.ndarray:
