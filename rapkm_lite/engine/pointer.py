@@ -100,14 +100,8 @@ def pointer(function, N: int, matrices: bool, memory: int):
         for i in range(N):
             buffer[answer + i] = np.nan
         try:
-            c = ask(
-                buffer[0],
-                buffer[1 : 1 + N],
-                buffer[1 + N : 1 + 2 * N],
-                wanted(buffer),
-                at_hand(buffer),
-                buffer[kept : kept + memory],
-            )
+            q_a, qd_a, own = buffer[1 : 1 + N], buffer[1 + N : 1 + 2 * N], buffer[kept : kept + memory]
+            c = ask(buffer[0], q_a, qd_a, wanted(buffer), at_hand(buffer), own)
             for i in range(N):
                 # An answer of another length is none.
                 buffer[answer + i] = c[i] if len(c) == N else np.nan
