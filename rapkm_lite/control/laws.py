@@ -80,12 +80,8 @@ class PID(LawValue):
     _unasked = UNASKED
 
     def __post_init__(self):
-        self._set(
-            K_P=gain("K_P", self.K_P),
-            K_I=gain("K_I", self.K_I, zero=True),
-            K_D=gain("K_D", self.K_D),
-            limit=torque_limit(self.limit),
-        )
+        self._set(K_P=gain("K_P", self.K_P), K_I=gain("K_I", self.K_I, zero=True), K_D=gain("K_D", self.K_D))
+        self._set(limit=torque_limit(self.limit))
         super().__post_init__()
 
     def start(self, model, dt):
