@@ -24,7 +24,7 @@ import copy
 import ctypes
 import dataclasses
 import itertools
-from functools import cached_property
+from functools import cache, cached_property
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
@@ -242,14 +242,10 @@ _KINDS = ("Manipulator", "Trajectory", "Sensors", "PD", "str")
 _CACHES = ("_hash", "_tables", "_codes")
 """What is kept beside the fields and belongs to no value."""
 
-_known_names: dict[type, tuple[str, ...]] = {}
 
-
+@cache
 def _names(cls: type) -> tuple[str, ...]:
-    if cls not in _known_names:
-        fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
-        _known_names[cls] = tuple(field.name for field in fields)
-    return _known_names[cls]
+    return tuple(field.name for field in dataclasses.fields(cls)) if dataclasses.is_dataclass(cls) else ()
 
 
 def _typed(value) -> str:
