@@ -43,7 +43,6 @@ _FORMS = {
     RedundantAPD: "REDUNDANT_APD",
     RedundantCTC: "REDUNDANT_CTC",
 }
-_ZERO = np.zeros(())
 _FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
 
 
@@ -63,7 +62,7 @@ def code_of(law: Any, model) -> Code | None:
         return None
     if type(law) is CompiledLaw:
         code, drives, run, user = "USER", {}, {}, law
-    elif type(law) in _FORMS and not any(getattr(law, name, _ZERO).ndim > 1 for name in ("K_P", "K_D", "K_I")):
+    elif type(law) in _FORMS and not any(np.ndim(getattr(law, name, 0.0)) > 1 for name in ("K_P", "K_D", "K_I")):
         (code, drives, run), user = _gains(law, model.n_arms), None
     else:
         return None
