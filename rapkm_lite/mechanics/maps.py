@@ -100,7 +100,9 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     if rule == "cross":
         merit = np.abs(distal_cross_products(robot, q))
     else:
-        A_tilde = _redundant_rows(robot, q)
+        # A~ = A (F^T F)^-1 F^T, without a decomposition of J.
+        F = at(robot, q).F
+        A_tilde = F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
         merit = [PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)]
         merit = np.stack(merit, axis=-1)
     return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
@@ -120,12 +122,6 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
     bad = ~(values <= limit)
     grid[..., inside], mask[..., inside] = np.where(bad, 0, values), bad
     return np.ma.array(grid, mask=mask)
-
-
-def _redundant_rows(robot: Manipulator, q: np.ndarray) -> np.ndarray:
-    """A~ = A (F^T F)^-1 F^T without a decomposition of J, (..., m, 2N)."""
-    F = at(robot, q).F
-    return F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
 
 
 def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
