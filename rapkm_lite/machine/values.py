@@ -104,16 +104,6 @@ _writable.restype, _writable.argtypes = ctypes.py_object, (ctypes.c_char_p, ctyp
 _WRITE = 0x200
 
 
-def all_frozen(arrays: list[np.ndarray]) -> list[np.ndarray]:
-    """`frozen` copies of arrays; the list is emptied on the way, so that of minutes no two columns stand twice.
-
-    >>> [float(array.sum()) for array in all_frozen([np.zeros(3), np.ones(3)])]
-    [0.0, 3.0]
-    """
-    arrays.reverse()
-    return [frozen(arrays.pop()) for _ in range(len(arrays))]
-
-
 def _is_frozen(array: np.ndarray) -> bool:
     root = array
     while isinstance(root, np.ndarray):
