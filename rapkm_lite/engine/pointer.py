@@ -23,7 +23,7 @@ def matrix_room(N: int) -> int:
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
     """Where the buffer of `engine.user` holds memory and answer, and its length."""
-    start = 7 + 8 * N + 6 * N + (matrix_room(N) if matrices else 0)
+    start = 7 + 8 * N + (matrix_room(N) if matrices else 0)
     return start, start + memory, start + memory + N
 
 
