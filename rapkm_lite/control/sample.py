@@ -33,7 +33,7 @@ class Sample:
     """What a controller knows at one instant.
 
     t, dt : time and sampling time, s.  model : the controller's own manipulator.
-    q_a, qd_a : measured base angles and rates (N,), rad and rad/s, read-only.  desired : the desired motion.
+    q_a, qd_a : measured base angles and rates (N,), rad and rad/s, in a run read-only.  desired : the desired motion.
 
     >>> import rapkm_lite as rk
     >>> class Push(rk.Law):
@@ -70,7 +70,7 @@ class Sample:
 
         The base angles of q are on the turn of the measured ones, of the true pose on that of the desired ones.
         source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
-        Raises ConvergenceError when the measured angles fit no pose.
+        Raises ConvergenceError when the measured angles fit no pose, ValueError where the true motion was not told.
         """
         if source is None:
             return None, None

@@ -63,7 +63,8 @@ def default(value: Any) -> Any:
 def frozen(array) -> np.ndarray:
     """A copy of an array that nobody can write into, and that no ``setflags`` makes writable again.
 
-    The numbers lie in an object of type bytes.  An array that came from here is returned as it is.
+    The numbers lie in an object of type bytes.  An array that came from here, or that holds objects, is returned as it
+    is.
 
     >>> frozen([1.0, 2.0])[0] = 3.0
     Traceback (most recent call last):

@@ -57,6 +57,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 
     Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
     chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
+    Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(rk.degree_of_actuation(robot, q))
@@ -74,6 +75,7 @@ def actuation_type(robot: Manipulator, q):
     redundantly (m > alpha) or non-redundantly actuated (m = alpha).  A pose with alpha < 2 is both underactuated and
     redundantly actuated, since m >= 2: redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
+    Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.actuation_type(robot, q)

@@ -152,7 +152,7 @@ def working_mode(robot: Manipulator, q) -> np.ndarray:
 
 
 def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
-    """Joint angles (..., 2N) in rad, in (-pi, pi], of the end-effector position x (..., 2) in m.
+    """Joint angles (..., 2N) in rad, in [-pi, pi], of the end-effector position x (..., 2) in m.
 
     mode : (..., N) signs of the elbow angles; default ``robot.mode``.
     Raises ValueError naming the point, the arm and its reach when the point lies outside the workspace.

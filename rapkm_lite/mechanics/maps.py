@@ -33,7 +33,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     """Sample positions x (n,), y (n,) in m, and inside (n, n): True where every arm reaches (x[j], y[i]) with a bend.
 
     box : (x_min, x_max, y_min, y_max) in m; default `sampling_box`.
-    Raises ValueError for an empty box or fewer than two samples.
+    Raises ValueError for an empty box, fewer than two samples or more than 5000.
 
     >>> import rapkm_lite as rk
     >>> x, y, inside = rk.workspace_grid(rk.load(), n=20)
@@ -57,7 +57,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
 def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: int = 200, box=None, pair=None):
     """An actuation measure over the workspace: x (n,), y (n,) in m and a masked array (..., n, n), rows along y.
 
-    measure : "sigma_min", the smallest singular value of A~ (10), between 0 and 1, zero at input singularities;
+    measure : "sigma_min", the smallest singular value of A~, 0 to 1, zero at input singularities, where (10) drops;
         "condition", the condition number of A in end-effector coordinates, 1 where the drives act alike in all
         directions, masked where it exceeds 1e12; "cross", the largest |d_j x d_k| of all pairs; "prestress", the
         largest share |n_i| of each drive in a unit prestress, A^T n = 0, on a leading axis of length N >= 3: for three

@@ -21,7 +21,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     regular A~_1 gives the same result.
     A_tilde : (..., m, n).  rows : the delta row indices of A~_1, (delta,) or (..., delta), with delta the rank of A~,
     which is 2 for every `Manipulator`.
-    Raises ValueError where A~_1 has lost rank.
+    Raises ValueError where A~_1 has lost rank, or has fewer rows than the rank of A~.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.redundant_control_matrix(robot, q)
@@ -109,6 +109,7 @@ def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.n
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
     delta : how many, the rank of A~; 2 for the machines of `Manipulator`.
+    Raises ValueError for another rule, and for more rows than there are.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.select_independent(rk.redundant_control_matrix(robot, q))

@@ -39,7 +39,7 @@ class Experiment(Value):
 
     @property
     def offset(self) -> np.ndarray:
-        """Calibration offsets (N,), rad."""
+        """Calibration offsets in rad, (N,) or one number, as `sensors` holds them."""
         return self.sensors.offset
 
     @property
