@@ -1,13 +1,7 @@
 """Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel."""
 
 from .control.compiled_law import CompiledLaw, compiled
-from .control.computed_torque import (
-    APD,
-    CTC,
-    RedundantAPD,
-    RedundantCTC,
-    SwitchedCTC,
-)
+from .control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from .control.grammar import Law
 from .control.laws import PD, PID, AntagonismFilter, CommandFilter
 from .control.sample import Controller, Sample
@@ -73,14 +67,7 @@ from .mechanics.kinematics import (
     working_modes,
 )
 from .mechanics.maps import actuation_map, sampling_box, switching_map, workspace_grid
-from .mechanics.matrices import (
-    complement,
-    complement_dot,
-    minimal_terms,
-    projector,
-    projector_dot,
-    redundant_terms,
-)
+from .mechanics.matrices import complement, complement_dot, minimal_terms, projector, projector_dot, redundant_terms
 from .mechanics.mjcf import to_mjcf
 from .mechanics.partition import explicit_pseudoinverse, select_independent
 from .mechanics.redundancy import allocate_torques, endeffector_stiffness, minimax_torques

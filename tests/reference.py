@@ -4,13 +4,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
-from rapkm_lite.mechanics.kinematics import ee_complement
 
 
 def acceleration(robot, x, xd, c):
     """End-effector acceleration under the drive torques c, from (6) and (7)."""
     q = rk.inverse_kinematics(robot, x)
-    at = rk.at(robot, q, ee_complement(robot, q) @ xd)
+    at = rk.at(robot, q, rk.orthogonal_complement(robot, q) @ xd)
     G, C, Q = at.minimal
     return np.linalg.solve(G, at.A.T @ c - C @ xd - Q)
 
@@ -30,7 +29,7 @@ def reference(robot, law, trajectory, offset, model=None, samples=None, method="
 
     for k, t in enumerate(trajectory.t[:samples]):
         q = rk.inverse_kinematics(robot, state[:2])
-        qd = ee_complement(robot, q) @ state[2:]
+        qd = rk.orthogonal_complement(robot, q) @ state[2:]
         # Angles near the desired ones, without a jump at +-pi.
         q_a = q[:N] + 2 * np.pi * np.round((trajectory.q_a[k] - q[:N]) / (2 * np.pi))
         c = controller(t, q_a + offset, qd[:N], trajectory[k], truth=(state[:2], state[2:]))

@@ -27,14 +27,9 @@ from ..mechanics.actuation import (
     redundant_control_matrix,
     weighted_pseudoinverse,
 )
-from ..mechanics.dynamics import (
-    coriolis_matrix,
-    generalized_forces,
-    mass_matrix,
-    minimal_dynamics,
-    redundant_dynamics,
-)
-from ..mechanics.kinematics import ee_complement, forward_kinematics
+from ..mechanics.at import at
+from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matrix, minimal_dynamics, redundant_dynamics
+from ..mechanics.kinematics import forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
 from .grammar import UNASKED, LawValue, gain, joint_gain, measured, seen
@@ -78,7 +73,7 @@ class APD(LawValue):
         state = _joint_state(model, q, qd, q_a, qd_a, desired)
         qd = np.asarray(qd, dtype=float)
         if self.independent is None:
-            xd = matvec(np.linalg.pinv(ee_complement(model, q)), qd)
+            xd = matvec(np.linalg.pinv(at(model, q).F), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
             return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
         j = list(joint_indices("independent", self.independent, model.n_joints))

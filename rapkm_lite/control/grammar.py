@@ -96,9 +96,7 @@ class Function(Law):
 
     def start(self, model, dt):
         """A function that cannot be called so is refused before the run."""
-        given = "t", "q_a", "qd_a", "desired"
-        callable_with("law", self.function, *given)
-        in_order("law", self.function, *given)
+        in_order("law", self.function, "t", "q_a", "qd_a", "desired")
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
@@ -128,13 +126,13 @@ def begin(law, model: Manipulator, dt: float):
     _check_asked(type(law))
     for name, given in _METHODS.items():
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
-            callable_with(f"law.{name}", getattr(law, name), *given)
             in_order(f"law.{name}", getattr(law, name), *given)
     return law.start(model, dt)
 
 
 def in_order(name: str, function, *given: str) -> None:
-    """Raise ValueError where a function has the names of its arguments in another order; it gets them by position."""
+    """Raise ValueError where a function does not take these arguments by position, or has them in another order."""
+    callable_with(name, function, *given)
     try:
         parameters = inspect.signature(function, follow_wrapped=False).parameters.values()
         told = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]

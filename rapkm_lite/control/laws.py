@@ -80,12 +80,8 @@ class PID(LawValue):
     _unasked = UNASKED
 
     def __post_init__(self):
-        self._set(
-            K_P=gain("K_P", self.K_P),
-            K_I=gain("K_I", self.K_I, zero=True),
-            K_D=gain("K_D", self.K_D),
-            limit=torque_limit(self.limit),
-        )
+        self._set(K_P=gain("K_P", self.K_P), K_I=gain("K_I", self.K_I, zero=True), K_D=gain("K_D", self.K_D))
+        self._set(limit=torque_limit(self.limit))
         super().__post_init__()
 
     def start(self, model, dt):
@@ -208,7 +204,6 @@ class CommandFilter(LawValue):
         return q_a - matvec(command_filter(A, self.law.K_P), e), qd_a - matvec(command_filter(A, self.law.K_D), ed)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        q_a, qd_a = measured(model, q_a, qd_a, desired)
-        K_P, K_D = self.law.gains(model.n_arms)
         q_c, qd_c = self.commands(model, q, q_a, qd_a, desired)
+        K_P, K_D = self.law.gains(model.n_arms)
         return -matvec(K_P, q_a - q_c) - matvec(K_D, qd_a - qd_c)

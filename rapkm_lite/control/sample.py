@@ -20,18 +20,20 @@ class NoPose(ConvergenceError):
     """The measured base angles fit no pose of the controller's model."""
 
 
-def one_instant(model, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarray]:
-    """`measured`, without leading axes."""
+def one_instant(model, t, q_a, qd_a, desired, truth) -> tuple:
+    """The same, checked: `measured`, without leading axes."""
     q_a, qd_a = measured(model, q_a, qd_a, desired)
     exact_array("desired.q", desired.q, model.n_joints)
-    return exact_array("q_a", q_a, model.n_arms), exact_array("qd_a", qd_a, model.n_arms)
+    q_a, qd_a = exact_array("q_a", q_a, model.n_arms), exact_array("qd_a", qd_a, model.n_arms)
+    truth = None if truth is None else exact_array("truth", truth, 2, 2)
+    return float(exact_array("t", t)), q_a, qd_a, desired, truth
 
 
 class Sample:
     """What a controller knows at one instant.
 
     t, dt : time and sampling time, s.  model : the controller's own manipulator.
-    q_a, qd_a : measured base angles and rates (N,), rad and rad/s, read-only.  desired : the desired motion.
+    q_a, qd_a : measured base angles and rates (N,), rad and rad/s, in a run read-only.  desired : the desired motion.
 
     >>> import rapkm_lite as rk
     >>> class Push(rk.Law):
@@ -45,10 +47,7 @@ class Sample:
 
     def __init__(self, keeper: Controller, t: float, q_a, qd_a, desired: Desired, truth=None):
         of_kind("keeper", keeper, Controller, "the Controller that makes the samples")
-        q_a, qd_a = one_instant(keeper.model, q_a, qd_a, desired)
-        if truth is not None:
-            truth = exact_array("truth", truth, 2, 2)
-        self._fill(keeper, float(exact_array("t", t)), q_a, qd_a, desired, truth)
+        self._fill(keeper, *one_instant(keeper.model, t, q_a, qd_a, desired, truth))
 
     @classmethod
     def _made(cls, *known) -> Sample:
@@ -71,7 +70,7 @@ class Sample:
 
         The base angles of q are on the turn of the measured ones, of the true pose on that of the desired ones.
         source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
-        Raises ConvergenceError when the measured angles fit no pose.
+        Raises ConvergenceError when the measured angles fit no pose, ValueError where the true motion was not told.
         """
         if source is None:
             return None, None
@@ -136,11 +135,7 @@ class Controller:
         return coordinates(self.law, self.memory)
 
     def __call__(self, t, q_a, qd_a, desired: Desired, truth=None) -> np.ndarray:
-        q_a, qd_a = one_instant(self.model, q_a, qd_a, desired)
-        t = float(exact_array("t", t))
-        if truth is not None:
-            truth = exact_array("truth", truth, 2, 2)
-        return self.command(t, q_a, qd_a, desired, truth)
+        return self.command(*one_instant(self.model, t, q_a, qd_a, desired, truth))
 
     def command(self, t, q_a, qd_a, desired, truth=None) -> np.ndarray:
         """The same without a check of the measurement."""

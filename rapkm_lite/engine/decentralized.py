@@ -19,12 +19,8 @@ def proportional(lanes, arms, w):
     P = len(arms) * len(lanes)
     if P == 4:
         # Read before anything is written, as one vector.
-        w[C * P], w[C * P + 1], w[C * P + 2], w[C * P + 3] = (
-            torque(w, 0, P),
-            torque(w, 1, P),
-            torque(w, 2, P),
-            torque(w, 3, P),
-        )
+        c0, c1, c2, c3 = torque(w, 0, P), torque(w, 1, P), torque(w, 2, P), torque(w, 3, P)
+        w[C * P], w[C * P + 1], w[C * P + 2], w[C * P + 3] = c0, c1, c2, c3
     else:
         for p in range(P):
             w[C * P + p] = torque(w, p, P)
@@ -49,12 +45,8 @@ def force_filter(lanes, drives, arms, w):
     for j in range(L):
         m11 = m12 = m22 = fx = fy = -0.0
         for i in range(N):
-            a1, a2, c, ease = (
-                w[at(A1, i, j, W, L)],
-                w[at(A2, i, j, W, L)],
-                w[at(C, i, j, W, L)],
-                w[at(EASE, i, j, W, L)],
-            )
+            a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
+            c, ease = w[at(C, i, j, W, L)], w[at(EASE, i, j, W, L)]
             m11, m12, m22 = m11 + ease * a1 * a1, m12 + ease * a1 * a2, m22 + ease * a2 * a2
             fx, fy = fx + a1 * c, fy + a2 * c
         gx, gy = solve_regular(m11, m12, m22, fx, fy)
@@ -69,12 +61,8 @@ def command_filter(lanes, drives, arms, w):
     for j in range(L):
         m11 = m12 = m22 = fx = fy = n11 = n12 = n22 = hx = hy = -0.0
         for i in range(N):
-            p, d, a1, a2 = (
-                w[at(GAIN_P, i, j, W, L)],
-                w[at(GAIN_D, i, j, W, L)],
-                w[at(A1, i, j, W, L)],
-                w[at(A2, i, j, W, L)],
-            )
+            p, d = w[at(GAIN_P, i, j, W, L)], w[at(GAIN_D, i, j, W, L)]
+            a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
             e, ed, pp, dd = p * w[at(E, i, j, W, L)], d * w[at(ED, i, j, W, L)], p * p, d * d
             m11, m12, m22, fx, fy = m11 + pp * a1 * a1, m12 + pp * a1 * a2, m22 + pp * a2 * a2, fx + a1 * e, fy + a2 * e
             n11, n12, n22 = n11 + dd * a1 * a1, n12 + dd * a1 * a2, n22 + dd * a2 * a2

@@ -26,17 +26,9 @@ def arm_shares(w, p, P, extra, env, rates, links):
     rates : v and the reference rate u.  links : as `geometry` gives them.
     """
     (vx, vy, ux, uy), (bx, by, lx, ly, ad, inv, _) = rates, links
-    base = bx * vx + by * vy
-    base_acc, back_acc = accelerations(
-        base,
-        lx * vx + ly * vy,
-        bx * ux + by * uy,
-        lx * ux + ly * uy,
-        ad,
-        inv,
-        w[(MODEL + L1SQ) * P + p],
-        w[(MODEL + L2SQ) * P + p],
-    )
+    base, back, base_ref, back_ref = bx * vx + by * vy, lx * vx + ly * vy, bx * ux + by * uy, lx * ux + ly * uy
+    l1sq, l2sq = w[(MODEL + L1SQ) * P + p], w[(MODEL + L2SQ) * P + p]
+    base_acc, back_acc = accelerations(base, back, base_ref, back_ref, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(
         w[(MODEL + S1) * P + p], w[(MODEL + S2) * P + p], w[(MODEL + TIP) * P + p], bx, by, lx, ly, base_acc, back_acc
     )
@@ -52,15 +44,8 @@ def arm_shares(w, p, P, extra, env, rates, links):
 @leaf
 def pose_of(w, j, W, L):
     """Velocity of the pose of a run, and the environment of the model."""
-    return (
-        w[of(PVX, j, W, L)],
-        w[of(PVY, j, W, L)],
-        (
-            w[of(ENVIRONMENT + GRAVITY_X, j, W, L)],
-            w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)],
-            w[of(ENVIRONMENT + SHARPNESS, j, W, L)],
-        ),
-    )
+    gx, gy = w[of(ENVIRONMENT + GRAVITY_X, j, W, L)], w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)]
+    return w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], (gx, gy, w[of(ENVIRONMENT + SHARPNESS, j, W, L)])
 
 
 @outlined

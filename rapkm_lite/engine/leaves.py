@@ -112,13 +112,8 @@ def accelerations(base, back, base_ref, back_ref, ad, inv, l1sq, l2sq):
 def inertia(s1, s2, tip, bx, by, lx, ly, base_acc, back_acc):
     """Share of an arm in the mass matrix and in the force at zero xdd: m11, m12, m22, fx, fy."""
     sx, sy, tx, ty = s1 * bx, s1 * by, s2 * lx, s2 * ly
-    return (
-        tip + sx * bx + tx * lx,
-        sx * by + tx * ly,
-        tip + sy * by + ty * ly,
-        -(sx * base_acc + tx * back_acc),
-        -(sy * base_acc + ty * back_acc),
-    )
+    m11, m12, m22 = tip + sx * bx + tx * lx, sx * by + tx * ly, tip + sy * by + ty * ly
+    return m11, m12, m22, -(sx * base_acc + tx * back_acc), -(sy * base_acc + ty * back_acc)
 
 
 @leaf

@@ -200,7 +200,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
 
     None for what is not there leaves it out of the kernel, which is then sooner compiled; an `else` would stay.
     history, study : the `History` of a single run, or () for a study; the other one is None.
-    modelled : None for laws without a model; else the `extra` of the model.
+    modelled : None for laws without a model; else an entry where the model has friction or gravity.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.
     clock : a long run is made in parts, whose state is in w; the table holds the samples of one part.
     """

@@ -67,12 +67,8 @@ def reference(lanes, drives, arms, law, table, o, w):
         for j in range(L):
             fx = fy = 0.0
             for i in range(N):
-                a1, a2, rate, elbow = (
-                    w[at(A1, i, j, W, L)],
-                    w[at(A2, i, j, W, L)],
-                    want(table, o, RATE, i, W),
-                    want(table, o, ELBOW_RATE, i, W),
-                )
+                a1, a2 = w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)]
+                rate, elbow = want(table, o, RATE, i, W), want(table, o, ELBOW_RATE, i, W)
                 fx += a1 * rate - (a1 + w[at(L1, i, j, W, L)]) * elbow
                 fy += a2 * rate - (a2 + w[at(L2, i, j, W, L)]) * elbow
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = solve2(

@@ -23,7 +23,7 @@ def matrix_room(N: int) -> int:
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
     """Where the buffer of `engine.user` holds memory and answer, and its length."""
-    start = 7 + 8 * N + 6 * N + (matrix_room(N) if matrices else 0)
+    start = 7 + 8 * N + (matrix_room(N) if matrices else 0)
     return start, start + memory, start + memory + N
 
 
@@ -100,14 +100,8 @@ def pointer(function, N: int, matrices: bool, memory: int):
         for i in range(N):
             buffer[answer + i] = np.nan
         try:
-            c = ask(
-                buffer[0],
-                buffer[1 : 1 + N],
-                buffer[1 + N : 1 + 2 * N],
-                wanted(buffer),
-                at_hand(buffer),
-                buffer[kept : kept + memory],
-            )
+            q_a, qd_a, own = buffer[1 : 1 + N], buffer[1 + N : 1 + 2 * N], buffer[kept : kept + memory]
+            c = ask(buffer[0], q_a, qd_a, wanted(buffer), at_hand(buffer), own)
             for i in range(N):
                 # An answer of another length is none.
                 buffer[answer + i] = c[i] if len(c) == N else np.nan

@@ -122,14 +122,8 @@ def single_step(arms, w, x, y):
     m = MODEL * W
     for i in range(W):
         place = placed(MODEL, w, i, 0, W, 1, x, y)
-        p11, p12, p22, gx, gy, near = pose_terms(
-            w[m + L2SQ * W + i],
-            w[m + SCALE * W + i],
-            place,
-            w[(MOTION + COS) * W + i],
-            w[(MOTION + SIN) * W + i],
-            w[E * W + i],
-        )
+        ux, uy = w[(MOTION + COS) * W + i], w[(MOTION + SIN) * W + i]
+        p11, p12, p22, gx, gy, near = pose_terms(w[m + L2SQ * W + i], w[m + SCALE * W + i], place, ux, uy, w[E * W + i])
         w[P11 * W + i], w[P12 * W + i], w[P22 * W + i], w[GX * W + i], w[GY * W + i] = p11, p12, p22, gx, gy
         w[NEAR * W + i] = near
         keep(w, i, W, place[0])

@@ -42,22 +42,15 @@ def arm_table(robot, width: int) -> np.ndarray:
     of no sign: their rows of A and all that they add to a sum are zero.
     """
     l1, l2 = robot.lengths.T
-    proximal, distal, _ = robot.arm_inertias.T
+    proximal, distal, coupling = robot.arm_inertias.T
     w1, w2 = robot.arm_moments.T
-    mass, none = _tip_masses(robot), np.arange(width) >= robot.n_arms
+    # J_a w1^2 + 2 P w1 w2 cos + J_d w2^2 = (J_a - p l1^2) w1^2 + (J_d - p l2^2) w2^2 + p |v|^2 with p = P / (l1 l2).
+    mass, none = coupling / (l1 * l2), np.arange(width) >= robot.n_arms
     geometry = [*robot.base.T, l1**2, l2**2, (l1**2 - l2**2) / 2]
     masses = [proximal - mass * l1**2, distal - mass * l2**2, mass, w1 / l1, w2 / l2, robot.friction]
     table = np.stack([*geometry, robot.mode, *masses, 1 / l1, 1 / (l1 * l2)])[:, np.where(none, 0, np.arange(width))]
     table[len(geometry) : -2, none] = 0.0
     return table
-
-
-def _tip_masses(robot) -> np.ndarray:
-    """Point mass at the tip that replaces the coupling of the two links of each arm, (N,) in kg.
-
-    J_a w1^2 + 2 P w1 w2 cos + J_d w2^2 = (J_a - p l1^2) w1^2 + (J_d - p l2^2) w2^2 + p |v|^2 with p = P / (l1 l2).
-    """
-    return robot.arm_inertias[:, 2] / robot.lengths.prod(axis=1)
 
 
 def environment(robot) -> np.ndarray:

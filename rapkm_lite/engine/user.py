@@ -168,12 +168,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     transposed(small, U, H, 2, n, 2)
     product(T, U, small, n, 2, 2)
     spread(Gn, T, U, n)
-    for i in range(2):
-        for j in range(n):
-            s = 0.0
-            for k in range(n):
-                s += H[k, i] * P_dot[k, j]
-            wide[i, j] = s
+    transposed(wide, H, P_dot, 2, n, n)
     product(T, C_, U, n, n, 2)
     transposed(small, U, T, 2, n, 2)
     for i in range(2):

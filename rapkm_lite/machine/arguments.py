@@ -30,8 +30,8 @@ class ConvergenceError(RuntimeError, ValueError):
 def real_array(name: str, value, *last: int) -> np.ndarray:
     """Return `value` as a float array of finite numbers whose trailing axes have the lengths `last`.
 
-    Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN or infinity, or
-    has other trailing axes.
+    Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN, infinity or
+    numbers from 1e100 on, or has other trailing axes.
     """
     if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last:
         array = value

@@ -28,15 +28,7 @@ UNITS_OF = {
     "control": {"K_P": "N m/rad", "K_D": "N m s/rad", "dt": "s"},
     "path": {"side": "m", "duration": "s", "centre": "m", "angle": "rad", "rest": "s"},
     "sensor": {"offset": "rad", "encoder": "1", "velocity_filter": "s"},
-    "fault": {
-        "kind": None,
-        "drive": "1",
-        "time": "s",
-        "start": "s",
-        "stop": "s",
-        "jump": "rad",
-        "limit": "N m",
-    },
+    "fault": {"kind": None, "drive": "1", "time": "s", "start": "s", "stop": "s", "jump": "rad", "limit": "N m"},
 }
 """Keys of every table of a data file, and their units."""
 

@@ -93,7 +93,8 @@ def _decides(value) -> bool:
 def _parts(value) -> tuple | None:
     """What an object is made of; None where nobody can tell."""
     if isinstance(value, types.FunctionType):
-        cells = tuple(_content(cell) for cell in value.__closure__ or ())
+        # What a variable of an enclosing function holds, which may be nothing yet.
+        cells = tuple(() if cell == types.CellType() else (cell.cell_contents,) for cell in value.__closure__ or ())
         return value.__code__, value.__defaults__, value.__kwdefaults__, cells, vars(value), id(value.__globals__)
     if isinstance(value, types.MethodType):
         return value.__func__, value.__self__
@@ -103,11 +104,3 @@ def _parts(value) -> tuple | None:
         return None if isinstance(made, str) else tuple(tuple(p) if hasattr(p, "__next__") else p for p in made)
     except Exception:
         return getattr(value, "__dict__", None)
-
-
-def _content(cell):
-    """What a variable of an enclosing function holds, which may be nothing yet."""
-    try:
-        return (cell.cell_contents,)
-    except ValueError:
-        return ()

@@ -19,7 +19,7 @@ class Log(Value):
     """A log of a run, one row per record; read-only.
 
     t : (k,) s, increasing.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
-    q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, with the noise of a current sensor.
+    q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, of a laboratory with the noise of a current sensor.
     Raises ValueError for shapes that do not fit, numbers that are not finite, or times that do not increase.
 
     >>> import rapkm_lite as rk
@@ -75,29 +75,22 @@ def read_log(source: str | Path) -> Log:
     >>> rk.read_log(rk.data_path("mystery_runs/gain.csv"))
     Log('gain', 901 records, 9 s, 3 drives)
     """
-    if not isinstance(source, str | Path):
-        raise ValueError(f"source = {short(source)}; allowed: the path of a CSV file")
-    path = Path(source)
+    path = Path(of_kind("source", source, str | Path, "the path of a CSV file"))
     try:
         # Spreadsheets write a mark before the header, editors an empty line at the end.
         with path.open(newline="", encoding="utf-8-sig") as file:
             header, *lines = list(csv.reader(file)) or [[]]
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
+    except (OSError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no text in UTF-8"
         raise ValueError(f"source = {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
     while lines and not lines[-1]:
         lines.pop()
-    header, N = _names(path, header)
-    table = _table(path, header, lines)
+    header = _names(path, header)
+    table = np.array([_numbers(path, header, number, line) for number, line in enumerate(lines, 2)])
     if len(table) == 0:
         raise ValueError(f"the log {path.name!r} has no record; allowed: one line or more below the header")
-    t, q_a, q_a_desired, c = np.split(table, [1, 1 + N, 1 + 2 * N], axis=1)
-    late = np.flatnonzero(np.diff(t[:, 0]) <= 0.0)
-    if len(late):
-        number = late[0] + 3
-        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
-    _without_gaps(path, t[:, 0])
-    return Log(path.stem, t[:, 0], q_a, q_a_desired, c)
+    _check_times(path, table[:, 0])
+    return Log(path.stem, table[:, 0], *np.split(table[:, 1:], 3, axis=1))
 
 
 def write_log(log: Log, target: str | Path) -> None:
@@ -123,9 +116,13 @@ def write_log(log: Log, target: str | Path) -> None:
         raise ValueError(f"target = {short(str(target))} cannot be written ({reason}); allowed: a CSV file") from None
 
 
-def _without_gaps(path: Path, t: np.ndarray) -> None:
-    """Records come evenly, but for jitter: a rest with a hole in it may be two."""
+def _check_times(path: Path, t: np.ndarray) -> None:
+    """Time increases, and records come evenly, but for jitter: a rest with a hole in it may be two."""
     steps = np.diff(t)
+    late = np.flatnonzero(steps <= 0.0)
+    if len(late):
+        number = late[0] + 3
+        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
     gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) if len(steps) else steps
     if len(gaps):
         k = gaps[0]
@@ -135,8 +132,8 @@ def _without_gaps(path: Path, t: np.ndarray) -> None:
         )
 
 
-def _names(path: Path, header: list[str]) -> tuple[list[str], int]:
-    """The names of the columns, and of how many drives they are; raises ValueError for others."""
+def _names(path: Path, header: list[str]) -> list[str]:
+    """The names of the columns; raises ValueError for others."""
     N, rest = divmod(len(header) - 1, 3)
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
@@ -148,29 +145,18 @@ def _names(path: Path, header: list[str]) -> tuple[list[str], int]:
         raise ValueError(
             f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"
         )
-    return header, N
-
-
-def _table(path: Path, header: list[str], lines: list[list[str]]) -> np.ndarray:
-    """All numbers of a log; one by one only where something is wrong, to say what and where."""
-    try:
-        table = np.array(lines, dtype=float)
-        # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
-        plain = not any("_" in text for line in lines for text in line)
-        if plain and table.shape[1:] == (len(header),) and np.abs(table).max() < 1e100:
-            return table
-    except ValueError:
-        pass
-    return np.array([_numbers(path, header, number, line) for number, line in enumerate(lines, 2)])
+    return header
 
 
 def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> list[float]:
+    """The numbers of a line; raises ValueError with the column of what is none."""
     if len(line) != len(header):
         raise ValueError(f"the log {path.name!r}, line {number} has {len(line)} columns; allowed: {len(header)}")
     row = []
     for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
         try:
             row.append(float(text))
+            # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
             fine = abs(row[-1]) < 1e100 and "_" not in text
         except ValueError:
             fine = False

@@ -120,16 +120,9 @@ class Manipulator(Value):
         """
         (l1, l2), (m1, m2), (c1, c2), (i1, i2) = (v.T for v in (self.lengths, self.masses, self.centers, self.inertias))
         load = self._load_per_arm
-        return frozen(
-            np.stack(
-                [
-                    i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia,
-                    i2 + m2 * c2**2 + load * l2**2,
-                    l1 * (m2 * c2 + load * l2),
-                ],
-                axis=-1,
-            )
-        )
+        proximal = i1 + m1 * c1**2 + (m2 + load) * l1**2 + self.rotor_inertia
+        distal, coupling = i2 + m2 * c2**2 + load * l2**2, l1 * (m2 * c2 + load * l2)
+        return frozen(np.stack([proximal, distal, coupling], axis=-1))
 
     @cached_property
     def arm_moments(self) -> np.ndarray:
@@ -219,22 +212,26 @@ def _per_link(name: str, value, N: int) -> np.ndarray:
 def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
     """Do N annuli share a point?  Then they share a crossing of two circles, or a whole circle."""
     centers, radii = np.concatenate([base, base]), np.concatenate([inner, outer])
-    points = [centers + np.stack([radii, 0 * radii], axis=-1)]
-    for i in range(len(radii)):
-        for j in range(i):
-            gap = centers[j] - centers[i]
-            distance = np.hypot(*gap)
-            if distance > 0.0:
-                along = (distance**2 + radii[i] ** 2 - radii[j] ** 2) / (2 * distance)
-                # Touching circles keep their one common point in spite of rounding.
-                across = np.sqrt(max(radii[i] ** 2 - along**2, 0.0))
-                unit = gap / distance
-                side = np.array([-unit[1], unit[0]])
-                points.append(centers[i] + along * unit + across * np.array([[1.0], [-1.0]]) * side)
-    points = np.concatenate(points)
-    reach = np.linalg.norm(points[:, None, :] - base, axis=-1)
+    i, j = np.tril_indices(len(radii), -1)
+    points = [centers + np.stack([radii, 0 * radii], axis=-1), crossings(centers[i], centers[j], radii[i], radii[j])]
+    reach = np.linalg.norm(np.concatenate(points)[:, None, :] - base, axis=-1)
     slack = 1e-12 * outer.max()
     return bool(np.any(np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)))
+
+
+def crossings(a: np.ndarray, b: np.ndarray, r_a: np.ndarray, r_b: np.ndarray) -> np.ndarray:
+    """Where circles about a and b (k, ..., 2) of radii r (k,) cross: (2 k, ..., 2), first those left of b - a.
+
+    Circles that do not meet have the point between them on their radical axis, which of those that touch is the one.
+    """
+    r_a, r_b = (r.reshape(-1, *[1] * (a.ndim - 1)) for r in (r_a, r_b))
+    gap = b - a
+    distance = np.maximum(np.linalg.norm(gap, axis=-1, keepdims=True), 1e-12 * r_b.max())
+    unit = gap / distance
+    along = (distance**2 + r_a**2 - r_b**2) / (2 * distance)
+    across = np.sqrt(np.maximum(r_a**2 - along**2, 0.0)) * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+    middle = a + along * unit
+    return np.concatenate([middle + across, middle - across])
 
 
 def manipulator(value: Any, name: str = "robot") -> Manipulator:
@@ -246,8 +243,8 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """Read a machine from ``data/<source>.toml`` or from a path that ends in ``.toml``.
 
     The file has a table ``[manipulator]`` with the arguments of `Manipulator`; a value may be plain or
-    ``{value = ..., unit = "...", source = "..."}``.  Tables ``[control]``, ``[path]`` and ``[sensor]`` are left to
-    `rapkm_lite.experiment`.
+    ``{value = ..., unit = "...", source = "..."}``.  Tables ``[control]``, ``[path]``, ``[sensor]`` and ``[[fault]]``
+    are left to `rapkm_lite.experiment`.
 
     Raises ValueError for an unknown key, a missing value, a wrong unit or a value out of range.
 

@@ -24,7 +24,7 @@ import copy
 import ctypes
 import dataclasses
 import itertools
-from functools import cached_property
+from functools import cache, cached_property
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
@@ -63,7 +63,8 @@ def default(value: Any) -> Any:
 def frozen(array) -> np.ndarray:
     """A copy of an array that nobody can write into, and that no ``setflags`` makes writable again.
 
-    The numbers lie in an object of type bytes.  An array that came from here is returned as it is.
+    The numbers lie in an object of type bytes.  An array that came from here, or that holds objects, is returned as it
+    is.
 
     >>> frozen([1.0, 2.0])[0] = 3.0
     Traceback (most recent call last):
@@ -76,7 +77,7 @@ def frozen(array) -> np.ndarray:
     array = np.asarray(array)
     if array.dtype.hasobject or _is_frozen(array):
         return array
-    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape) if array.size else _read_only(array)
+    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape)
 
 
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -104,28 +105,12 @@ _writable.restype, _writable.argtypes = ctypes.py_object, (ctypes.c_char_p, ctyp
 _WRITE = 0x200
 
 
-def all_frozen(arrays: list[np.ndarray]) -> list[np.ndarray]:
-    """`frozen` copies of arrays; the list is emptied on the way, so that of minutes no two columns stand twice.
-
-    >>> [float(array.sum()) for array in all_frozen([np.zeros(3), np.ones(3)])]
-    [0.0, 3.0]
-    """
-    arrays.reverse()
-    return [frozen(arrays.pop()) for _ in range(len(arrays))]
-
-
 def _is_frozen(array: np.ndarray) -> bool:
     root = array
     while isinstance(root, np.ndarray):
         root = root.base
     # NumPy leaves a large unpickled array writable, in spite of the bytes below it.
     return isinstance(root, bytes) and array.flags.c_contiguous and not array.flags.writeable
-
-
-def _read_only(array: np.ndarray) -> np.ndarray:
-    array = array.copy()
-    array.setflags(write=False)
-    return array
 
 
 def _frozen(value):
@@ -248,14 +233,10 @@ _KINDS = ("Manipulator", "Trajectory", "Sensors", "PD", "str")
 _CACHES = ("_hash", "_tables", "_codes")
 """What is kept beside the fields and belongs to no value."""
 
-_known_names: dict[type, tuple[str, ...]] = {}
 
-
+@cache
 def _names(cls: type) -> tuple[str, ...]:
-    if cls not in _known_names:
-        fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
-        _known_names[cls] = tuple(field.name for field in fields)
-    return _known_names[cls]
+    return tuple(field.name for field in dataclasses.fields(cls)) if dataclasses.is_dataclass(cls) else ()
 
 
 def _typed(value) -> str:

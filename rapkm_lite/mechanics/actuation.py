@@ -22,8 +22,7 @@ from ..machine.arguments import (
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores, linalg
 from .at import at
-from .kinematics import cross
-from .linalg import many_inverses, product
+from .linalg import many_inverses, minors, product
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -58,6 +57,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 
     Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
     chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
+    Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(rk.degree_of_actuation(robot, q))
@@ -75,6 +75,7 @@ def actuation_type(robot: Manipulator, q):
     redundantly (m > alpha) or non-redundantly actuated (m = alpha).  A pose with alpha < 2 is both underactuated and
     redundantly actuated, since m >= 2: redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
+    Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.actuation_type(robot, q)
@@ -118,9 +119,7 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
     >>> rk.distal_cross_products(robot, q).round(3)
     array([ 0.96 , -0.969,  0.507])
     """
-    d = at(robot, q).d / robot.lengths[:, 1:]
-    j, k = np.triu_indices(robot.n_arms, 1)
-    return cross(d[..., j, :], d[..., k, :])
+    return minors(at(robot, q).d / robot.lengths[:, 1:])
 
 
 def singular_values(A) -> np.ndarray:

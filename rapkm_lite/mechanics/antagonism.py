@@ -172,7 +172,7 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     equilibrium (13), A^T K_P (e_a + offset) + wrench = 0, for small errors e_a = A e_x.
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
-    wrench : static control force A^T c (..., 2) that gravity and load demand (Qbar at rest); default none.
+    wrench : static control force A^T c (..., delta) that gravity and load demand (Qbar at rest); default none.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.steady_state_error(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(5)

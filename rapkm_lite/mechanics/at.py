@@ -53,8 +53,9 @@ class At(Value):
 
     A quantity is computed when it is asked for the first time, and kept; all arrays are read-only (copy one to change
     it: ``at.G.copy()``).  Those that need qd raise ValueError when it was not given, those that do not exist at a
-    singular pose raise there.  F, A and what follows from them belong to the end-effector position as independent
-    coordinates, or to the two joints chosen by `using`.
+    singular pose raise there, and F, N and what follows from them where q leaves the loops open, by more than 1e-3 of
+    the longest link.  F, A and what follows from them belong to the end-effector position as independent coordinates,
+    or to the two joints chosen by `using`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.at(robot, q)
@@ -170,9 +171,8 @@ class At(Value):
         if self.independent is not None:
             return cores.joint_complement_dot(self.J, self.J_dot, self.F, self.independent)
         tree = self.robot.tree
-        return cores.complement(
-            tree, cores.over_lever_dot(tree, self._v, self._levers, self._over, self._rates, self.qd)
-        )
+        over_dot = cores.over_lever_dot(tree, self._v, self._levers, self._over, self._rates, self.qd)
+        return cores.complement(tree, over_dot)
 
     @quantity
     def A(self) -> np.ndarray:

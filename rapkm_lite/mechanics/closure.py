@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import (
-    ConvergenceError,
-    check_leading,
-    matvec,
-    real_array,
-    small_number,
-    solve,
-    whole_number,
-)
+from ..machine.arguments import ConvergenceError, check_leading, matvec, real_array, small_number, solve, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
@@ -117,7 +109,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     end-effector position `guess` (..., 2) in m, of Gauss and Newton with the control matrix A = d q_a / d x where the
     exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
     kinematics of the five-bar.  Its base angles are on the turn of the measured ones, the elbow angles in (-pi, pi].
-    Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace.
+    Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace, and
+    ValueError where it meets an input singularity.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.forward_kinematics(robot, rk.estimate_pose(robot, q[:3], guess=[0.0, 0.0])).round(12)

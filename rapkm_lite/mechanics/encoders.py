@@ -13,11 +13,12 @@ import numpy as np
 
 from ..machine.arguments import ConvergenceError, real_array
 from ..machine.logs import Log, read_log
-from ..machine.manipulator import Manipulator
+from ..machine.manipulator import Manipulator, crossings
 from . import cores
 from .at import At, at
 from .closure import estimate_pose, misfit
 from .kinematics import cross, unit_vector
+from .linalg import minors
 
 
 def unknown_names(N: int) -> tuple[str, ...]:
@@ -98,8 +99,7 @@ def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndar
     Raises ValueError for angles that fit no pose.
     """
     pose = at(robot, poses(robot, angles))
-    i, j = np.triu_indices(robot.n_arms, 1)
-    side = cross(pose.d[:, i], pose.d[:, j]).T
+    side = minors(pose.d).T
     across = np.concatenate([side < 0.0, side > 0.0])
     second = np.where(across, _fit(robot, angles, _crossings(robot, angles)), np.inf)
     # With residuals r at a pose, those at the crossing of the pair S of largest |det A_S| are r - A A_S^-1 r_S to first
@@ -108,21 +108,11 @@ def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _crossings(robot: Manipulator, angles: np.ndarray) -> np.ndarray:
-    """Where distal links meet, (N (N - 1), k, 2) m: of all pairs i < j the points with d_i x d_j > 0, then those below.
-
-    Circles that do not meet have the point between them on their radical axis.
-    """
+    """Where distal links meet, (N (N - 1), k, 2) m: of all pairs i < j where d_i x d_j > 0, then the other points."""
     l1, l2 = robot.lengths.T
     i, j = np.triu_indices(robot.n_arms, 1)
     elbow = (robot.base + l1[:, None] * unit_vector(angles)).swapaxes(0, 1)
-    l_i, l_j = l2[i, None, None], l2[j, None, None]
-    gap = elbow[j] - elbow[i]
-    distance = np.maximum(np.linalg.norm(gap, axis=-1, keepdims=True), 1e-12 * l2.max())
-    unit = gap / distance
-    along = (distance**2 + l_i**2 - l_j**2) / (2 * distance)
-    across = np.sqrt(np.maximum(l_i**2 - along**2, 0.0)) * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-    middle = elbow[i] + along * unit
-    return np.concatenate([middle + across, middle - across])
+    return crossings(elbow[i], elbow[j], l2[i], l2[j])
 
 
 def _fit(robot: Manipulator, angles: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -152,7 +152,7 @@ def working_mode(robot: Manipulator, q) -> np.ndarray:
 
 
 def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
-    """Joint angles (..., 2N) in rad, in (-pi, pi], of the end-effector position x (..., 2) in m.
+    """Joint angles (..., 2N) in rad, in [-pi, pi], of the end-effector position x (..., 2) in m.
 
     mode : (..., N) signs of the elbow angles; default ``robot.mode``.
     Raises ValueError naming the point, the arm and its reach when the point lies outside the workspace.
@@ -179,17 +179,3 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
             f"allowed: {abs(l1 - l2):g} to {l1 + l2:g} m"
         )
     return q
-
-
-def ee_complement(robot: Manipulator, q) -> np.ndarray:
-    """F of (5) for the end-effector position as independent coordinates: qd = F xd, (..., 2N, 2) in rad/m.
-
-    Regular everywhere inside the workspace, in every working mode.
-    Raises ValueError where an arm is stretched or folded (boundary of the workspace).
-    """
-    return at(robot, q).F.copy()
-
-
-def ee_complement_dot(robot: Manipulator, q, qd) -> np.ndarray:
-    """dF/dt of `ee_complement` along qd, (..., 2N, 2) in rad/(m s)."""
-    return at(robot, q, given(qd)).F_dot.copy()

@@ -10,8 +10,9 @@ import numpy as np
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from .actuation import distal_cross_products, drive_pairs
+from .at import at
 from .cores import prestress_shares
-from .kinematics import ee_complement, inverse_kinematics
+from .kinematics import inverse_kinematics
 from .linalg import singular_values
 from .partition import PARTITION_RULES
 
@@ -32,7 +33,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     """Sample positions x (n,), y (n,) in m, and inside (n, n): True where every arm reaches (x[j], y[i]) with a bend.
 
     box : (x_min, x_max, y_min, y_max) in m; default `sampling_box`.
-    Raises ValueError for an empty box or fewer than two samples.
+    Raises ValueError for an empty box, fewer than two samples or more than 5000.
 
     >>> import rapkm_lite as rk
     >>> x, y, inside = rk.workspace_grid(rk.load(), n=20)
@@ -56,7 +57,7 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
 def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: int = 200, box=None, pair=None):
     """An actuation measure over the workspace: x (n,), y (n,) in m and a masked array (..., n, n), rows along y.
 
-    measure : "sigma_min", the smallest singular value of A~ (10), between 0 and 1, zero at input singularities;
+    measure : "sigma_min", the smallest singular value of A~, 0 to 1, zero at input singularities, where (10) drops;
         "condition", the condition number of A in end-effector coordinates, 1 where the drives act alike in all
         directions, masked where it exceeds 1e12; "cross", the largest |d_j x d_k| of all pairs; "prestress", the
         largest share |n_i| of each drive in a unit prestress, A^T n = 0, on a leading axis of length N >= 3: for three
@@ -99,7 +100,9 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     if rule == "cross":
         merit = np.abs(distal_cross_products(robot, q))
     else:
-        A_tilde = _redundant_rows(robot, q)
+        # A~ = A (F^T F)^-1 F^T, without a decomposition of J.
+        F = at(robot, q).F
+        A_tilde = F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
         merit = [PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)]
         merit = np.stack(merit, axis=-1)
     return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
@@ -121,15 +124,9 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
     return np.ma.array(grid, mask=mask)
 
 
-def _redundant_rows(robot: Manipulator, q: np.ndarray) -> np.ndarray:
-    """A~ = A (F^T F)^-1 F^T without a decomposition of J, (..., m, 2N)."""
-    F = ee_complement(robot, q)
-    return F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
-
-
 def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
     """Smallest singular value of the rows of A~, which are those of A L^-T with the Cholesky factor F^T F = L L^T."""
-    F = ee_complement(robot, q)
+    F = at(robot, q).F
     f, g = F[..., 0], F[..., 1]
     l11 = np.sqrt((f * f).sum(-1))
     l21 = (f * g).sum(-1) / l11
@@ -141,7 +138,7 @@ def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
 
 
 def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    sigma = singular_values(ee_complement(robot, q)[..., drives, :])
+    sigma = singular_values(at(robot, q).F[..., drives, :])
     return np.divide(sigma[..., 0], sigma[..., 1], out=np.full(sigma.shape[:-1], np.inf), where=sigma[..., 1] > 0)
 
 
@@ -154,7 +151,7 @@ def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} arms, which cannot prestress each other; allowed: 3 or more")
     # At an input singularity every prestress is free: no direction, so the point is masked.
-    return np.moveaxis(prestress_shares(ee_complement(robot, q)[..., : robot.n_arms, :]), -1, 0)
+    return np.moveaxis(prestress_shares(at(robot, q).A), -1, 0)
 
 
 _MEASURES = {"sigma_min": _sigma_min, "condition": _condition, "cross": _cross, "prestress": _prestress}

@@ -2,9 +2,9 @@
 
 J (..., r, n) constraint Jacobian of full rank, G and C (..., n, n), Q (..., n) of the tree (2).  Further functions that
 take matrices of any mechanism: `weighted_pseudoinverse`, `prestress_projector`, `antagonism_filter`, `command_filter`,
-`null_basis`, `common_sign`, `singular_values`, `steady_state_error` for A (..., m, delta); `explicit_pseudoinverse`,
-`select_independent` and `closed_loop_projector` for A~ (..., m, n); `effective_gain` for F (..., n, delta).  The
-functions of a `Manipulator` evaluate the same formulas.
+`null_basis`, `common_sign`, `singular_values`, `steady_state_error` for A (..., m, delta), `allocate_torques` and
+`minimax_torques` for one A; `explicit_pseudoinverse`, `select_independent` and `closed_loop_projector` for A~
+(..., m, n); `effective_gain` for F (..., n, delta).  The functions of a `Manipulator` evaluate the same formulas.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     regular A~_1 gives the same result.
     A_tilde : (..., m, n).  rows : the delta row indices of A~_1, (delta,) or (..., delta), with delta the rank of A~,
     which is 2 for every `Manipulator`.
-    Raises ValueError where A~_1 has lost rank.
+    Raises ValueError where A~_1 has lost rank, or has fewer rows than the rank of A~.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.redundant_control_matrix(robot, q)
@@ -86,18 +86,13 @@ def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _spectrum(A1: np.ndarray) -> np.ndarray:
-    """Singular values of the rows A~_1 (..., delta, n), largest first."""
-    return singular_values(A1.mT)
-
-
 def _inverse_condition(A1: np.ndarray) -> np.ndarray:
-    sigma = _spectrum(A1)
+    sigma = singular_values(A1.mT)
     return sigma[..., -1] / np.maximum(sigma[..., 0], 1e-300)
 
 
 PARTITION_RULES = {
-    "sigma_min": lambda A1: _spectrum(A1)[..., -1],
+    "sigma_min": lambda A1: singular_values(A1.mT)[..., -1],
     "condition": _inverse_condition,
     "printed": lambda A1: -np.abs(A1).sum(axis=-1).max(axis=-1),
 }
@@ -114,6 +109,7 @@ def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.n
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
     delta : how many, the rank of A~; 2 for the machines of `Manipulator`.
+    Raises ValueError for another rule, and for more rows than there are.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.select_independent(rk.redundant_control_matrix(robot, q))

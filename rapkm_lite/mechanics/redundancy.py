@@ -22,7 +22,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     non-negative least squares, which ends after finitely many steps; without limits in reach it is (11).
     A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
     W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
-    Raises ValueError at input singularities, and for a wrench beyond the limits, with the factor that is missing.
+    Raises ValueError at input singularities, for a wrench beyond the limits, with the factor that is missing, and for a
+    prestress so far beyond them that rounding hides the nearest torques.
 
     >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
     >>> rk.allocate_torques(A, [1.0, 1.0], limit=1.0).round(3), rk.allocate_torques(A, [1.0, 1.0], limit=0.6).round(3)

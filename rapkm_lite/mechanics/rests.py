@@ -12,7 +12,7 @@ from ..machine.manipulator import Manipulator
 from .at import at
 from .encoders import closure, poses
 
-# Records of the later half of a rest, over which its means are taken.
+# Fewest records of the later half of a rest, over which its means are taken.
 SHORTEST = 10
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..machine.arguments import positive_number, real_array, short
 from ..machine.manipulator import Manipulator
-from ..machine.values import all_frozen
+from ..machine.values import frozen
 from . import cores
 from .kinematics import inverse_kinematics
 
@@ -135,7 +135,8 @@ def columns(robot: Manipulator, t: np.ndarray, motion: Motion, given: dict) -> l
         for column, part in zip(made, parts, strict=True):
             column[rows] = part
     del column
-    return all_frozen(made)
+    made.reverse()  # and emptied on the way, so that of minutes no two columns stand twice
+    return [frozen(made.pop()) for _ in range(len(made))]
 
 
 def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

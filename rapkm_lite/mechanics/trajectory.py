@@ -170,7 +170,6 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     >>> rk.follow(rk.load(), t, np.stack([0.05 * t, 0 * t], -1), [[0.05, 0.0]] * 101, np.zeros((101, 2)))
     Trajectory(101 samples, 1 s, 'testbed')
     """
-    manipulator(robot)
     t = equidistant(t)
     x, xd, xdd = (real_array(name, v, 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
     check_rates(t, x, xd, xdd)
@@ -179,7 +178,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
 
 def _follow(robot: Manipulator, t, motion: Motion, given: dict) -> Trajectory:
     """`follow` without its checks; `motion` gives x, xd, xdd of some rows, `given` is what the caller was asked for."""
-    made = Trajectory(robot.n_arms, *columns(robot, t, motion, given), t=t, robot=robot)
+    made = Trajectory(manipulator(robot).n_arms, *columns(robot, t, motion, given), t=t, robot=robot)
     made.__dict__["_apart"] = None
     return made
 
@@ -194,7 +193,6 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     >>> rk.polygon(rk.load(), [[-0.05, 0.01], [0.05, 0.01], [0.0, 0.05]], duration=3.0).x[1000].round(3)
     array([0.05, 0.01])
     """
-    manipulator(robot)
     corners = real_array("corners", corners, 2)
     if corners.ndim != 2 or len(corners) < 2:
         raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
@@ -234,7 +232,6 @@ def triangle(
     >>> triangle(load())
     Trajectory(5001 samples, 5 s, 'testbed')
     """
-    manipulator(robot)
     side, angle = positive_number("side", side), float(exact_array("angle", angle))
     if abs(angle) > 1e6:
         raise ValueError(f"angle = {angle:g} rad; allowed: up to 1e6 rad, beyond which corners would be rounded")
@@ -252,7 +249,6 @@ def circle(
     >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]
     array([0.05, 0.  ])
     """
-    manipulator(robot)
     radius, t = positive_number("radius", radius), sample_times(duration, dt)
     duration, middle = positive_number("duration", duration), exact_array("centre", centre, 2)[:, None]
     full = 2 * np.pi * slow_turns(t, turns)
@@ -274,7 +270,6 @@ def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Traj
     >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)
     Trajectory(501 samples, 0.5 s, 'testbed')
     """
-    manipulator(robot)
     t = sample_times(duration, dt)
     still, point = np.zeros((len(t), 2)), exact_array("x", x, 2)
     return _follow(robot, t, lambda rows: (still[rows] + point, still[rows], still[rows]), {"x": x})

@@ -43,7 +43,6 @@ _FORMS = {
     RedundantAPD: "REDUNDANT_APD",
     RedundantCTC: "REDUNDANT_CTC",
 }
-_ZERO = np.zeros(())
 _FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
 
 
@@ -63,7 +62,7 @@ def code_of(law: Any, model) -> Code | None:
         return None
     if type(law) is CompiledLaw:
         code, drives, run, user = "USER", {}, {}, law
-    elif type(law) in _FORMS and not any(getattr(law, name, _ZERO).ndim > 1 for name in ("K_P", "K_D", "K_I")):
+    elif type(law) in _FORMS and not any(np.ndim(getattr(law, name, 0.0)) > 1 for name in ("K_P", "K_D", "K_I")):
         (code, drives, run), user = _gains(law, model.n_arms), None
     else:
         return None
@@ -81,22 +80,13 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
         code = code if law.projected else f"{code}_LINE2"
         return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
-    (p1, p2), (d1, d2) = _per("K_P", law.K_P, 2), _per("K_D", law.K_D, 2)
-    run = {
-        "PAIR_P1": p1,
-        "PAIR_P2": p2,
-        "PAIR_D1": d1,
-        "PAIR_D2": d2,
-        "HYSTERESIS": float(getattr(law, "hysteresis", 1.0)),
-        "JOINT_J": -1.0,
-        "JOINT_K": -1.0,
-    }
-    independent = getattr(law, "independent", None)
-    if independent is not None:
-        if max(independent) >= 2 * N:
-            raise ValueError(f"independent = {independent}; allowed: joint indices from 0 to {2 * N - 1}")
-        run |= {"JOINT_J": float(independent[0]), "JOINT_K": float(independent[1])}
-    return code, {}, run
+    gains = *_per("K_P", law.K_P, 2), *_per("K_D", law.K_D, 2)
+    joints = getattr(law, "independent", None) or (-1, -1)
+    if max(joints) >= 2 * N:
+        raise ValueError(f"independent = {joints}; allowed: joint indices from 0 to {2 * N - 1}")
+    rows = "PAIR_P1", "PAIR_P2", "PAIR_D1", "PAIR_D2", "HYSTERESIS", "JOINT_J", "JOINT_K"
+    values = *gains, getattr(law, "hysteresis", 1.0), *joints
+    return code, {}, dict(zip(rows, map(float, values), strict=True))
 
 
 def _per(name: str, value, size: int) -> np.ndarray:

@@ -148,7 +148,7 @@ def _parts(work: np.ndarray, width: int, L: int) -> tuple[np.ndarray, np.ndarray
 
 @functools.lru_cache(maxsize=64)
 def _shape(robot, model, code: Code, L: int, study: bool, faulty: bool, counted: bool):
-    """What the kernel has to know of runs side by side besides numbers: `Kind`, extra of the model, `Law`, columns."""
+    """What the kernel has to know of runs besides numbers: `Kind`, has the model other forces, `Law`, columns."""
     form, filtered = getattr(tables, code.form), getattr(tables, code.filter)
     at = None if code.user is None else code.user.at
     asks = tables.NOTHING if at is None else tables.DESIRED if at == "desired" else tables.POSED

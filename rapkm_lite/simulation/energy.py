@@ -57,11 +57,6 @@ def mechanical_work(run) -> np.ndarray:
     return np.sum([np.sum(work_of_holds(run.c[part], run.q_a[part]), axis=0) for part in parts], axis=0)
 
 
-def electric_energy(run) -> np.ndarray:
-    """Electric energy per drive (N,) in J, regenerative: sum over the holds of R (c/k_t)^2 dt + c (q_k+1 - q_k)."""
-    return copper_loss(run.robot, run.c[:-1], run.dt) + mechanical_work(run)
-
-
 def root_mean_square_torque(run) -> float:
     """Root mean square over the holds of the Euclidean norm of the drive torques, N m."""
     return float(np.sqrt(np.sum(run.c[:-1] ** 2) / max(len(run.c) - 1, 1)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +39,7 @@ class Experiment(Value):
 
     @property
     def offset(self) -> np.ndarray:
-        """Calibration offsets (N,), rad."""
+        """Calibration offsets in rad, (N,) or one number, as `sensors` holds them."""
         return self.sensors.offset
 
     @property
@@ -50,9 +49,8 @@ class Experiment(Value):
 
     def run(self, law=None) -> Run:
         """Simulate it, by default with its own law."""
-        return simulate(
-            self.robot, self.law if law is None else law, self.trajectory, sensors=self.sensors, faults=self.faults
-        )
+        law = self.law if law is None else law
+        return simulate(self.robot, law, self.trajectory, sensors=self.sensors, faults=self.faults)
 
 
 def experiment(source="testbed") -> Experiment:
@@ -104,9 +102,7 @@ def measured_energies() -> np.ndarray:
     >>> rk.measured_energies().sum(axis=1).round(2)
     array([4.56, 2.24])
     """
-    with data_path("table1.csv").open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-    return np.array([[float(v) for v in row[1:]] for row in rows[1:]])
+    return np.loadtxt(data_path("table1.csv"), delimiter=",", skiprows=2, usecols=(1, 2, 3))
 
 
 def table1() -> Table1:

@@ -121,8 +121,10 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
 
 def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
     """Without repeating the run: a model that is far off was so from the start, a fault that is felt since it began."""
-    if _far_off(setup.model, setup.robot):
-        yield f"the controller's model has {_difference(setup.model, setup.robot)}"
+    model, robot = setup.model, setup.robot
+    off = max(np.abs(model.lengths - robot.lengths).max(), np.abs(model.base - robot.base).max())
+    if np.any(model.mode != robot.mode) or off > 0.05 * robot.lengths.min():
+        yield f"the controller's model has {_difference(model, robot)}"
     if swinging(c) > 1.5:
         yield (
             "unstable gain: in the end the torques swung to and fro within 12 samples of "
@@ -202,12 +204,6 @@ def _too(setup: Setup) -> str:
 def _offsets(setup: Setup) -> str:
     offset = setup.sensors.offset
     return f"offset = {short(offset.tolist())} rad, up to {1e3 * np.abs(offset).max():.3g} mrad"
-
-
-def _far_off(model: Manipulator, robot: Manipulator) -> bool:
-    """Is a model in another working mode, or a length or base point of it wrong by more than 5 % of a link?"""
-    off = max(np.abs(model.lengths - robot.lengths).max(), np.abs(model.base - robot.base).max())
-    return bool(np.any(model.mode != robot.mode)) or off > 0.05 * robot.lengths.min()
 
 
 def _difference(model: Manipulator, robot: Manipulator) -> str:

@@ -175,11 +175,10 @@ def blank_table(t: np.ndarray, N: int) -> FaultTable:
 
 
 def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
-    """The table of a run with the times t (k,) and N drives; None without faults.
+    """The table of a run with the times t (k,) and N drives, from `check_faults`; None without faults.
 
-    Raises ValueError for what is no fault, and for a drive that there is not.
+    Raises ValueError for a drive that there is not, and for a fault that writes what is no number.
     """
-    faults = check_faults(faults)
     if not faults:
         return None
     table = blank_table(t, N)

@@ -86,10 +86,8 @@ def _show(text: str):
         from ipywidgets import Label
 
         return _display(Label(text))
-    if _in_terminal():
-        _terminal(text)
-        return lambda: _terminal(" " * len(text) + "\r")
-    return lambda: None
+    _terminal(text)
+    return lambda: _terminal(" " * len(text) + "\r")
 
 
 def progress(items) -> Iterator:

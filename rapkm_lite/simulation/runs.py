@@ -16,10 +16,11 @@ from ..machine.arguments import exact_array, matvec, real_array, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default, frozen
-from ..mechanics.kinematics import ee_complement, inverse_kinematics
+from ..mechanics.at import at
+from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .compiled import DONE, LEFT_WORKSPACE, SINGULAR, TOO_STIFF, encode, single
-from .energy import electric_energy
+from .energy import copper_loss, mechanical_work
 from .explain import explain
 from .faults import Fault, FaultsLike, check_faults, fault_table
 from .loop import again_in_python, closed_loop, own_copy
@@ -119,7 +120,7 @@ class Run(Value):
     @cached_property
     def qd(self) -> np.ndarray:
         """All joint rates (k, 2N), rad/s."""
-        return frozen(matvec(ee_complement(self.robot, self.q), self.xd))
+        return frozen(matvec(at(self.robot, self.q).F, self.xd))
 
     @property
     def dt(self) -> float:
@@ -134,7 +135,7 @@ class Run(Value):
     @property
     def energy(self) -> np.ndarray:
         """Electric energy per drive (N,) in J, regenerative: sum over the holds of R (c/k_t)^2 dt + c (q_k+1 - q_k)."""
-        return electric_energy(self)
+        return copper_loss(self.robot, self.c[:-1], self.dt) + mechanical_work(self)
 
     @property
     def error(self) -> np.ndarray:

@@ -52,12 +52,10 @@ class Setup(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How a run ended and its history, rows of samples.
+    """How a run ended, and its history: the columns of a `Run`, with a row for every sample of the path.
 
-    status : DONE, LEFT_WORKSPACE (during the hold after `sample`), or what kept the law from an answer at `sample`.
-    x, xd : (k, 2) true end-effector position and velocity.  q_a, qd_a : (k, N) true base angles and rates.
-    c : (k, N) torques that acted.  pairs : (k, 2) independent joints in use, -1 where there are none.
-    Rows from `sample` on hold nothing when the run has failed; the row `sample` itself counts for LEFT_WORKSPACE.
+    status : DONE; LEFT_WORKSPACE or TOO_STIFF, in the hold after `sample`; or what kept the law from an answer there.
+    Rows from `sample` on hold nothing when the run has failed, but for the row `sample` itself where a hold failed.
     """
 
     status: int

@@ -60,7 +60,11 @@ def sweep(
     (2, 3)
     """
     manipulator(robot)
-    chunk = _check_options(failed, chunk, executor, progress)
+    one_of("failed", failed, ("raise", "mask"))
+    if executor is not None:
+        having("executor", executor, "an executor of concurrent.futures", "submit")
+    switch("progress", progress)
+    chunk = whole_number("chunk", chunk, 1)
     given, laws, offsets = _rows(law, offsets, robot.n_arms)
     setup = prepare(robot, trajectory, Sensors(0.0, encoder, velocity_filter), model, faults)
     in_python = [own_copy(one) for one in {id(one): one for one in laws}.values() if encode(one, setup) is None]
@@ -80,14 +84,6 @@ def sweep(
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
         _raise(i, errors.get(i), own, laws[i], result)
     return result
-
-
-def _check_options(failed, chunk, executor, progress) -> int:
-    one_of("failed", failed, ("raise", "mask"))
-    if executor is not None:
-        having("executor", executor, "an executor of concurrent.futures", "submit")
-    switch("progress", progress)
-    return whole_number("chunk", chunk, 1)
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
@@ -168,21 +164,8 @@ def _result(table: Columns, setup: Setup, law, offsets, mask: bool) -> Sweep:
         return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
     words = REASONS | {DONE: None, NOT_RUN: "it had not run when the sweep was stopped"}
-    return Sweep(
-        setup.robot,
-        law,
-        setup.trajectory,
-        offsets,
-        column(table.energies),
-        column(table.torque_norm),
-        column(table.antagonistic_energy),
-        column(table.x_final),
-        column(table.rms_path_error),
-        column(table.largest_path_error),
-        failed,
-        np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN)),
-        setup.model,
-        setup.sensors,
-        setup.broken,
-        tuple(own or words[status] for own, status in zip(table.reason, table.status.tolist(), strict=True)),
-    )
+    stopped = tuple(own or words[status] for own, status in zip(table.reason, table.status.tolist(), strict=True))
+    time = np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN))
+    fields: list = [setup.robot, law, setup.trajectory, offsets, *map(column, table[:6]), failed, time]
+    fields += [setup.model, setup.sensors, setup.broken, stopped]
+    return Sweep(*fields)
