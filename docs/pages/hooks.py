@@ -85,8 +85,23 @@ def _widen(app, doctree, docname):
             box.append(image)
 
 
+def _hold_together(app, doctree, docname):
+    """A formula in a line and the stop behind it, which would else begin the next line alone."""
+    from docutils import nodes
+
+    for formula in list(doctree.findall(nodes.math)):
+        behind = formula.next_node(descend=False, siblings=True)
+        stop = re.match(r"[.,;:!?)]+", behind.astext()) if isinstance(behind, nodes.Text) else None
+        if stop:
+            behind.parent.replace(behind, nodes.Text(behind.astext()[stop.end() :]))
+            together = nodes.inline(classes=["together"])
+            formula.replace_self(together)
+            together += [formula, nodes.Text(stop[0])]
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", _docstring)
     app.connect("doctree-resolved", _fold)
     app.connect("doctree-resolved", _widen)
+    app.connect("doctree-resolved", _hold_together)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
