@@ -102,16 +102,8 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
         for shot in flat:
             shot.putpalette(tones.ravel().tolist())
         flat = [shot.convert("RGB") for shot in flat]
-        film = _file(
-            flat[0],
-            "WEBP",
-            save_all=True,
-            append_images=flat[1:],
-            duration=durations,
-            loop=loops,
-            lossless=True,
-            method=4,
-        )
+        timing = {"duration": durations, "loop": loops}
+        film = _file(flat[0], "WEBP", save_all=True, append_images=flat[1:], lossless=True, method=4, **timing)
         if len(film) <= LARGEST:
             break
     return film
@@ -187,11 +179,5 @@ def film(
             )
         shots = [shots[k] for k in _kept(len(shots), 3 * len(shots) // 4, -1)]
         note = f"{len(shots)} of {count} pictures, because all of them make more than {LARGEST / 1000:.0f} kB."
-    return Film(
-        moving=moving,
-        poster=_file(still, "WEBP", quality=85, method=6),
-        png=_file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True),
-        size=still.size,
-        alt=alt,
-        note=note,
-    )
+    small = _file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True)
+    return Film(moving, _file(still, "WEBP", quality=85, method=6), small, still.size, alt, note)
