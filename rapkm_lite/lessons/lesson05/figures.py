@@ -82,12 +82,8 @@ def plot_feedback_along(trajectory, ax=None):
     ax = axes_or_new(ax)
     robot = trajectory.robot
     for pair in drive_pairs(robot):
-        ax.semilogy(
-            trajectory.t,
-            feedback_norm(robot, trajectory.q, pair),
-            label=f"pair {pair_name(pair)}",
-            **pair_line(robot, pair),
-        )
+        norm = feedback_norm(robot, trajectory.q, pair)
+        ax.semilogy(trajectory.t, norm, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, feedback_norm(robot, trajectory.q), label="redundant", color=AFTER, lw=2.4)
     ax.set(xlabel="time in s", ylabel="norm in N m per rad/s²", xlim=(0, trajectory.t[-1]))
     ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.06, 1.0), columnspacing=1.2, handlelength=1.8)

@@ -58,16 +58,8 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     plot_machine(robot, np.zeros(robot.n_joints), ax, arms=[])
     for i, point in enumerate(robot.base):
         ax.plot(*point, "o", color=arm_colour(i), ms=10)
-        ax.annotate(
-            f"drive {i + 1}",
-            point,
-            xytext=(0, 12 if point[1] > 0 else -16),
-            textcoords="offset points",
-            ha="center",
-            color=arm_colour(i),
-            fontweight="bold",
-            fontsize=9,
-        )
+        place = {"xytext": (0, 12 if point[1] > 0 else -16), "textcoords": "offset points", "ha": "center"}
+        ax.annotate(f"drive {i + 1}", point, color=arm_colour(i), fontweight="bold", fontsize=9, **place)
     marks = ax.scatter(*np.asarray(centres).T, c=values, marker="s", s=60, zorder=3)
     ax.figure.colorbar(marks, ax=ax, label=label)
     if path is not None:
@@ -104,14 +96,8 @@ def plot_readings(names, low, high, readings, reference=None, ax=None):
     for line in share:
         ax.plot(line, rows, "o-", color=NEUTRAL, ms=5, lw=0.6, alpha=0.6)
     if reference is not None:
-        ax.plot(
-            (np.asarray(reference) - low) / (np.asarray(high) - low),
-            rows,
-            "D",
-            color=ALARM,
-            ms=7,
-            label="the reading of the data file",
-        )
+        at = (np.asarray(reference) - low) / (np.asarray(high) - low)
+        ax.plot(at, rows, "D", color=ALARM, ms=7, label="the reading of the data file")
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]".replace("-", "−") for n, a, b in zip(names, low, high, strict=True)])
     ax.set(xlim=(-0.02, 1.02), xlabel="position in the search range, 0 … 1")

@@ -53,13 +53,8 @@ def plot_model_share(eps, share, t, leak, axes=None):
     axes[0].set(xlabel="all links too long by the share ε", ylabel="share that still fights", title="in motion")
     axes[0].legend(loc="upper left")
     axes[1].plot(t, 1e3 * leak, color=ALARM)
-    axes[1].set(
-        xlabel="time in s",
-        ylabel="leaking force in mN per N m",
-        title="a prestress on the way, ε = 0.001",
-        xlim=(t[0], t[-1]),
-        ylim=(0, None),
-    )
+    axes[1].set(xlabel="time in s", ylabel="leaking force in mN per N m", xlim=(t[0], t[-1]), ylim=(0, None))
+    axes[1].set_title("a prestress on the way, ε = 0.001")
     return axes
 
 
