@@ -243,9 +243,7 @@ ACCELERATIONS = {
     "these are the accelerations of the two independent joints; the step back to all joints is missing": (
         _projected(joints=0.0)
     ),
-    "these are the accelerations of the free arms: the loops are not held closed, the factor F is missing": (
-        _free_tree
-    ),
+    "these are the accelerations of the free arms: the loops are not held closed, the factor F is missing": _free_tree,
 }
 
 FORCES = {

@@ -146,9 +146,7 @@ MEANS = {
     "the root is one too many: this is sigma times the root of the trace": (
         lambda S, sigma: sigma * np.sqrt(np.trace(S))
     ),
-    "this is the standard deviation of the cost, not its mean": (
-        lambda S, sigma: sigma**2 * np.sqrt(2 * np.sum(S * S))
-    ),
+    "this is the standard deviation of the cost, not its mean": lambda S, sigma: sigma**2 * np.sqrt(2 * np.sum(S * S)),
     "these are the costs of the single drives; their sum is wanted": lambda S, sigma: sigma**2 * np.diag(S),
     "this is sigma² S, still a matrix: take the mean of dq^T S dq": lambda S, sigma: sigma**2 * S,
     "S is squared: the cost is dq^T S dq, not the square of S dq": lambda S, sigma: sigma**2 * np.trace(S @ S),
