@@ -41,10 +41,6 @@ def _of_matrices(matrix):
     return form
 
 
-def _without_inverse(A, N):
-    return np.eye(N) - A @ A.swapaxes(-1, -2)
-
-
 def _of_cross_products(robot, trajectory, K_P):
     """The three-drive formula with the null vector, for the first three drives."""
     A = control_matrix(robot, trajectory.q)[:, :3]
@@ -84,7 +80,9 @@ FORMS = {
             * (np.eye(robot.n_arms) - (A := control_matrix(robot, trajectory.q)[:-1].mean(axis=0)) @ np.linalg.pinv(A))
         )
     ),
-    "the inverse of A^T A is missing: I - A A^T is no projector": _of_matrices(_without_inverse),
+    "the inverse of A^T A is missing: I - A A^T is no projector": _of_matrices(
+        lambda A, N: np.eye(N) - A @ A.swapaxes(-1, -2)
+    ),
     "this is A A^T: neither a projector nor the part that moves nothing": _of_matrices(
         lambda A, N: A @ A.swapaxes(-1, -2)
     ),
