@@ -71,13 +71,10 @@ def film_workshop(robot, offset, frames: int = 36):
         for ax, run, meter, name in zip(axes, runs, meters, ("machine A", "machine B"), strict=True):
             _draw_at_work(robot, run.q[k], lap, meter[k], most, ax, f"{name}, {run.t[k]:.1f} s")
 
-    return film(
-        draw,
-        np.linspace(0, len(path.t) - 1, frames).astype(int),
+    alt = (
         "Two equal machines with three arms take their tool around the same triangle in five seconds and then stand "
         f"still for five more. The meter of machine A stops at {meters[0][-1]:.1f} J. That of machine B rises faster, "
-        f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J.",
-        panels=2,
-        figsize=(7.6, 3.2),
-        seconds=10,
+        f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J."
     )
+    steps = np.linspace(0, len(path.t) - 1, frames).astype(int)
+    return film(draw, steps, alt, panels=2, figsize=(7.6, 3.2), seconds=10)

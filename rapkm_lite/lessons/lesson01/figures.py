@@ -233,11 +233,8 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
         axes[-1].legend(loc="upper left")
 
     names = list(poses)
-    return film(
-        draw,
-        np.linspace(0, len(t) - 1, frames).astype(int),
+    alt = (
         f"Two simulations of the machine on its circle. {names[0]}: the tips drift apart, to {size:.0f} mm after "
-        f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero.",
-        panels=3,
-        figsize=(8.8, 3.0),
+        f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero."
     )
+    return film(draw, np.linspace(0, len(t) - 1, frames).astype(int), alt, panels=3, figsize=(8.8, 3.0))

@@ -35,8 +35,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
     >>> ax = plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
     """
     modes = working_modes(robot)
-    if axes is None:
-        axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1]
+    axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1] if axes is None else axes
     for k, (ax, mode) in enumerate(zip(np.ravel(axes), modes, strict=True)):
         plot_map(x, y, sigma[k], ax, vmin=0.0, vmax=sigma.max(), bar=False)
         plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
@@ -56,8 +55,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     >>> ax = plot_parameterization_singularities(path, [0.094, 0.064])
     """
     robot = trajectory.robot
-    if axes is None:
-        axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
+    axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1] if axes is None else axes
     q = inverse_kinematics(robot, x)
     plot_workspace(robot, axes[0])
     plot_pair_curves(robot, axes[0], pairs=[pair])

@@ -108,8 +108,7 @@ def plot_log(log, axes=None):
     >>> import rapkm_lite as rk
     >>> ax = plot_log(rk.mystery_run("gain"))
     """
-    if axes is None:
-        axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True)
+    axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True) if axes is None else axes
     for i in range(log.c.shape[1]):
         axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
         axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))

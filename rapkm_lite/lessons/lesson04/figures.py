@@ -207,16 +207,16 @@ def film_filter(run, frames: int = 18):
     >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
     (768, 307)
     """
-    return film(
-        lambda axes, share: plot_filter_share(run, share, axes),
-        [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)],
+    alt = (
         "Left the torques of the three drives over time, lopsided at first, right every sample as a point, antagonism "
         "to the side and torque that moves upwards. While the filter is turned on the curves draw together, and all "
-        "points travel sideways onto the vertical axis and keep their height.",
-        panels=2,
-        figsize=(8.0, 3.2),
-        seconds=4,
+        "points travel sideways onto the vertical axis and keep their height."
     )
+
+    def draw(axes, share):
+        plot_filter_share(run, share, axes)
+
+    return film(draw, [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)], alt, panels=2, figsize=(8.0, 3.2), seconds=4)
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):

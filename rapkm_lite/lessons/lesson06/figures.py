@@ -17,8 +17,7 @@ def plot_landscape(values, cube, theory, axes=None):
     >>> import numpy as np; cube = np.ones((3, 3, 3))
     >>> ax = plot_landscape([-1.0, 0.0, 1.0], cube, cube)
     """
-    if axes is None:
-        axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1]
+    axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1] if axes is None else axes
     levels = np.max(cube) * np.linspace(0, 1, 9) ** 2  # evenly spaced ellipses of a quadratic form
     for ax, k in zip(axes, (0, len(values) // 2, len(values) - 1), strict=True):
         filled = ax.contourf(values, values, cube[:, :, k].T, levels=levels)
