@@ -32,7 +32,7 @@ def plot_working_modes(robot, x, axes=None):
     return axes
 
 
-def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""):
+def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str) -> None:
     """The machine at q (2N,) on its path, and a meter beside it: `spent` of `most` energy, both in J."""
     plot_path(path, ax, lw=0.9)
     plot_machine(robot, q, ax, labels=False)
@@ -43,7 +43,6 @@ def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""
     ax.text(-0.4, 0.34, title, fontweight="bold")
     ax.set(xlim=(-0.42, 0.62), ylim=(-0.34, 0.38))
     ax.set_axis_off()
-    return ax
 
 
 def film_workshop(robot, offset, frames: int = 36):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mechanics.actuation import control_matrix
+from ...mechanics.actuation import control_matrix, prestress_projector
 from ...simulation.energy import antagonism_form
 
 
 def _null(robot, trajectory) -> np.ndarray:
     """The projector N_{A^T} (k, N, N) at every sample."""
-    A = control_matrix(robot, trajectory.q)
-    return np.eye(robot.n_arms) - A @ np.linalg.pinv(A)
+    return prestress_projector(control_matrix(robot, trajectory.q))
 
 
 def _weight(robot) -> float:

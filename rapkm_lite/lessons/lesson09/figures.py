@@ -133,8 +133,7 @@ def plot_one_sign(trajectory, ax=None, n: int = 201):
     plot_path(trajectory, ax)
     ax.fill([], [], color="#B9CDE0", label="one sign possible")
     ax.fill([], [], color="#E8E4DC", label="impossible")
-    room = [(float(v[0]), float(v[-1])) for v in (x, y)]
-    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", xlim=room[0], ylim=room[1])
+    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", xlim=x[[0, -1]], ylim=y[[0, -1]])
     ax.grid(False)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
