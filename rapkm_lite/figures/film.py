@@ -87,8 +87,13 @@ def _shots(draw: Callable, steps: list, panels: int, figsize: tuple[float, float
     return shots
 
 
-def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes:
-    """The animated WebP: lines and flat colours are smallest without loss in few colours, one set for all frames."""
+def _moving(shots: list[Image.Image], seconds: float, rest: float, loops: int) -> bytes:
+    """The animated WebP in equal steps, whose last picture rests.
+
+    Lines and flat colours are smallest without loss in few colours, one set for all frames.
+    """
+    each = round(1000 * seconds / len(shots))
+    durations = [each] * (len(shots) - 1) + [each + round(1000 * rest)]
     some = [np.asarray(shot) for shot in shots[:: max(1, len(shots) // 6)] + shots[-1:]]
     # Thin lines have few pixels: without a stripe of its own an arm's colour would be merged with another one.
     stripes = np.array([ImageColor.getrgb(colour) for colour in ARM_COLOURS], dtype=np.uint8)
@@ -107,12 +112,6 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
         if len(film) <= LARGEST:
             break
     return film
-
-
-def _timed(shots: list[Image.Image], seconds: float, rest: float, loops: int) -> bytes:
-    """The animated WebP in equal steps, whose last picture rests."""
-    each = round(1000 * seconds / len(shots))
-    return _moving(shots, [each] * (len(shots) - 1) + [each + round(1000 * rest)], loops)
 
 
 def _kept(count: int, most: int, poster: int) -> list[int]:
@@ -171,7 +170,7 @@ def film(
     with matplotlib.style.context(STYLE):
         shots = _shots(draw, steps, panels, figsize, dpi)
     still = shots[poster]
-    while len(moving := _timed(shots, seconds, rest, loops)) > LARGEST:
+    while len(moving := _moving(shots, seconds, rest, loops)) > LARGEST:
         if len(shots) <= _FEWEST:
             raise ValueError(
                 f"frames: {len(shots)} pictures of {still.width} x {still.height} make {len(moving) / 1000:.0f} kB; "

@@ -43,10 +43,6 @@ def saved_energy(robot: Manipulator, A, c, dt) -> np.ndarray:
     return energy.copper_loss(robot, c, dt) - energy.copper_loss(robot, kept, dt)
 
 
-def _torque_cases(rng):
-    return [(A, rng.normal(0, 0.05, 3)) for A in _control_matrices(rng, 20)]
-
-
 def _torque_law(got, A, c):
     number = max(np.max(np.abs(A.T @ (got - c))), abs(_null(A) @ got))
     return number, "change of the end-effector force (N), or torque left along the null vector of A^T (N m)"
@@ -142,7 +138,7 @@ EXERCISES = {
             "A^T A f = A^T c: f = np.linalg.solve(A.T @ A, A.T @ c), then A @ f.",
         ),
         unit="N m",
-        cases=_torque_cases,
+        cases=lambda rng: [(A, rng.normal(0, 0.05, 3)) for A in _control_matrices(rng, 20)],
         invariant=_torque_law,
         tolerance=1e-10,
         close=3e-2,
