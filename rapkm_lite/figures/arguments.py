@@ -85,9 +85,7 @@ def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -
     if kind == "bool" or isinstance(default, bool):
         switch(name, value)
     elif kind == "str" or isinstance(default, str):
-        of_kind(name, value, str, "text")
-        if name == "colour":
-            _colour(name, value)
+        _text(name, value)
     elif kind == "dict":
         _dictionary(name, value)
     elif kind.startswith("int"):
@@ -210,10 +208,11 @@ def _words(name: str, value, known: Known) -> None:
         raise ValueError(f"{name} = {short(value)}; allowed: a list of words")
 
 
-def _colour(name: str, value) -> None:
+def _text(name: str, value) -> None:
     from matplotlib.colors import is_color_like
 
-    if not is_color_like(value):
+    of_kind(name, value, str, "text")
+    if name == "colour" and not is_color_like(value):
         raise ValueError(f"{name} = {short(value)}; allowed: a colour of Matplotlib, such as '#112233'")
 
 
