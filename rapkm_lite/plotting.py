@@ -4,18 +4,8 @@ Written by ``python notebooks/build.py``, for editors and readers; the figures l
 """
 
 from .figures.arguments import guarded
-from .figures.film import (
-    LARGEST,
-    film,
-)
-from .figures.machine import (
-    arm_points,
-    plane_axes,
-    plane_limits,
-    plot_machine,
-    plot_path,
-    plot_workspace,
-)
+from .figures.film import LARGEST, film
+from .figures.machine import arm_points, plane_axes, plane_limits, plot_machine, plot_path, plot_workspace
 from .figures.maps import (
     curve_crossings,
     grid_points,
@@ -27,11 +17,7 @@ from .figures.maps import (
     plot_map,
     plot_pair_curves,
 )
-from .figures.runs import (
-    lines_per_drive,
-    plot_errors,
-    plot_torques,
-)
+from .figures.runs import lines_per_drive, plot_errors, plot_torques
 from .figures.style import (
     AFTER,
     ALARM,
@@ -47,13 +33,8 @@ from .figures.style import (
     axes_or_new,
     use_style,
 )
-from .figures.tables import (
-    table,
-)
-from .lessons.lesson00.figures import (
-    film_workshop,
-    plot_working_modes,
-)
+from .figures.tables import table
+from .lessons.lesson00.figures import film_workshop, plot_working_modes
 from .lessons.lesson01.figures import (
     film_loops,
     plot_complement_size,
@@ -107,31 +88,10 @@ from .lessons.lesson05.figures import (
     plot_singular_poses,
     plot_torques_and_errors,
 )
-from .lessons.lesson06.figures import (
-    plot_bands,
-    plot_gain_curve,
-    plot_landscape,
-    plot_placement,
-    plot_readings,
-)
-from .lessons.lesson07.figures import (
-    plot_demand,
-    plot_five_bar_curves,
-    plot_spacing,
-)
-from .lessons.lesson08.figures import (
-    plot_bias,
-    plot_chatter,
-    plot_counted,
-    plot_places,
-    plot_torque_steps,
-)
-from .lessons.lesson09.figures import (
-    plot_accelerations,
-    plot_clipping,
-    plot_one_sign,
-    plot_room,
-)
+from .lessons.lesson06.figures import plot_bands, plot_gain_curve, plot_landscape, plot_placement, plot_readings
+from .lessons.lesson07.figures import plot_demand, plot_five_bar_curves, plot_spacing
+from .lessons.lesson08.figures import plot_bias, plot_chatter, plot_counted, plot_places, plot_torque_steps
+from .lessons.lesson09.figures import plot_accelerations, plot_clipping, plot_one_sign, plot_room
 from .lessons.lesson10.figures import (
     plot_faulty_runs,
     plot_geometry_maps,
@@ -146,12 +106,7 @@ from .lessons.lesson11.figures import (
     plot_slow_error,
     plot_step_response,
 )
-from .lessons.lesson12.figures import (
-    plot_apex,
-    plot_four_legs,
-    plot_length_choice,
-    plot_swing,
-)
+from .lessons.lesson12.figures import plot_apex, plot_four_legs, plot_length_choice, plot_swing
 
 __all__ = [
     "AFTER",

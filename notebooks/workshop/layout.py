@@ -49,7 +49,9 @@ def figure_list() -> str:
                 raise ValueError(f"{name} stands in {owner[name]} and in {module}; allowed: one figure of that name")
             owner[name] = module
         if names:
-            text += [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+            line = f"from {module} import {', '.join(names)}"
+            long = [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+            text += [line] if len(line) <= 120 else long
     text[5:5] = ["from .figures.arguments import guarded"]
     text += ["", "__all__ = ["]
     text += [*(f'    "{name}",' for name in sorted(owner)), "]", "", "globals().update(guarded(globals()))", ""]

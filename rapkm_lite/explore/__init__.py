@@ -7,15 +7,7 @@
 
 from ..figures.arguments import guarded
 from ..figures.machine import plane_limits
-from ..figures.marks import (
-    Palette,
-    Picture,
-    bars,
-    draw_machine,
-    draw_workspace,
-    drive_legend,
-    pair_legend,
-)
+from ..figures.marks import Palette, Picture, bars, draw_machine, draw_workspace, drive_legend, pair_legend
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .geometry import actuation, machine, prestress

@@ -12,6 +12,8 @@ from ..machine.arguments import exact_array, function, having, of_kind, positive
 from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
+_COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}
+
 
 def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
     """A slider; whole numbers when all four are.  The label names the unit.
@@ -24,7 +26,7 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
     whole = all(isinstance(v, int) for v in (low, high, step, value))
     kind = widgets.IntSlider if whole else widgets.FloatSlider
     form = {} if whole else {"readout_format": f".{max(0, math.ceil(-math.log10(step) - 1e-9))}f"}
-    return kind(value, min=low, max=high, step=step, description=label, **form, **_common())
+    return kind(value, min=low, max=high, step=step, description=label, **form, **_COMMON)
 
 
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
@@ -39,7 +41,7 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
     # A browser moves a value between two steps to the nearer one, so the steps are laid through the value.
     first = math.log10(value) - step * round(math.log10(value / low) / step)
     ends = {"base": 10, "min": first, "max": first + steps * step, "step": step}
-    return widgets.FloatLogSlider(value, description=label, readout_format=".3g", **ends, **_common())
+    return widgets.FloatLogSlider(value, description=label, readout_format=".3g", **ends, **_COMMON)
 
 
 def choice(label: str, options, value=None) -> widgets.Widget:
@@ -54,7 +56,7 @@ def choice(label: str, options, value=None) -> widgets.Widget:
     known = [_meaning(option) for option in options]
     if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
         raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
-    return widgets.Dropdown(options=options, value=known[0] if value is None else value, description=label, **_common())
+    return widgets.Dropdown(options=options, value=known[0] if value is None else value, description=label, **_COMMON)
 
 
 def _meaning(option):
@@ -72,7 +74,7 @@ def switch(label: str, value: bool = False) -> widgets.Widget:
     >>> switch("filter").value
     False
     """
-    return widgets.Checkbox(value, description=label, indent=False, **_common())
+    return widgets.Checkbox(value, description=label, indent=False, **_COMMON)
 
 
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
@@ -199,7 +201,3 @@ def _ends(widget) -> tuple[float, float]:
     if isinstance(widget, widgets.FloatLogSlider):
         return widget.base**widget.min, widget.base**widget.max
     return widget.min, widget.max
-
-
-def _common() -> dict:
-    return {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}

@@ -54,8 +54,9 @@ def explorer(
         are the arguments of `draw` (a ``**rest`` takes what it does not name).
     panels, layout, widths, size, setup : see `Picture`.
     play : name of a whole-number slider that gets a play button.
-    live : redraw while a slider is dragged; default only with the compiled engine.
-    about : a sentence of what is to be seen, for those who do not see it; default the first line of `draw`'s docstring.
+    live : redraw while a slider is dragged, where the engine is compiled and ipywidgets is 8 or later; default True.
+    about : a sentence of what is to be seen, for those who do not see it; default the first line of the docstring of
+        `draw`, or else of the function that it is local to.
     Raises ValueError, naming both sides, when the controls and the arguments of `draw` differ.
 
     >>> from rapkm_lite import explore

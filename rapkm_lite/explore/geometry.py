@@ -22,7 +22,7 @@ from .controls import choice, slider
 from .explorer import Explorer, explorer
 from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders, ready_made
 
-# Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.
+# Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.5.
 WEAK = 1.5
 # Steps of the map on which the arms stand out; weak is far from the colour of the paper.
 MAP = marks.Palette(
@@ -67,10 +67,9 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
-        for pair in [which[drives]] if which[drives] else []:
-            for curve in curves(mode, pair):
-                picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
-                picture.line("machine", *curve.T, **pair_line(robot, pair) | {"linewidth": 2.2}, zorder=2)
+        for curve in curves(mode, which[drives]) if which[drives] else ():
+            picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
+            picture.line("machine", *curve.T, **pair_line(robot, which[drives]) | {"linewidth": 2.2}, zorder=2)
         A = act.control_matrix(robot, q)
         numbers = {
             "end-effector": f"({1e3 * point[0]:z.0f}, {1e3 * point[1]:z.0f}) mm",
@@ -221,5 +220,4 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
 
 def sign_changes(c: np.ndarray) -> np.ndarray:
     """How often each column of c (k, m) changes its sign, zeros not counted, (m,)."""
-    signs = [np.sign(column[np.abs(column) > 1e-9]) for column in c.T]
-    return np.array([int(np.count_nonzero(np.diff(s))) for s in signs])
+    return np.array([np.count_nonzero(np.diff(np.sign(column[np.abs(column) > 1e-9]))) for column in c.T])

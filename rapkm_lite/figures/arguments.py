@@ -100,12 +100,6 @@ def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -
         curve(name, value, known)
 
 
-def _text(name: str, value) -> None:
-    of_kind(name, value, str, "text")
-    if name == "colour":
-        _colour(name, value)
-
-
 def _dictionary(name: str, value) -> None:
     if not isinstance(value, dict) or not value:
         raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
@@ -119,16 +113,9 @@ def _trajectory(name: str, value, known: Known) -> None:
     of_kind(name, value, Trajectory, "a Trajectory, such as triangle(robot) returns")
 
 
-def _run(name: str, value, known: Known) -> None:
-    having(name, value, "a Run, such as simulate returns", "robot", "q", "q_a", "c", "dt")
-
-
-def _log(name: str, value, known: Known) -> None:
-    having(name, value, "a Log, such as mystery_run returns", "t", "q_a", "q_a_desired", "c")
-
-
-def _table(name: str, value, known: Known) -> None:
-    having(name, value, "what table1() returns", "measured", "simulated")
+def _having(words: str, attributes: str) -> Callable[[str, Any, Known], None]:
+    """The rule for a value that is known by its attributes."""
+    return lambda name, value, known: having(name, value, words, *attributes.split())
 
 
 def _axes(name: str, value, known: Known) -> None:
@@ -217,52 +204,40 @@ def _rows(name: str, value, known: Known) -> None:
 
 
 def _words(name: str, value, known: Known) -> None:
-    listed = isinstance(value, list | tuple) and value and all(isinstance(word, str) for word in value)
-    if not listed:
+    if not (isinstance(value, list | tuple) and value and all(isinstance(word, str) for word in value)):
         raise ValueError(f"{name} = {short(value)}; allowed: a list of words")
 
 
-def _colour(name: str, value) -> None:
+def _text(name: str, value) -> None:
     from matplotlib.colors import is_color_like
 
-    if not is_color_like(value):
+    of_kind(name, value, str, "text")
+    if name == "colour" and not is_color_like(value):
         raise ValueError(f"{name} = {short(value)}; allowed: a colour of Matplotlib, such as '#112233'")
 
 
 def _gain(name: str, value, known: Known) -> None:
-    array = real_array(name, value)
-    if array.ndim == 0:
+    if real_array(name, value).ndim == 0:
         positive_number(name, value)
 
 
 _RULES: dict[str, Callable[[str, Any, Known], None]] = {
     "robot": _robot,
-    "trajectory": _trajectory,
-    "path": _trajectory,
-    "run": _run,
-    "log": _log,
-    "table": _table,
-    "ax": _axes,
-    "axes": _axes,
+    "log": _having("a Log, such as mystery_run returns", "t q_a q_a_desired c"),
+    "table": _having("what table1() returns", "measured simulated"),
     "q": _pose,
     "offset": _offset,
     "pair": _pair,
     "pairs": _pairs,
     "arms": _arms,
-    "mode": _signs,
-    "modes": _signs,
-    "K": _gain,
-    "K_P": _gain,
-    "free": _run,
-    "clipped": _run,
-    "names": _words,
-    "labels": _words,
-    "rules": _words,
-    "head": _words,
     "rows": _rows,
-    "marked": _level,
-    "special": _level,
-    **dict.fromkeys("rate vmin vmax target nominal".split(), _level),
+    **dict.fromkeys("trajectory path".split(), _trajectory),
+    **dict.fromkeys("run free clipped".split(), _having("a Run, such as simulate returns", "robot q q_a c dt")),
+    **dict.fromkeys("ax axes".split(), _axes),
+    **dict.fromkeys("mode modes".split(), _signs),
+    **dict.fromkeys("K K_P".split(), _gain),
+    **dict.fromkeys("names labels rules head".split(), _words),
+    **dict.fromkeys("rate vmin vmax target nominal marked special".split(), _level),
     **dict.fromkeys("quantum friction guaranteed".split(), _size_of),
     **dict.fromkeys("F n limit zoom places start stop end box forces room pose low high centres".split(), _numbers),
 }

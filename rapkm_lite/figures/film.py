@@ -87,8 +87,13 @@ def _shots(draw: Callable, steps: list, panels: int, figsize: tuple[float, float
     return shots
 
 
-def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes:
-    """The animated WebP: lines and flat colours are smallest without loss in few colours, one set for all frames."""
+def _moving(shots: list[Image.Image], seconds: float, rest: float, loops: int) -> bytes:
+    """The animated WebP in equal steps, whose last picture rests.
+
+    Lines and flat colours are smallest without loss in few colours, one set for all frames.
+    """
+    each = round(1000 * seconds / len(shots))
+    durations = [each] * (len(shots) - 1) + [each + round(1000 * rest)]
     some = [np.asarray(shot) for shot in shots[:: max(1, len(shots) // 6)] + shots[-1:]]
     # Thin lines have few pixels: without a stripe of its own an arm's colour would be merged with another one.
     stripes = np.array([ImageColor.getrgb(colour) for colour in ARM_COLOURS], dtype=np.uint8)
@@ -102,25 +107,11 @@ def _moving(shots: list[Image.Image], durations: list[int], loops: int) -> bytes
         for shot in flat:
             shot.putpalette(tones.ravel().tolist())
         flat = [shot.convert("RGB") for shot in flat]
-        film = _file(
-            flat[0],
-            "WEBP",
-            save_all=True,
-            append_images=flat[1:],
-            duration=durations,
-            loop=loops,
-            lossless=True,
-            method=4,
-        )
+        timing = {"duration": durations, "loop": loops}
+        film = _file(flat[0], "WEBP", save_all=True, append_images=flat[1:], lossless=True, method=4, **timing)
         if len(film) <= LARGEST:
             break
     return film
-
-
-def _timed(shots: list[Image.Image], seconds: float, rest: float, loops: int) -> bytes:
-    """The animated WebP in equal steps, whose last picture rests."""
-    each = round(1000 * seconds / len(shots))
-    return _moving(shots, [each] * (len(shots) - 1) + [each + round(1000 * rest)], loops)
 
 
 def _kept(count: int, most: int, poster: int) -> list[int]:
@@ -179,7 +170,7 @@ def film(
     with matplotlib.style.context(STYLE):
         shots = _shots(draw, steps, panels, figsize, dpi)
     still = shots[poster]
-    while len(moving := _timed(shots, seconds, rest, loops)) > LARGEST:
+    while len(moving := _moving(shots, seconds, rest, loops)) > LARGEST:
         if len(shots) <= _FEWEST:
             raise ValueError(
                 f"frames: {len(shots)} pictures of {still.width} x {still.height} make {len(moving) / 1000:.0f} kB; "
@@ -187,11 +178,5 @@ def film(
             )
         shots = [shots[k] for k in _kept(len(shots), 3 * len(shots) // 4, -1)]
         note = f"{len(shots)} of {count} pictures, because all of them make more than {LARGEST / 1000:.0f} kB."
-    return Film(
-        moving=moving,
-        poster=_file(still, "WEBP", quality=85, method=6),
-        png=_file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True),
-        size=still.size,
-        alt=alt,
-        note=note,
-    )
+    small = _file(still.quantize(256, dither=Image.Dither.NONE), "PNG", optimize=True)
+    return Film(moving, _file(still, "WEBP", quality=85, method=6), small, still.size, alt, note)

@@ -40,18 +40,9 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
         if labels:
             # Opposite to the proximal link, where the arm itself seldom lies.
             away = (points[0] - points[1]) / robot.lengths[i, 0]
-            ax.annotate(
-                f"drive {i + 1}",
-                robot.base[i],
-                xytext=away * (36, 17),
-                textcoords="offset points",
-                ha="center",
-                va="center",
-                color=arm_text_colour(i),
-                fontweight="bold",
-                fontsize=9,
-                zorder=6,
-            )
+            look = {"color": arm_text_colour(i), "fontweight": "bold", "fontsize": 9, "ha": "center", "va": "center"}
+            place = {"xytext": away * (36, 17), "textcoords": "offset points", "zorder": 6}
+            ax.annotate(f"drive {i + 1}", robot.base[i], **place, **look)
     return plane_axes(robot, ax)
 
 
@@ -94,13 +85,8 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     margin = float(bounded("margin", exact_array("margin", margin), 0.0, strict=False))
     room = robot.lengths[:, 0].max() + margin * robot.lengths.max()
     low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
-    return {
-        "xlabel": "x in m",
-        "ylabel": "y in m",
-        "aspect": "equal",
-        "xlim": (low[0], high[0]),
-        "ylim": (low[1], high[1]),
-    }
+    frame = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
+    return {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal"} | frame
 
 
 def plane_axes(robot, ax):

@@ -116,16 +116,8 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
         if pairs is not None and pair not in pairs:
             continue
         look: dict[str, Any] = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
-        drawn = ax.contour(
-            x,
-            y,
-            cross[..., k],
-            levels=[0.0],
-            colors=[look["color"]],
-            linestyles=[look["linestyle"]],
-            linewidths=look.get("linewidth", 1.6),
-            zorder=3,
-        )
+        style = {"colors": [look["color"]], "linestyles": [look["linestyle"]], "linewidths": look.get("linewidth", 1.6)}
+        drawn = ax.contour(x, y, cross[..., k], levels=[0.0], zorder=3, **style)
         if on_map:
             drawn.set_path_effects(_OUTLINED)
         else:

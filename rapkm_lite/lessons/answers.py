@@ -163,10 +163,8 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     if got.shape != shape:
         if got.ndim == 2 and got.shape == shape[::-1]:
             raise Ended("wrong", f"the answer is transposed: shape {got.shape}, expected {shape}", "transposed")
-        layout = (
-            "; a flat array is wanted" if len(shape) == 1 else "; their number is right, the rows and columns are not"
-        )
-        extra = layout * (got.size == int(np.prod(shape)) and got.size > 1)
+        flat, other = "; a flat array is wanted", "; their number is right, the rows and columns are not"
+        extra = (flat if len(shape) == 1 else other) * (got.size == int(np.prod(shape)) and got.size > 1)
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
     if not np.all(np.isfinite(got)):
         raise Ended("wrong", "the answer holds NaN or infinity", "NaN or infinity")

@@ -39,17 +39,13 @@ def _unwrapped(answer: Any) -> Any:
     return answer
 
 
-def _seeded(exercise: Exercise) -> list[tuple]:
-    return exercise.cases(np.random.default_rng(20_111_130))
-
-
 def _is_far(case: tuple) -> TypeGuard[Case]:
     return isinstance(case, Case) and case.beyond
 
 
 def _near_and_far(exercise: Exercise, answer: Any) -> Result:
     """The verdict on the plain cases; what is right there may fall short in those that lie beyond."""
-    cases = _seeded(exercise)
+    cases = exercise.cases(np.random.default_rng(20_111_130))
     far = [case for case in cases if _is_far(case)]
     result = _numbers(exercise, answer, [case for case in cases if not _is_far(case)])
     if not far:
@@ -119,9 +115,8 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     off = f"off by up to {max(worst):.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
     share = _share(worst, want, right)
     if share <= exercise.close:
-        return Result(
-            "close", f"the method is right, {off}, that is {100 * share:.2g} %. To improve: {exercise.improve}"
-        )
+        near = f"the method is right, {off}, that is {100 * share:.2g} %"
+        return Result("close", f"{near}. To improve: {exercise.improve}")
     _explained(exercise, seen, right, off)
     law = f"; {sentence}: {lawful:.3g}" if exercise.invariant and lawful > exercise.tolerance else ""
     raise Ended("wrong", f"it is {off}{law}", "no name found")

@@ -32,8 +32,7 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
         print(f"Your own {name} cannot be drawn here ({type(error).__name__}); the lesson goes on with the package's.")
         return
     if not np.all(np.isfinite(y)) or np.max(np.abs(y), initial=0.0) > 20 * max(map(abs, limits[1])):
-        ax.set_xlim(limits[0])
-        ax.set_ylim(limits[1])
+        ax.set(xlim=limits[0], ylim=limits[1])
     if per_arm:
         for i, line in enumerate(lines):
             line.set_color(arm_colour(i))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 
-from .palette import Palette, canvas_style
+from .palette import canvas_style
 from .picture import Mark, Picture
 
 
@@ -40,7 +42,7 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
         if mark.kind == "legend":
             row.append([[words, style_of("line", style)] for words, style in mark.words])
         elif mark.kind == "scale":
-            row.append([_colours(mark.words[0]), mark.words[1]])
+            row.append([asdict(mark.words[0]), mark.words[1]])
         else:
             row[2] = style_of(mark.kind, mark.style)
         if mark.kind == "image":
@@ -52,7 +54,7 @@ def encode(picture: Picture, marks: list[Mark], known: dict) -> tuple[dict, list
                 filled = np.ma.filled(np.ma.asarray(values, dtype=np.float32), np.nan)
                 images[known[key][0]] = [*filled.shape, *extent]
                 buffers.append(filled.astype("<f4").tobytes())
-            row.append([known[key][0], _colours(palette)])
+            row.append([known[key][0], asdict(palette)])
         elif mark.kind in ("label", "words", "title"):
             row.append(mark.words)
         rows.append(row)
@@ -86,7 +88,3 @@ def decode(header: dict, buffers: list[bytes], styles: dict) -> list[tuple]:
         marks.append((kind, panel, styles.get(style), numbers[at : at + 2 * count].reshape(-1, 2)))
         at += 2 * count
     return marks
-
-
-def _colours(palette: Palette) -> dict:
-    return {"levels": palette.levels, "light": palette.light, "dark": palette.dark}

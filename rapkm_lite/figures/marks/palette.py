@@ -10,18 +10,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, is_color_like, to_he
 
 from ...machine.arguments import bounded, exact_array, real_array, short
 
-LINE = {
-    "color",
-    "linewidth",
-    "linestyle",
-    "alpha",
-    "zorder",
-    "marker",
-    "markersize",
-    "markerfacecolor",
-    "markeredgewidth",
-    "solid_capstyle",
-}
+LINE = {"color", "linewidth", "linestyle", "alpha", "zorder", "solid_capstyle"}
+LINE |= {"marker", "markersize", "markerfacecolor", "markeredgewidth"}
 PATCH = {"facecolor", "edgecolor", "linewidth", "linestyle", "alpha", "zorder", "fill"}
 WORDS = {"color", "fontsize", "fontweight", "ha", "va", "alpha", "zorder"}
 STYLES = {"line": LINE, "bar": PATCH, "polygon": PATCH, "label": WORDS, "words": WORDS, "title": WORDS - {"ha", "va"}}
@@ -111,9 +101,6 @@ def canvas_style(kind: str, items: tuple) -> dict:
         out |= {"width": style.get("linewidth", 1.0), "dash": dash or ()}
     elif kind != "image":
         out |= {"color": to_hex(style.get("color", "#222222")), "size": style.get("fontsize", 10.5)}
-        out |= {
-            "bold": style.get("fontweight") == "bold",
-            "ha": style.get("ha", "left"),
-            "va": style.get("va", "baseline"),
-        }
+        out |= {"bold": style.get("fontweight") == "bold"}
+        out |= {"ha": style.get("ha", "left"), "va": style.get("va", "baseline")}
     return out

@@ -127,11 +127,8 @@ class Picture:
     def arrow(self, panel: str, start, vector, width: float = 0.006, **style) -> None:
         """An arrow from `start` (2,) along `vector` (2,), in data coordinates; nothing when shorter than `width`."""
         self._check(panel)
-        start, vector, width = (
-            numbers("start", start, 2),
-            numbers("vector", vector, 2),
-            positive_number("width", width),
-        )
+        start, vector = numbers("start", start, 2), numbers("vector", vector, 2)
+        width = positive_number("width", width)
         length = float(np.hypot(*vector))
         checked("polygon", style)
         if width < length < np.inf:
@@ -184,9 +181,7 @@ class Picture:
                 raise ValueError(f"{name} = {values!r}; allowed: (a, b) or (a, b, c), with value = a x + b y + c")
             if along is not None and len(values) != len(along):
                 raise ValueError(f"{name} has {len(values)} values for {len(along)} points; allowed: one for each")
-        self.handles.append(
-            {"panel": panel, "at": (x, y), "set": controls, "along": along, "grip": grip},
-        )
+        self.handles.append({"panel": panel, "at": (x, y), "set": controls, "along": along, "grip": grip})
 
     def limits(self, panel: str, x=None, y=None) -> None:
         """Set the limits of a panel."""

@@ -142,14 +142,5 @@ def _scale(ax, mark: Mark) -> None:
     ax.figure.get_layout_engine().set(wspace=0.06)
 
 
-_PAINT = {
-    "line": _line,
-    "bar": _patch,
-    "polygon": _patch,
-    "label": _words,
-    "words": _words,
-    "title": _title,
-    "image": _image,
-    "legend": _legend,
-    "scale": _scale,
-}
+_PAINT = {"line": _line, "bar": _patch, "polygon": _patch, "label": _words, "words": _words}
+_PAINT |= {"title": _title, "image": _image, "legend": _legend, "scale": _scale}

@@ -2,8 +2,9 @@
 
     python -m rapkm_lite.lessons.grading.worker NOTEBOOK LESSON LOG [--whole] [--skip KEY ...]
 
-Written to LOG: {"begin": key} before a statement or an exercise, {"result": [name, word, sentence, mistake]}, and
-{"done": true}.  What hangs or dies is the last thing begun; the caller starts again and lets it be skipped.
+Written to LOG: {"begin": key} before a statement or a check, {"end": key} after a check, {"result": [name, word,
+sentence, mistake]}, and {"done": true}.  What hangs or dies is the last thing begun; the caller starts again and lets
+it be skipped.
 """
 
 from __future__ import annotations

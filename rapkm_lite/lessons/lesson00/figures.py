@@ -32,7 +32,7 @@ def plot_working_modes(robot, x, axes=None):
     return axes
 
 
-def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""):
+def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str) -> None:
     """The machine at q (2N,) on its path, and a meter beside it: `spent` of `most` energy, both in J."""
     plot_path(path, ax, lw=0.9)
     plot_machine(robot, q, ax, labels=False)
@@ -43,7 +43,6 @@ def _draw_at_work(robot, q, path, spent: float, most: float, ax, title: str = ""
     ax.text(-0.4, 0.34, title, fontweight="bold")
     ax.set(xlim=(-0.42, 0.62), ylim=(-0.34, 0.38))
     ax.set_axis_off()
-    return ax
 
 
 def film_workshop(robot, offset, frames: int = 36):
@@ -71,13 +70,10 @@ def film_workshop(robot, offset, frames: int = 36):
         for ax, run, meter, name in zip(axes, runs, meters, ("machine A", "machine B"), strict=True):
             _draw_at_work(robot, run.q[k], lap, meter[k], most, ax, f"{name}, {run.t[k]:.1f} s")
 
-    return film(
-        draw,
-        np.linspace(0, len(path.t) - 1, frames).astype(int),
+    alt = (
         "Two equal machines with three arms take their tool around the same triangle in five seconds and then stand "
         f"still for five more. The meter of machine A stops at {meters[0][-1]:.1f} J. That of machine B rises faster, "
-        f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J.",
-        panels=2,
-        figsize=(7.6, 3.2),
-        seconds=10,
+        f"and goes on rising while nothing moves, to {meters[1][-1]:.1f} J."
     )
+    steps = np.linspace(0, len(path.t) - 1, frames).astype(int)
+    return film(draw, steps, alt, panels=2, figsize=(7.6, 3.2), seconds=10)

@@ -42,16 +42,8 @@ def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: st
     # The name of a narrow angle stands on the other side of its dotted line.
     half = (stop - start) / 2
     middle = at + 1.55 * size * unit_vector(np.asarray(start + (half if abs(half) > 0.4 else -np.copysign(0.3, half))))
-    ax.text(
-        *middle,
-        text,
-        color=colour,
-        ha="center",
-        va="center",
-        fontsize=11,
-        zorder=6,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8},
-    )
+    paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
+    ax.text(*middle, text, color=colour, ha="center", va="center", fontsize=11, zorder=6, bbox=paper)
 
 
 def plot_cut_tree(robot, q, ax=None, title: str = ""):
@@ -65,13 +57,8 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
     for i in range(robot.n_arms):
         gap = np.hypot(*(p[i] - p[1]))
         if gap > 1e-3:
-            ax.annotate(
-                "",
-                p[i],
-                p[1],
-                arrowprops={"arrowstyle": "-|>", "color": ALARM, "lw": 1.8, "shrinkA": 4, "shrinkB": 4},
-                zorder=7,
-            )
+            arrow = {"arrowstyle": "-|>", "color": ALARM, "lw": 1.8, "shrinkA": 4, "shrinkB": 4}
+            ax.annotate("", p[i], p[1], arrowprops=arrow, zorder=7)
         if i != 1:
             ax.plot([], [], color=ALARM, label=f"arm 2 to arm {i + 1}: {1e3 * gap:.1f} mm")
     ax.legend(loc="upper left", handlelength=0, handletextpad=0, title="gaps")
@@ -93,25 +80,13 @@ def plot_topology(robot, ax=None):
         ax.plot([i, i], [0.1, 2], color=arm_colour(i), lw=3)
         for y, name in ((0.55, f"$q^{{{i + 1}}}$ driven"), (1.5, f"$q^{{{N + i + 1}}}$")):
             ax.text(i + 0.07, y, name, color=arm_text_colour(i), va="center")
+        box = {"boxstyle": "round", "facecolor": "white", "edgecolor": arm_colour(i), "linewidth": 1.5}
         for y, link in ((1, i + 1), (2, N + i + 1)):
-            ax.text(
-                i,
-                y,
-                f"link {link}",
-                ha="center",
-                va="center",
-                zorder=5,
-                bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": arm_colour(i), "linewidth": 1.5},
-            )
+            ax.text(i, y, f"link {link}", ha="center", va="center", zorder=5, bbox=box)
         if i != 1:
-            bow = f"arc3,rad={-0.5 * np.sign(i - 1)}"
-            ax.annotate(
-                "",
-                (i, 2.1),
-                (1, 2.1),
-                zorder=1,
-                arrowprops={"arrowstyle": "-", "color": ALARM, "ls": "--", "lw": 2, "connectionstyle": bow},
-            )
+            bow = {"connectionstyle": f"arc3,rad={-0.5 * np.sign(i - 1)}"}
+            line = {"arrowstyle": "-", "color": ALARM, "ls": "--", "lw": 2} | bow
+            ax.annotate("", (i, 2.1), (1, 2.1), zorder=1, arrowprops=line)
             ax.text((1 + i) / 2, 2.55, "cut", color=ALARM, ha="center", va="center")
     ax.set(xlim=(-0.5, N - 0.3), ylim=(-0.4, 2.8))
     ax.set_axis_off()
@@ -229,13 +204,8 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
     for i, force in enumerate(np.asarray(forces)):
-        ax.annotate(
-            "",
-            tuple(x + force / scale),
-            tuple(x),
-            zorder=7,
-            arrowprops={"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0},
-        )
+        arrow = {"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", tuple(x + force / scale), tuple(x), zorder=7, arrowprops=arrow)
         ax.plot([], [], color=arm_colour(i), lw=2.4, label=f"on arm {i + 1}: {np.hypot(*force):.2f} N")
     ax.legend(loc="upper left")
     ax.set_title(title)
@@ -263,11 +233,8 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
         axes[-1].legend(loc="upper left")
 
     names = list(poses)
-    return film(
-        draw,
-        np.linspace(0, len(t) - 1, frames).astype(int),
+    alt = (
         f"Two simulations of the machine on its circle. {names[0]}: the tips drift apart, to {size:.0f} mm after "
-        f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero.",
-        panels=3,
-        figsize=(8.8, 3.0),
+        f"{t[-1]:.0f} s, with red arrows for the gaps. {names[1]}: they stay together, and the gap stays zero."
     )
+    return film(draw, np.linspace(0, len(t) - 1, frames).astype(int), alt, panels=3, figsize=(8.8, 3.0))

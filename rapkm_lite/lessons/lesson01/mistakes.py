@@ -14,19 +14,16 @@ from ...mechanics.dynamics import (
     orthogonal_complement,
     orthogonal_complement_dot,
 )
-from ...mechanics.kinematics import constraint_jacobian, loop_constraints
+from ...mechanics.kinematics import constraint_jacobian, loop_constraints, tips
+from ...mechanics.kinematics import unit_vector as _way
 
 
-def _way(angle) -> np.ndarray:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _gaps_of(tips):
+def _gaps_of(wrong):
     """A wrong h from wrong tips: base points, lengths of the two links, base and elbow angles -> tips (N, 2)."""
 
     def gaps(robot, q):
         l1, l2 = robot.lengths.T[..., None]
-        p = tips(robot.base, l1, l2, q[: robot.n_arms], q[robot.n_arms :])
+        p = wrong(robot.base, l1, l2, q[: robot.n_arms], q[robot.n_arms :])
         return (np.delete(p, 1, axis=0) - p[1]).ravel()
 
     return gaps
@@ -34,21 +31,7 @@ def _gaps_of(tips):
 
 def _gaps_with(change):
     """A wrong h from the right tips (N, 2)."""
-
-    def gaps(robot, q):
-        l1, l2 = robot.lengths.T[..., None]
-        base, elbow = np.reshape(q, (2, -1))
-        return np.ravel(change(robot.base + l1 * _way(base) + l2 * _way(base + elbow)))
-
-    return gaps
-
-
-def _interleaved(robot, q):
-    return loop_constraints(robot, np.concatenate([q[0::2], q[1::2]]))
-
-
-def _one_length(robot, q):
-    return loop_constraints(robot.replace(lengths=robot.lengths[0]), q)
+    return lambda robot, q: np.ravel(change(tips(robot, q)))
 
 
 def _parts(robot, q, independent):
@@ -74,11 +57,6 @@ def _stacked(robot, q, independent, top=True):
     _, J1, J2 = _parts(robot, q, independent)
     block = -np.linalg.solve(J1, J2)
     return np.vstack([block, np.eye(2)] if top else [np.eye(2), block])
-
-
-def _null_space(robot, q, independent):
-    """The orthonormal basis of the null space of J that the singular value decomposition gives."""
-    return np.linalg.svd(constraint_jacobian(robot, q))[2][robot.n_constraints :].T
 
 
 def _projector(robot, q):
@@ -158,8 +136,12 @@ GAPS = {
     "the angles are turned into degrees first: units, np.cos takes radians": _gaps_of(
         lambda b, l1, l2, q1, q2: b + l1 * _way(np.rad2deg(q1)) + l2 * _way(np.rad2deg(q1 + q2))
     ),
-    "all arms are given the lengths of the first one": _one_length,
-    "the joints are taken in the order base, elbow, base, elbow, ...: all base joints come first": _interleaved,
+    "all arms are given the lengths of the first one": (
+        lambda robot, q: loop_constraints(robot.replace(lengths=robot.lengths[0]), q)
+    ),
+    "the joints are taken in the order base, elbow, base, elbow, ...: all base joints come first": (
+        lambda robot, q: loop_constraints(robot, np.concatenate([q[0::2], q[1::2]]))
+    ),
     "the gaps are measured from the tip of arm 1, not of arm 2": _gaps_with(lambda p: p[1:] - p[0]),
     "the gaps are measured from the tip of arm 3, not of arm 2": _gaps_with(lambda p: np.delete(p, 2, axis=0) - p[2]),
     "the gap between arm 2 and itself is not left out": _gaps_with(lambda p: p - p[1]),
@@ -206,7 +188,7 @@ COMPLEMENTS = {
         lambda robot, q, independent: orthogonal_complement(robot, q, [0, 1])
     ),
     "this is another basis of the same plane, without the identity in the independent rows (another frame)": (
-        _null_space
+        lambda robot, q, independent: np.linalg.svd(constraint_jacobian(robot, q))[2][robot.n_constraints :].T
     ),
     "these are two columns of the projector N_J: same plane, but no identity in the independent rows": (
         lambda robot, q, independent: _projector(robot, q)[:, independent]
@@ -243,9 +225,7 @@ ACCELERATIONS = {
     "these are the accelerations of the two independent joints; the step back to all joints is missing": (
         _projected(joints=0.0)
     ),
-    "these are the accelerations of the free arms: the loops are not held closed, the factor F is missing": (
-        _free_tree
-    ),
+    "these are the accelerations of the free arms: the loops are not held closed, the factor F is missing": _free_tree,
 }
 
 FORCES = {

@@ -35,8 +35,7 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
     >>> ax = plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
     """
     modes = working_modes(robot)
-    if axes is None:
-        axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1]
+    axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1] if axes is None else axes
     for k, (ax, mode) in enumerate(zip(np.ravel(axes), modes, strict=True)):
         plot_map(x, y, sigma[k], ax, vmin=0.0, vmax=sigma.max(), bar=False)
         plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
@@ -56,8 +55,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     >>> ax = plot_parameterization_singularities(path, [0.094, 0.064])
     """
     robot = trajectory.robot
-    if axes is None:
-        axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1]
+    axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1] if axes is None else axes
     q = inverse_kinematics(robot, x)
     plot_workspace(robot, axes[0])
     plot_pair_curves(robot, axes[0], pairs=[pair])
@@ -71,9 +69,9 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     plot_workspace(robot, axes[1])
     plot_path(trajectory, axes[1])
     plot_pair_curves(robot, axes[1])
-    for k, left_out in ((k, pair_line(robot, p)) for k, p in enumerate(drive_pairs(robot))):
-        at = curve_crossings(trajectory)[k]
-        axes[1].plot(*trajectory.x[at].T, "o", mfc="white", mec=left_out["color"], mew=1.8, ms=7, ls="", zorder=5)
+    for other, at in zip(drive_pairs(robot), curve_crossings(trajectory), strict=True):
+        look = {"mfc": "white", "mec": pair_line(robot, other)["color"], "mew": 1.8, "ms": 7, "ls": "", "zorder": 5}
+        axes[1].plot(*trajectory.x[at].T, "o", **look)
     axes[0].set(xlim=(-0.32, 0.32), ylim=(-0.25, 0.36))
     axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
     axes[1].set_title("all three pairs and the path")
@@ -254,10 +252,8 @@ def film_force_polygon(robot, x, pair=(1, 2), frames: int = 36):
     beside = distal_cross_products(robot, inverse_kinematics(robot, x + step * np.eye(2)))[:, k]
     across = beside / np.linalg.norm(beside)
     # There and back, to end where nothing is left of the pair's polygon.
-    places = [
-        x + 0.04 * s * across
-        for s in np.concatenate([np.linspace(-1, 1, 2 * frames // 3), np.linspace(1, 0, frames // 3)])
-    ]
+    way = np.concatenate([np.linspace(-1, 1, 2 * frames // 3), np.linspace(1, 0, frames // 3)])
+    places = x + 0.04 * way[:, None] * across
     place = control_matrix(robot, inverse_kinematics(robot, np.array([places[0], x])))
     size = 1.15 * max(np.abs(force_polygon(A, 0.1)).max() for A in place)
 

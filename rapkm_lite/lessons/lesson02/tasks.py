@@ -85,21 +85,19 @@ def force_without(part: str):
 
     def force(A, torque):
         size, crossed = np.linalg.norm(A, axis=1), np.array([cross(A, row) for row in A])
-        return (
-            torque
-            * {
-                "abs": lambda: np.abs(crossed.sum(axis=1) / size).min(),
-                "size": lambda: np.abs(crossed).sum(axis=1).min(),
-                "unit": lambda: np.min(np.abs(crossed).sum(axis=1) / size**2),
-                "one": lambda: np.min((np.abs(crossed) / size[:, None]).max(axis=1)),
-                "along": lambda: np.min(np.abs(A @ A.T).sum(axis=1) / size),
-                "mean": lambda: np.mean(edges(A)),
-                "corner": lambda: np.linalg.norm(force_polygon(A, 1.0), axis=1).min(),
-                "far corner": lambda: np.linalg.norm(force_polygon(A, 1.0), axis=1).max(),
-                "axes": lambda: np.abs(A).sum(axis=0).min(),
-                "root": lambda: np.linalg.svd(A, compute_uv=False)[-1] * np.sqrt(len(A)),
-            }[part]()
-        )
+        forces = {
+            "abs": lambda: np.abs(crossed.sum(axis=1) / size).min(),
+            "size": lambda: np.abs(crossed).sum(axis=1).min(),
+            "unit": lambda: np.min(np.abs(crossed).sum(axis=1) / size**2),
+            "one": lambda: np.min((np.abs(crossed) / size[:, None]).max(axis=1)),
+            "along": lambda: np.min(np.abs(A @ A.T).sum(axis=1) / size),
+            "mean": lambda: np.mean(edges(A)),
+            "corner": lambda: np.linalg.norm(force_polygon(A, 1.0), axis=1).min(),
+            "far corner": lambda: np.linalg.norm(force_polygon(A, 1.0), axis=1).max(),
+            "axes": lambda: np.abs(A).sum(axis=0).min(),
+            "root": lambda: np.linalg.svd(A, compute_uv=False)[-1] * np.sqrt(len(A)),
+        }
+        return torque * forces[part]()
 
     return force
 

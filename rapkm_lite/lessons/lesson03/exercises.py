@@ -10,11 +10,6 @@ from . import tasks
 from .readings import READINGS
 
 
-def _error(change):
-    """A wrong rest error from A, gains and offset."""
-    return lambda A, K_P, offset: change(A, K_P, offset)
-
-
 def _mu(weight):
     """Torques along eta with one part of mu done otherwise; weight(eta, gains) stands for the sum of compliances."""
     return lambda eta, gains, offset: -eta * (eta @ offset) / weight(eta, gains)
@@ -36,40 +31,34 @@ EXERCISES = {
         improve="the two equations are linear: solve them instead of minimizing or simulating",
         mistakes={
             "this is the printed (14) with A^T put in: right for equal gains only, it tears the loops": (
-                _error(lambda A, K, o: -np.linalg.solve(K, A @ np.linalg.pinv(A) @ K @ o))
+                lambda A, K, o: -np.linalg.solve(K, A @ np.linalg.pinv(A) @ K @ o)
             ),
-            "this is minus the offset: two drives could follow their encoders, three have to agree": (
-                _error(lambda A, K, o: -o)
-            ),
+            "this is minus the offset: two drives could follow their encoders, three have to agree": lambda A, K, o: -o,
             "the gains are forgotten (a factor K_P is missing): all drives count the same": (
-                _error(lambda A, K, o: -A @ np.linalg.pinv(A) @ o)
+                lambda A, K, o: -A @ np.linalg.pinv(A) @ o
             ),
             "these are the two numbers xi in m; the factor A is missing, e = A xi": (
-                _error(lambda A, K, o: -np.linalg.solve(A.T @ K @ A, A.T @ K @ o))
+                lambda A, K, o: -np.linalg.solve(A.T @ K @ A, A.T @ K @ o)
             ),
             "this is the measured error e + offset; the true one is wanted": (
-                _error(lambda A, K, o: steady_state_error(A, K, o) + o)
+                lambda A, K, o: steady_state_error(A, K, o) + o
             ),
-            "these are the torques at rest, not the errors": (
-                _error(lambda A, K, o: -K @ (steady_state_error(A, K, o) + o))
-            ),
+            "these are the torques at rest, not the errors": lambda A, K, o: -K @ (steady_state_error(A, K, o) + o),
             "the gains are inverted: the softest drive counts most": (
-                _error(lambda A, K, o: steady_state_error(A, np.linalg.inv(K), o))
+                lambda A, K, o: steady_state_error(A, np.linalg.inv(K), o)
             ),
             "the stiffness A^T K_P A is missing: the force is not yet divided by it": (
-                _error(lambda A, K, o: -A @ (A.T @ K @ o))
+                lambda A, K, o: -A @ (A.T @ K @ o)
             ),
             "K_P is missing in the stiffness: A^T A instead of A^T K_P A": (
-                _error(lambda A, K, o: -A @ np.linalg.solve(A.T @ A, A.T @ K @ o))
+                lambda A, K, o: -A @ np.linalg.solve(A.T @ A, A.T @ K @ o)
             ),
             "K_P is missing on the right-hand side: A^T offset instead of A^T K_P offset": (
-                _error(lambda A, K, o: -A @ np.linalg.solve(A.T @ K @ A, A.T @ o))
+                lambda A, K, o: -A @ np.linalg.solve(A.T @ K @ A, A.T @ o)
             ),
-            "the gains are squared": _error(lambda A, K, o: steady_state_error(A, K @ K, o)),
-            "only the diagonal of K_P is used": _error(lambda A, K, o: steady_state_error(A, np.diag(np.diag(K)), o)),
-            "this is the force -A^T K_P offset at the end-effector, not the error": _error(
-                lambda A, K, o: -A.T @ K @ o
-            ),
+            "the gains are squared": lambda A, K, o: steady_state_error(A, K @ K, o),
+            "only the diagonal of K_P is used": lambda A, K, o: steady_state_error(A, np.diag(np.diag(K)), o),
+            "this is the force -A^T K_P offset at the end-effector, not the error": lambda A, K, o: -A.T @ K @ o,
         },
     ),
     "03.fight": Exercise(

@@ -44,14 +44,8 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
         ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)
     ax.plot(0, 0, "+", color=NEUTRAL, ms=13, mew=2, zorder=5)
     ax.plot(*rest, "s", mfc="white", mec=NEUTRAL, mew=1.8, ms=8, zorder=6)
-    ax.set(
-        xlim=centre[0] + half * np.array([-1, 1]),
-        ylim=centre[1] + half * np.array([-1, 1]),
-        aspect="equal",
-        xlabel="x − desired x in mm",
-        ylabel="y − desired y in mm",
-        title=title,
-    )
+    ax.set(xlabel="x − desired x in mm", ylabel="y − desired y in mm", title=title, aspect="equal")
+    ax.set(xlim=centre[0] + half * np.array([-1, 1]), ylim=centre[1] + half * np.array([-1, 1]))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=1)
     return ax
 
@@ -80,21 +74,12 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     for look, (label, values) in zip(looks, theories.items(), strict=True):
         ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
-    ax.set(
-        xscale="log",
-        xlabel="gain of drive 3 / gain of drives 1 and 2",
-        ylabel="largest rest torque in mN m",
-        title=title,
-    )
-    _plain_ticks(ax, [0.1, 0.3, 1, 3, 10])
+    ax.set(xscale="log", xlabel="gain of drive 3 / gain of drives 1 and 2", ylabel="largest rest torque in mN m")
+    ax.set_xticks([0.1, 0.3, 1, 3, 10], ["0.1", "0.3", "1", "3", "10"])
+    ax.set_xticks([], minor=True)
+    ax.set_title(title)
     ax.legend()
     return ax
-
-
-def _plain_ticks(ax, values) -> None:
-    """Marks on a logarithmic x axis, written as plain numbers."""
-    ax.set_xticks(values, [f"{v:g}" for v in values])
-    ax.set_xticks([], minor=True)
 
 
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
@@ -123,8 +108,7 @@ def plot_log(log, axes=None):
     >>> import rapkm_lite as rk
     >>> ax = plot_log(rk.mystery_run("gain"))
     """
-    if axes is None:
-        axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True)
+    axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True) if axes is None else axes
     for i in range(log.c.shape[1]):
         axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
         axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))

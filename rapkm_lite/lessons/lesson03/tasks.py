@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from ...control.laws import PD
 from ...machine.logs import mystery_run
 from ...machine.manipulator import load
 from ...mechanics.actuation import control_matrix
@@ -90,10 +91,6 @@ def unseen_offsets(robot, x):
     return (inverse_kinematics(robot, x) - there)[: robot.n_arms]
 
 
-def _gains(robot, spread):
-    return K_P * np.linspace(1.0 - spread, 1.0 + spread, robot.n_arms)
-
-
 def betrayal(offsets) -> list[Measured]:
     """What a second of standing still shows of the offsets of a design, the worst over places, gains and machines."""
     shift, torque, size = [], [], []
@@ -106,11 +103,10 @@ def betrayal(offsets) -> list[Measured]:
         robot = load(name).replace(friction=0.0)
         chosen = numbers(given(offsets, (robot, np.array(x))))
         if chosen.shape != (robot.n_arms,):
-            raise Ended(
-                "wrong", f"the offsets have shape {chosen.shape}, expected ({robot.n_arms},): one for each drive"
-            )
-        gains, stay = _gains(robot, spread), hold(robot, x, 1.0)
-        run = simulate(robot, _pd(gains), stay, chosen)
+            words = f"the offsets have shape {chosen.shape}, expected ({robot.n_arms},): one for each drive"
+            raise Ended("wrong", words)
+        gains = K_P * np.linspace(1.0 - spread, 1.0 + spread, robot.n_arms)
+        run = simulate(robot, PD(gains, K_D * np.sqrt(gains / K_P)), hold(robot, x, 1.0), chosen)
         shift.append(1e3 * np.linalg.norm(run.x[-1] - x))
         torque.append(1e3 * np.abs(run.c[-1]).max())
         size.append(1e3 * np.abs(chosen).max())
@@ -121,23 +117,16 @@ def betrayal(offsets) -> list[Measured]:
     ]
 
 
-def _pd(gains):
-    from ...control.laws import PD
-
-    return PD(gains, K_D * np.sqrt(gains / K_P))
-
-
 def asked(offsets):
-    """The offsets of a design at one place of the testbed, with A and eta there."""
+    """The offsets of a design at one place of the testbed, with eta there."""
     robot = load().replace(friction=0.0)
     x = np.array([0.04, -0.05])
-    q = inverse_kinematics(robot, x)
-    return np.asarray(offsets(robot, x), dtype=float), control_matrix(robot, q), null_vector(robot, q)
+    return np.asarray(offsets(robot, x), dtype=float), null_vector(robot, inverse_kinematics(robot, x))
 
 
 def along_eta(offsets) -> bool:
     """True where the offsets of a design are along eta but for 5 %: they fight, and shift nothing."""
-    chosen, _, n = asked(offsets)
+    chosen, n = asked(offsets)
     return bool(np.linalg.norm(chosen - n * (n @ chosen)) < 0.05 * np.linalg.norm(chosen))
 
 

@@ -43,27 +43,14 @@ def saved_energy(robot: Manipulator, A, c, dt) -> np.ndarray:
     return energy.copper_loss(robot, c, dt) - energy.copper_loss(robot, kept, dt)
 
 
-def _torque_cases(rng):
-    return [(A, rng.normal(0, 0.05, 3)) for A in _control_matrices(rng, 20)]
-
-
 def _torque_law(got, A, c):
     number = max(np.max(np.abs(A.T @ (got - c))), abs(_null(A) @ got))
     return number, "change of the end-effector force (N), or torque left along the null vector of A^T (N m)"
 
 
-def _scaled_up(A, c):
-    """A (A^T c): the projection without the inverse between its factors."""
-    return A @ (A.T @ c)
-
-
 def _one_by_one(A, c):
     """The parts along the two columns of A, added as if these were at right angles."""
     return sum(column * (column @ c) / (column @ column) for column in A.T)
-
-
-def _mean_removed(A, c):
-    return c - c.mean()
 
 
 def _command_cases(rng):
@@ -120,8 +107,7 @@ def _energy_with(change):
 
     def saving(robot, A, c, dt):
         kept = _kept(A, c)
-        losses = [energy.copper_loss(robot, torques, dt) for torques in (c, kept, c - kept)]
-        return change(*losses)
+        return change(*(energy.copper_loss(robot, torques, dt) for torques in (c, kept, c - kept)))
 
     return saving
 
@@ -152,7 +138,7 @@ EXERCISES = {
             "A^T A f = A^T c: f = np.linalg.solve(A.T @ A, A.T @ c), then A @ f.",
         ),
         unit="N m",
-        cases=_torque_cases,
+        cases=lambda rng: [(A, rng.normal(0, 0.05, 3)) for A in _control_matrices(rng, 20)],
         invariant=_torque_law,
         tolerance=1e-10,
         close=3e-2,
@@ -161,7 +147,9 @@ EXERCISES = {
             "this is the complement, the antagonistic part of the torques: the filter keeps the rest, c minus this": (
                 lambda A, c: c - filtered_torques(A, c)
             ),
-            "the inverse of A^T A is missing: A A^T c is no projection, and it has another unit": _scaled_up,
+            "the inverse of A^T A is missing: A A^T c is no projection, and it has another unit": (
+                lambda A, c: A @ (A.T @ c)
+            ),
             "this is the force A^T c at the end-effector, not yet the torques": lambda A, c: A.T @ c,
             "these are the two numbers f; the factor A is missing, c_eff = A f": (
                 lambda A, c: np.linalg.solve(A.T @ A, A.T @ c)
@@ -174,7 +162,7 @@ EXERCISES = {
                 lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0)
             ),
             "the mean of the torques is removed, as if the null vector were (1, 1, 1): it turns with the pose": (
-                _mean_removed
+                lambda A, c: c - c.mean()
             ),
         },
     ),

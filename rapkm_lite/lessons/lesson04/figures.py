@@ -47,16 +47,8 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
             axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
             axes[0].plot(*points[0], "o", color=arm_colour(i), ms=11, zorder=4)
             axes[0].plot(*points[1], "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, zorder=4)
-        axes[0].plot(
-            *points[2],
-            "s",
-            mfc=face,
-            mec=NEUTRAL,
-            mew=1.8,
-            ms=9,
-            zorder=5,
-            label=f"seen by drives {pair[0] + 1} and {pair[1] + 1}",
-        )
+        label = f"seen by drives {pair[0] + 1} and {pair[1] + 1}"
+        axes[0].plot(*points[2], "s", mfc=face, mec=NEUTRAL, mew=1.8, ms=9, zorder=5, label=label)
     axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
     plane_axes(robot, axes[0])
     low, high = robot.base.min(axis=0) - 0.11, robot.base.max(axis=0) + 0.08
@@ -72,31 +64,17 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
 def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     """Points (2,) in m by pair of drives, the least-squares point and the true one, in mm about x."""
     corners = 1e3 * (np.array([*points.values()]) - x)
+    words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9.5}
+    centred = words | {"ha": "center", "va": "center"}
     ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
     for (j, k), corner in zip(points, corners, strict=True):
         ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
         side = np.sign(corner[1] - corners[:, 1].mean())  # the name stands outside the triangle
-        ax.annotate(
-            f"drives {j + 1}, {k + 1}",
-            corner,
-            xytext=(0, 14 * side),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=9.5,
-        )
+        ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), **centred)
     ax.plot(*(1e3 * (estimate - x)), "D", color=NEUTRAL, ms=7)
-    ax.annotate(
-        "least squares",
-        1e3 * (estimate - x),
-        xytext=(0, -13),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=9.5,
-    )
+    ax.annotate("least squares", 1e3 * (estimate - x), xytext=(0, -13), **centred)
     ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
-    ax.annotate("true", (0, 0), xytext=(10, -4), textcoords="offset points", fontsize=9.5)
+    ax.annotate("true", (0, 0), xytext=(10, -4), **words)
     ax.set_aspect("equal", adjustable="datalim")
     ax.margins(0.35)
     ax.set(xlabel="x − true x in mm", ylabel="y − true y in mm", title="the same, true size, close up")
@@ -165,13 +143,8 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
     for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
         ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
-    ax.set(
-        xlabel="time in s",
-        title=title,
-        xlim=(0, run.t[-1]),
-        yscale="log" if log else "linear",
-        ylabel=f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}",
-    )
+    words = f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}"
+    ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear")
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return ax
 
@@ -234,16 +207,16 @@ def film_filter(run, frames: int = 18):
     >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
     (768, 307)
     """
-    return film(
-        lambda axes, share: plot_filter_share(run, share, axes),
-        [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)],
+    alt = (
         "Left the torques of the three drives over time, lopsided at first, right every sample as a point, antagonism "
         "to the side and torque that moves upwards. While the filter is turned on the curves draw together, and all "
-        "points travel sideways onto the vertical axis and keep their height.",
-        panels=2,
-        figsize=(8.0, 3.2),
-        seconds=4,
+        "points travel sideways onto the vertical axis and keep their height."
     )
+
+    def draw(axes, share):
+        plot_filter_share(run, share, axes)
+
+    return film(draw, [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)], alt, panels=2, figsize=(8.0, 3.2), seconds=4)
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):

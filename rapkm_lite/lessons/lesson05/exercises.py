@@ -6,10 +6,7 @@ import numpy as np
 
 from ...machine.manipulator import load
 from ...mechanics.actuation import control_matrix, drive_pairs, redundant_control_matrix, weighted_pseudoinverse
-from ...mechanics.dynamics import (
-    forward_dynamics,
-    minimal_dynamics,
-)
+from ...mechanics.dynamics import forward_dynamics, minimal_dynamics
 from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.partition import explicit_pseudoinverse, select_independent
 from ..checker import Case, Exercise

@@ -43,8 +43,7 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     """
     robot = trajectory.robot
     poses = [(pair, k) for pair in pairs for k in curve_crossings(trajectory)[drive_pairs(robot).index(pair)]]
-    if axes is None:
-        axes = plt.subplots(1, len(poses), figsize=(2.75 * len(poses), 3.3), sharey=True)[1]
+    axes = plt.subplots(1, len(poses), figsize=(2.75 * len(poses), 3.3), sharey=True)[1] if axes is None else axes
     for ax, (pair, k) in zip(np.ravel(axes), poses, strict=True):
         q, x = trajectory.q[k], trajectory.x[k]
         plot_workspace(robot, ax, n=120)
@@ -82,12 +81,8 @@ def plot_feedback_along(trajectory, ax=None):
     ax = axes_or_new(ax)
     robot = trajectory.robot
     for pair in drive_pairs(robot):
-        ax.semilogy(
-            trajectory.t,
-            feedback_norm(robot, trajectory.q, pair),
-            label=f"pair {pair_name(pair)}",
-            **pair_line(robot, pair),
-        )
+        norm = feedback_norm(robot, trajectory.q, pair)
+        ax.semilogy(trajectory.t, norm, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, feedback_norm(robot, trajectory.q), label="redundant", color=AFTER, lw=2.4)
     ax.set(xlabel="time in s", ylabel="norm in N m per rad/s²", xlim=(0, trajectory.t[-1]))
     ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(-0.06, 1.0), columnspacing=1.2, handlelength=1.8)
@@ -100,8 +95,7 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_torques_and_errors(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
     """
-    if axes is None:
-        axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1]
+    axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1] if axes is None else axes
     plot_torques(run, axes[0], title, milli=False)
     plot_errors(run, axes[1])
     at = [] if pair is None else curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
@@ -122,8 +116,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_ee_paths({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)}, pair=(0, 1))
     """
-    if axes is None:
-        axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1]
+    axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1] if axes is None else axes
     longest = max(runs.values(), key=lambda run: run.t[-1])
     for ax in axes:
         plot_workspace(longest.robot, ax)
@@ -178,17 +171,16 @@ def film_mirror(run, pair, frames: int = 23):
     """
     first, second = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)][:2]
     steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, frames).astype(int)
-    return film(
-        lambda axes, k: plot_mirror(run, k, pair, axes),
-        steps,
+    alt = (
         "Left the machine, right the lower right corner of the triangle, enlarged. At the curve on which the distal "
         "links are parallel the end-effector is thrown back, while the wanted point goes on over the curve; until the "
-        "path comes back each is the mirror image of the other in the line through the two elbows.",
-        panels=2,
-        figsize=(8.0, 3.6),
-        seconds=6,
-        poster=frames // 2 - 1,
+        "path comes back each is the mirror image of the other in the line through the two elbows."
     )
+
+    def draw(axes, k):
+        plot_mirror(run, k, pair, axes)
+
+    return film(draw, steps, alt, panels=2, figsize=(8.0, 3.6), seconds=6, poster=frames // 2 - 1)
 
 
 def plot_pairs(run, ax=None):
@@ -213,8 +205,7 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
     >>> import rapkm_lite as rk
     >>> ax = plot_partition_rules(rk.load(), n=21)
     """
-    if axes is None:
-        axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1]
+    axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1] if axes is None else axes
     x, y, inside, points = grid_points(robot, n)
     A = redundant_control_matrix(robot, inverse_kinematics(robot, points))
     for ax, rule in zip(axes, rules, strict=True):
@@ -232,8 +223,7 @@ def plot_lyapunov(t, functions: dict, rate, axes=None):
 
     >>> ax = plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
     """
-    if axes is None:
-        axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1]
+    axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1] if axes is None else axes
     for (label, V), line in zip(functions.items(), ({"color": BEFORE}, {"color": AFTER, "ls": "--"}), strict=False):
         axes[0].semilogy(t, V, label=label, **line)
         axes[1].plot(t[1:], -np.diff(np.log(V)) / np.diff(t), label=label, **line)

@@ -17,8 +17,7 @@ def plot_landscape(values, cube, theory, axes=None):
     >>> import numpy as np; cube = np.ones((3, 3, 3))
     >>> ax = plot_landscape([-1.0, 0.0, 1.0], cube, cube)
     """
-    if axes is None:
-        axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1]
+    axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1] if axes is None else axes
     levels = np.max(cube) * np.linspace(0, 1, 9) ** 2  # evenly spaced ellipses of a quadratic form
     for ax, k in zip(axes, (0, len(values) // 2, len(values) - 1), strict=True):
         filled = ax.contourf(values, values, cube[:, :, k].T, levels=levels)
@@ -58,16 +57,8 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     plot_machine(robot, np.zeros(robot.n_joints), ax, arms=[])
     for i, point in enumerate(robot.base):
         ax.plot(*point, "o", color=arm_colour(i), ms=10)
-        ax.annotate(
-            f"drive {i + 1}",
-            point,
-            xytext=(0, 12 if point[1] > 0 else -16),
-            textcoords="offset points",
-            ha="center",
-            color=arm_colour(i),
-            fontweight="bold",
-            fontsize=9,
-        )
+        place = {"xytext": (0, 12 if point[1] > 0 else -16), "textcoords": "offset points", "ha": "center"}
+        ax.annotate(f"drive {i + 1}", point, color=arm_colour(i), fontweight="bold", fontsize=9, **place)
     marks = ax.scatter(*np.asarray(centres).T, c=values, marker="s", s=60, zorder=3)
     ax.figure.colorbar(marks, ax=ax, label=label)
     if path is not None:
@@ -104,14 +95,8 @@ def plot_readings(names, low, high, readings, reference=None, ax=None):
     for line in share:
         ax.plot(line, rows, "o-", color=NEUTRAL, ms=5, lw=0.6, alpha=0.6)
     if reference is not None:
-        ax.plot(
-            (np.asarray(reference) - low) / (np.asarray(high) - low),
-            rows,
-            "D",
-            color=ALARM,
-            ms=7,
-            label="the reading of the data file",
-        )
+        at = (np.asarray(reference) - low) / (np.asarray(high) - low)
+        ax.plot(at, rows, "D", color=ALARM, ms=7, label="the reading of the data file")
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]".replace("-", "−") for n, a, b in zip(names, low, high, strict=True)])
     ax.set(xlim=(-0.02, 1.02), xlabel="position in the search range, 0 … 1")

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mechanics.actuation import control_matrix
+from ...mechanics.actuation import control_matrix, prestress_projector
 from ...simulation.energy import antagonism_form
 
 
 def _null(robot, trajectory) -> np.ndarray:
     """The projector N_{A^T} (k, N, N) at every sample."""
-    A = control_matrix(robot, trajectory.q)
-    return np.eye(robot.n_arms) - A @ np.linalg.pinv(A)
+    return prestress_projector(control_matrix(robot, trajectory.q))
 
 
 def _weight(robot) -> float:
@@ -39,10 +38,6 @@ def _of_matrices(matrix):
         return _weight(robot) * K_P**2 * _held(values, trajectory)
 
     return form
-
-
-def _without_inverse(A, N):
-    return np.eye(N) - A @ A.swapaxes(-1, -2)
 
 
 def _of_cross_products(robot, trajectory, K_P):
@@ -84,7 +79,9 @@ FORMS = {
             * (np.eye(robot.n_arms) - (A := control_matrix(robot, trajectory.q)[:-1].mean(axis=0)) @ np.linalg.pinv(A))
         )
     ),
-    "the inverse of A^T A is missing: I - A A^T is no projector": _of_matrices(_without_inverse),
+    "the inverse of A^T A is missing: I - A A^T is no projector": _of_matrices(
+        lambda A, N: np.eye(N) - A @ A.swapaxes(-1, -2)
+    ),
     "this is A A^T: neither a projector nor the part that moves nothing": _of_matrices(
         lambda A, N: A @ A.swapaxes(-1, -2)
     ),
@@ -146,9 +143,7 @@ MEANS = {
     "the root is one too many: this is sigma times the root of the trace": (
         lambda S, sigma: sigma * np.sqrt(np.trace(S))
     ),
-    "this is the standard deviation of the cost, not its mean": (
-        lambda S, sigma: sigma**2 * np.sqrt(2 * np.sum(S * S))
-    ),
+    "this is the standard deviation of the cost, not its mean": lambda S, sigma: sigma**2 * np.sqrt(2 * np.sum(S * S)),
     "these are the costs of the single drives; their sum is wanted": lambda S, sigma: sigma**2 * np.diag(S),
     "this is sigma² S, still a matrix: take the mean of dq^T S dq": lambda S, sigma: sigma**2 * S,
     "S is squared: the cost is dq^T S dq, not the square of S dq": lambda S, sigma: sigma**2 * np.trace(S @ S),

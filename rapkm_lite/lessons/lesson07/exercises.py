@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...mechanics.actuation import prestress_projector
 from ...mechanics.kinematics import inverse_kinematics
 from ..checker import Exercise
 from . import tasks
@@ -77,15 +78,13 @@ EXERCISES = {
             ),
             "the gain K_P is missing": lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, delay, 1.0),
             "the rates A xd are missing: a delay in s is no angle": (
-                lambda A, xd, delay, K_P: (
-                    tasks.delay_torque(A, xd, delay, K_P) * 0 - K_P * (np.eye(len(A)) - A @ np.linalg.pinv(A)) @ delay
-                )
+                lambda A, xd, delay, K_P: -K_P * prestress_projector(A) @ delay
             ),
             "the delays are averaged: equal delays contradict nothing": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, np.full(len(A), delay.mean()), K_P)
             ),
             "the projection comes before the delays: the rates contradict nothing, their products with delays do": (
-                lambda A, xd, delay, K_P: -K_P * delay * ((np.eye(len(A)) - A @ np.linalg.pinv(A)) @ (A @ xd))
+                lambda A, xd, delay, K_P: -K_P * delay * (prestress_projector(A) @ (A @ xd))
             ),
             "milliseconds were read as seconds (units, a factor of 1000)": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, 1e3 * delay, K_P)

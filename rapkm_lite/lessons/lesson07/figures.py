@@ -43,11 +43,8 @@ def plot_five_bar_curves(robot, start, end, axes=None):
     low, high = axes[0].get_ylim()
     axes[0].set(xlabel="x in mm", ylabel="y in mm", aspect="equal", title="in the plane", ylim=(low, high + 22))
     axes[0].legend(loc="upper center", ncols=3)
-    axes[1].set(
-        xlabel="turn of the first drive of the pair in °",
-        ylabel="turn of the second in °",
-        title="in the joint subspaces",
-    )
+    axes[1].set(xlabel="turn of the first drive of the pair in °", ylabel="turn of the second in °")
+    axes[1].set_title("in the joint subspaces")
     axes[1].legend(loc="best")
     return axes
 

@@ -35,9 +35,8 @@ def plot_places(robot, groups, axes=None):
         axes[1].plot(n[:, 0], n[:, 1], label=name, **points)
     turn = np.linspace(0, 2 * np.pi, 200)
     axes[1].plot(np.cos(turn), np.sin(turn), color="#BBBBBB", lw=1, zorder=1)
-    axes[1].set(
-        xlabel="component of drive 1", ylabel="component of drive 2", aspect="equal", xlim=(-0.2, 1.1), ylim=(-0.2, 1.1)
-    )
+    axes[1].set(xlabel="component of drive 1", ylabel="component of drive 2", aspect="equal")
+    axes[1].set(xlim=(-0.2, 1.1), ylim=(-0.2, 1.1))
     axes[1].set_title("null vectors")
     axes[0].set_title("places")
     axes[1].legend(loc="lower left", fontsize=9)
@@ -102,12 +101,8 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     crosses: dict[str, Any] = {"color": ALARM, "mew": 1.8, "ms": 7}
     ax.plot(ratio[can_rest], jumps[can_rest], "o", label="a place of rest exists", **dots)
     ax.plot(ratio[~can_rest], jumps[~can_rest], "x", label="no place of rest", **crosses)
-    ax.set(
-        xscale="log",
-        title=title,
-        xlabel="step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$",
-        ylabel="torque jumps per second",
-    )
+    ax.set_xlabel("step of the torque over width of the friction band, $k_P\\Delta_c / (2f_c)$")
+    ax.set(xscale="log", ylabel="torque jumps per second", title=title)
     marks = [0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5]
     ax.set_xticks(marks, [f"{mark:g}" for mark in marks])
     ax.set_xticks([], minor=True)

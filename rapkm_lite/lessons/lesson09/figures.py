@@ -105,17 +105,11 @@ def plot_accelerations(robot, places, limit: float, axes=None):
         ax.fill(*whole, color="#DCE3EA", label="all drives")
         ax.plot(*accelerations(shortest_reach(A, limit)), color=AFTER, lw=1.8, label="all, least size")
         for pair in drive_pairs(robot):
-            ax.plot(
-                *accelerations(force_polygon(A[list(pair)], limit)),
-                **pair_line(robot, pair) | {"lw": 1.2},
-                label=f"pair {pair_name(pair)}",
-            )
+            look = pair_line(robot, pair) | {"lw": 1.2, "label": f"pair {pair_name(pair)}"}
+            ax.plot(*accelerations(force_polygon(A[list(pair)], limit)), **look)
         size = max(size, 1.1 * np.abs(whole).max())
-        ax.set(
-            title=f"at ({1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}) mm".replace("-", "−"),
-            xlabel="acceleration in x in m/s²",
-            aspect="equal",
-        )
+        ax.set_title(f"at ({1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}) mm".replace("-", "−"))
+        ax.set(xlabel="acceleration in x in m/s²", aspect="equal")
     for ax in axes:
         ax.set(xlim=(-size, size), ylim=(-size, size))
     axes[0].set_ylabel("acceleration in y in m/s²")
@@ -139,8 +133,7 @@ def plot_one_sign(trajectory, ax=None, n: int = 201):
     plot_path(trajectory, ax)
     ax.fill([], [], color="#B9CDE0", label="one sign possible")
     ax.fill([], [], color="#E8E4DC", label="impossible")
-    room = [(float(v[0]), float(v[-1])) for v in (x, y)]
-    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", xlim=room[0], ylim=room[1])
+    ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", xlim=x[[0, -1]], ylim=y[[0, -1]])
     ax.grid(False)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax

@@ -146,15 +146,11 @@ def carried(answer) -> list[Measured]:
     run = simulate(robot, Choosing(lambda A, f: chosen(answer, A, f)), path)
     one_way = np.maximum(run.c.min(axis=0), (-run.c).min(axis=0)).min()
     error = np.linalg.norm(run.x - path.x, axis=-1).max()
+    most, least = (round(1e3 * float(torque), 6) for torque in (np.abs(run.c).max(), one_way))
+    changes = "smallest torque (negative: a drive changes its sign)"
     return [
-        Measured("largest torque", round(1e3 * float(np.abs(run.c).max()), 6), "mN m", 1e3 * LIMIT),
-        Measured(
-            "smallest torque (negative: a drive changes its sign)",
-            round(1e3 * float(one_way), 6),
-            "mN m",
-            1e3 * LEAST,
-            at_most=False,
-        ),
+        Measured("largest torque", most, "mN m", 1e3 * LIMIT),
+        Measured(changes, least, "mN m", 1e3 * LEAST, at_most=False),
         Measured("heat", float(copper_loss(robot, run.c[:-1], run.dt).sum()), "J", HEAT),
         Measured("largest error", 1e3 * float(error), "mm", 1e3 * ERROR),
     ]

@@ -10,7 +10,7 @@ from ...figures.machine import plane_axes
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.closure import estimate_pose
-from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.kinematics import inverse_kinematics, wrap
 
 
 def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
@@ -30,8 +30,7 @@ def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
         inside[inside] = keep
         wanted = inverse_kinematics(model, points[keep])[:, : robot.n_arms]
         rest = estimate_pose(robot, wanted, points[keep])[:, : robot.n_arms]
-        turned = (wanted - rest + np.pi) % (2 * np.pi) - np.pi
-        fight = 1e3 * K_P * np.linalg.norm(turned, axis=-1)
+        fight = 1e3 * K_P * np.linalg.norm(wrap(wanted - rest), axis=-1)
         plot_map(x, y, on_grid(inside, fight), ax, vmin=0.0, label="norm of the rest torques in mN m")
         plane_axes(robot, ax)
         ax.set(xlim=x[[0, -1]], ylim=y[[0, -1]], title=title)
@@ -53,13 +52,8 @@ def plot_model_share(eps, share, t, leak, axes=None):
     axes[0].set(xlabel="all links too long by the share ε", ylabel="share that still fights", title="in motion")
     axes[0].legend(loc="upper left")
     axes[1].plot(t, 1e3 * leak, color=ALARM)
-    axes[1].set(
-        xlabel="time in s",
-        ylabel="leaking force in mN per N m",
-        title="a prestress on the way, ε = 0.001",
-        xlim=(t[0], t[-1]),
-        ylim=(0, None),
-    )
+    axes[1].set(xlabel="time in s", ylabel="leaking force in mN per N m", xlim=(t[0], t[-1]), ylim=(0, None))
+    axes[1].set_title("a prestress on the way, ε = 0.001")
     return axes
 
 

@@ -57,8 +57,7 @@ def pushes(got, robot, model, x, K_P) -> tuple[float, str]:
 
 def force_left(A, fight, limit) -> float:
     """Force in N that is left in every direction: each drive carries its share of the fight first."""
-    per_force = np.linalg.norm(A @ np.linalg.inv(A.T @ A), axis=1)
-    return float(np.min((limit - np.abs(fight)) / per_force))
+    return float(np.min((limit - np.abs(fight)) / shares(A)))
 
 
 def shares(A) -> np.ndarray:

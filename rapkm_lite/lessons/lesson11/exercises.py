@@ -13,7 +13,7 @@ from . import tasks
 from .bandwidth import GAIN_FOR_BANDWIDTH
 
 
-def _frequencies(robot, q, matrix) -> np.ndarray:
+def _frequencies(matrix) -> np.ndarray:
     """Frequencies in Hz from the eigenvalues of a matrix (2, 2)."""
     return np.sqrt(np.abs(np.sort(np.linalg.eigvals(matrix).real))) / (2 * np.pi)
 
@@ -33,17 +33,10 @@ def _terms(robot, q):
     return minimal_dynamics(robot, q, 0 * q, None)[0], control_matrix(robot, q)
 
 
-def _one_model(plant: str):
-    """The error where both force terms come from one of the two machines, so that only Q or nothing is left."""
-
-    def made(robot, model, q, qd, xd, xdd, K_P):
-        inverse = {"robot": robot, "model": model}[plant]
-        G, C, Q = minimal_dynamics(robot, q, qd, None)
-        G_model, C_model, Q_model = minimal_dynamics(model, q, qd, None)
-        missed = np.einsum("kij,kj->ki", G_model - G, xdd) + np.einsum("kij,kj->ki", C_model - C, xd) + Q_model - Q
-        return np.linalg.solve(minimal_dynamics(inverse, q, qd, None)[0], missed[..., None])[..., 0] / K_P
-
-    return made
+def _own_inertia(robot, model, q, qd, xd, xdd, K_P):
+    """The error where the force that the model misses is divided by the machine's own inertia."""
+    G = minimal_dynamics(robot, q, qd, None)[0]
+    return np.linalg.solve(G, _force(robot, model, q, qd, xd, xdd, K_P)[..., None])[..., 0] / K_P
 
 
 def _without(part: str):
@@ -61,6 +54,7 @@ def _without(part: str):
 
 
 def _force(robot, model, q, qd, xd, xdd, K_P):
+    """The force that the model misses."""
     G = minimal_dynamics(model, q, qd, None)[0]
     return np.einsum("kij,kj->ki", G, tasks.model_error(robot, model, q, qd, xd, xdd, K_P)) * K_P
 
@@ -93,9 +87,7 @@ EXERCISES = {
             ),
             "the higher one comes first: wrong order": lambda robot, q, K_P: tasks.pd_frequencies(robot, q, K_P)[::-1],
             "the inertia is missing: these are roots of stiffnesses": (
-                lambda robot, q, K_P: _frequencies(
-                    robot, q, _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
-                )
+                lambda robot, q, K_P: _frequencies(_terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1]))
             ),
             "the gains are averaged: unequal gains turn and split the two modes": (
                 lambda robot, q, K_P: tasks.pd_frequencies(robot, q, np.full(robot.n_arms, np.mean(K_P)))
@@ -114,7 +106,7 @@ EXERCISES = {
             ),
             "the inertia is multiplied instead of divided: it should be inverted": (
                 lambda robot, q, K_P: _frequencies(
-                    robot, q, _terms(robot, q)[0] @ _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
+                    _terms(robot, q)[0] @ _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
                 )
             ),
         },
@@ -143,7 +135,7 @@ EXERCISES = {
                 lambda *case: -tasks.model_error(*case)
             ),
             "the gain K_P is missing: these are accelerations": lambda *case: case[-1] * tasks.model_error(*case),
-            "the machine's own inertia is inverted; the law multiplies with that of its model": _one_model("robot"),
+            "the machine's own inertia is inverted; the law multiplies with that of its model": _own_inertia,
             "the velocity terms C xd are missing": _without("C"),
             "friction and gravity (Q) are missing": _without("Q"),
             "the acceleration is missing: an unknown mass matters where the motion accelerates": _without("G"),

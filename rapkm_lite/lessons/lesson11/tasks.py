@@ -21,9 +21,8 @@ PAYLOAD = 0.1
 
 
 def _plants() -> list:
-    unequal = load().replace(
-        lengths=[[0.2, 0.22], [0.23, 0.2], [0.21, 0.24]], masses=[[0.1, 0.2], [0.15, 0.1], [0.2, 0.12]]
-    )
+    lengths, masses = [[0.2, 0.22], [0.23, 0.2], [0.21, 0.24]], [[0.1, 0.2], [0.15, 0.1], [0.2, 0.12]]
+    unequal = load().replace(lengths=lengths, masses=masses)
     return [("the testbed", load()), ("unequal arms", unequal), ("four arms", load("four_arms"))]
 
 
@@ -76,18 +75,8 @@ def error_cases(rng) -> list[Case]:
     cases = []
     for label, robot, model in _variants():
         path, some = triangle(robot, 0.12, float(rng.choice([2.0, 2.5, 4.0]))), rng.integers(100, 1900, 4)
-        cases.append(
-            Case(
-                label,
-                robot,
-                model,
-                path.q[some],
-                path.qd[some],
-                path.xd[some],
-                path.xdd[some],
-                rng.uniform(200.0, 900.0),
-            )
-        )
+        motion = path.q[some], path.qd[some], path.xd[some], path.xdd[some]
+        cases.append(Case(label, robot, model, *motion, rng.uniform(200.0, 900.0)))
     return cases
 
 
@@ -123,13 +112,12 @@ def three_duties(answer) -> list[Measured]:
     loaded = simulate(heavy, law, path, OFFSET, model=robot)
     rough = simulate(robot, law, path, OFFSET, encoder=2000, velocity_filter=5e-3)
     error = 1e3 * np.linalg.norm(loaded.x - path.x, axis=-1).max()
+    jump = 1e3 * np.abs(np.diff(calm.c, axis=0)).max()
     return [
         Measured("largest error with 100 g on board", error, "mm", 2.6),
         Measured("energy with 2000 counts per turn", rough.energy.sum(), "J", 10.5),
         Measured("energy with good encoders", calm.energy.sum(), "J", 4.0),
-        Measured(
-            "largest jump of a torque with good encoders", 1e3 * np.abs(np.diff(calm.c, axis=0)).max(), "mN m", 3.0
-        ),
+        Measured("largest jump of a torque with good encoders", jump, "mN m", 3.0),
     ]
 
 

@@ -26,9 +26,7 @@ EXERCISES = {
         close=1e-3,
         improve="project exactly; a cut-off of 1e-9 for pinv does",
         mistakes={
-            "the sign: a drive is pulled back by its offset": (
-                lambda J, m, K_P, offset: -tasks.fight(J, m, K_P, offset)
-            ),
+            "the sign: a drive is pulled back by its offset": lambda J, m, K_P, offset: -tasks.fight(J, m, K_P, offset),
             "nothing is projected: part of these torques moves the machine": (
                 lambda J, m, K_P, offset: -K_P * np.asarray(offset)
             ),

@@ -32,17 +32,9 @@ def plot_four_legs(pose, ax=None, *, lines=False):
         ax.plot(*points.T, color=arm_colour(i), lw=4, solid_capstyle="round", zorder=3)
         ax.plot(*points[0], "o", color=arm_colour(i), ms=11, zorder=4)
         ax.plot(*points[1:].T, "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, zorder=6)
-        ax.annotate(
-            f"drive {i + 1}",
-            points[0],
-            xytext=(0, 13 if points[0, 1] > 0 else -13),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            color=arm_text_colour(i),
-            fontweight="bold",
-            fontsize=9,
-        )
+        look = {"color": arm_text_colour(i), "fontweight": "bold", "fontsize": 9, "ha": "center", "va": "center"}
+        place = {"xytext": (0, 13 if points[0, 1] > 0 else -13), "textcoords": "offset points"}
+        ax.annotate(f"drive {i + 1}", points[0], **place, **look)
         if lines:
             along = points[2] - points[1]
             ends = np.stack([points[2], points[2] + 0.7 * along])

@@ -78,14 +78,8 @@ def equipped(answer) -> Manipulator:
     robot = manipulator(given(answer, ()), "the answer")
     if robot.n_arms != 3:
         raise ValueError(f"the machine has {robot.n_arms} arms; allowed: 3")
-    return Manipulator(
-        base=robot.base,
-        lengths=robot.lengths,
-        masses=ROD * robot.lengths,
-        load=LOAD,
-        rotor_inertia=3.35e-6,
-        mode=robot.mode,
-    )
+    rods = ROD * robot.lengths
+    return Manipulator(robot.base, robot.lengths, rods, load=LOAD, rotor_inertia=3.35e-6, mode=robot.mode)
 
 
 def behaviour(answer) -> list[Measured]:
