@@ -23,7 +23,7 @@ HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
 PATIENCE = 0.3
 # Older front ends, like Colab's, queue what a dragged slider sends.
-_CONTINUOUS = COMPILED and int(widgets.__version__.split(".")[0]) >= 8
+_CONTINUOUS = int(widgets.__version__.split(".")[0]) >= 8
 
 
 class Canvas(anywidget.AnyWidget):
@@ -54,7 +54,7 @@ def explorer(
         are the arguments of `draw` (a ``**rest`` takes what it does not name).
     panels, layout, widths, size, setup : see `Picture`.
     play : name of a whole-number slider that gets a play button.
-    live : redraw while a slider is dragged, where the engine is compiled and ipywidgets is 8 or later; default True.
+    live : redraw while a slider is dragged, with ipywidgets 8 or later; by default where the engine is compiled.
     about : a sentence of what is to be seen, for those who do not see it; default the first line of the docstring of
         `draw`, or else of the function that it is local to.
     Raises ValueError, naming both sides, when the controls and the arguments of `draw` differ.
