@@ -164,8 +164,21 @@ def _result(table: Columns, setup: Setup, law, offsets, mask: bool) -> Sweep:
         return np.ma.array(v, mask=np.broadcast_to(failed.reshape(-1, *[1] * (v.ndim - 1)), v.shape)) if mask else v
 
     words = REASONS | {DONE: None, NOT_RUN: "it had not run when the sweep was stopped"}
-    stopped = tuple(own or words[status] for own, status in zip(table.reason, table.status.tolist(), strict=True))
-    time = np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN))
-    fields: list = [setup.robot, law, setup.trajectory, offsets, *map(column, table[:6]), failed, time]
-    fields += [setup.model, setup.sensors, setup.broken, stopped]
-    return Sweep(*fields)
+    return Sweep(
+        setup.robot,
+        law,
+        setup.trajectory,
+        offsets,
+        column(table.energies),
+        column(table.torque_norm),
+        column(table.antagonistic_energy),
+        column(table.x_final),
+        column(table.rms_path_error),
+        column(table.largest_path_error),
+        failed,
+        np.ma.array(table.failure_time, mask=~failed | (table.status == NOT_RUN)),
+        setup.model,
+        setup.sensors,
+        setup.broken,
+        tuple(own or words[status] for own, status in zip(table.reason, table.status.tolist(), strict=True)),
+    )
