@@ -15,7 +15,7 @@ from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
 from ..mechanics.actuation import control_matrix, required_wrench, singular_values, weighted_pseudoinverse
 from ..mechanics.dynamics import minimal_dynamics
-from ..mechanics.kinematics import inverse_kinematics, working_modes
+from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import triangle
 from ..simulation.energy import antagonistic_energy, antagonistic_torque, copper_loss
 from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
@@ -126,20 +126,24 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     along = robot.base - middle
     out = along / np.linalg.norm(along, axis=1, keepdims=True)
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
-    offset = np.resize(OFFSET, N)
+    offset, way = np.resize(OFFSET, N), triangle(load(), dt=0.02).x
 
     def draw(picture, radius, proximal, distal, load, mode):
         lengths = 1e-3 * np.array([proximal, distal])
         base = middle + 1e-3 * radius * out
         own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
-        # A sample for each pixel or two.
-        path = triangle(own, dt=0.02)
+        picture.line("machine", *way.T, color=NEUTRAL, linewidth=1.2, zorder=1)
+        if reachable(own, middle):
+            marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
+        try:
+            path = triangle(own, dt=0.02)  # a sample for each pixel or two
+        except ValueError:
+            marks.draw_workspace(picture, "machine", own)
+            raise
         A = control_matrix(own, path.q)
         inverse = weighted_pseudoinverse(A)
         moving = matvec(inverse, required_wrench(own, path.q, path.qd, path.qdd))
         pressing = -GAIN * (offset - matvec(inverse, matvec(A.mT, offset)))
-        marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
-        picture.line("machine", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=1)
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)

@@ -44,7 +44,7 @@ def mathtext(words: str) -> str:
 
 
 def figure(picture: Picture, problem: str = "") -> Figure:
-    """A Matplotlib figure of the picture; `problem` is a sentence in its middle."""
+    """A Matplotlib figure of the picture; `problem` is a sentence at its foot."""
     with mpl.rc_context(_RC):
         made = Figure(figsize=picture.size, dpi=96, layout="constrained")
         FigureCanvasAgg(made)
@@ -62,8 +62,8 @@ def figure(picture: Picture, problem: str = "") -> Figure:
             _PAINT[mark.kind](axes[mark.panel], mark)
         if problem:
             box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
-            words = textwrap.fill(problem, int(8.5 * picture.size[0]))
-            made.text(0.5, 0.5, words, ha="center", va="center", color=ALARM, fontsize=11.5, zorder=100, bbox=box)
+            words = textwrap.fill(problem, int(10 * picture.size[0]))
+            made.text(0.5, 0.04, words, ha="center", va="bottom", color=ALARM, fontsize=11.5, zorder=100, bbox=box)
     return made
 
 
