@@ -36,6 +36,7 @@ html_theme = "furo"
 html_title = "rapkm_lite"
 html_static_path = ["pages/static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 # An excerpt would show formulas as they are typed, and from disk a browser may not read it.
 html_show_search_summary = False
 html_favicon = "pages/static/icon.svg"

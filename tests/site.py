@@ -1,8 +1,8 @@
 """All pages of a built site in headless Chromium, from disk and from a web server: python -m tests.site docs/_site
 
 Fails on an outside request, a console error, a raw formula, a broken link or anchor, a picture without words,
-horizontal scrolling and broken words of tables at 360 px, an open answer, and a search that finds nothing.  --shots
-FOLDER takes screenshots.
+horizontal scrolling and broken words of tables at 360 px, a box that the keyboard does not move, an open answer, and
+a search that finds nothing.  --shots FOLDER takes screenshots.
 """
 
 from __future__ import annotations
@@ -37,6 +37,13 @@ LOOK = r"""() => {
       range.setEnd(text, word.index + word[0].length);
       if (new Set([...range.getClientRects()].map((box) => box.top)).size > 1) wrong.push(`broken word ${word[0]}`);
     }
+  }
+  if (all('[role="heading"]:not([aria-level])').length) wrong.push('heading without a level');
+  for (const box of all('article :is(div, pre, table, mjx-container)')) {
+    const moves = /auto|scroll/.test(getComputedStyle(box).overflowX) && box.scrollWidth > box.clientWidth + 1;
+    // The keyboard comes to the box, or to something in it.
+    const reached = box.closest('[tabindex="0"]') || box.querySelector('a, button, summary, [tabindex="0"]');
+    if (moves && !reached) wrong.push(`${box.tagName} that only a mouse moves`);
   }
   if (all('details.hide[open], details.dig-deeper[open], article details[open]').length) wrong.push('an open answer');
   return wrong;
