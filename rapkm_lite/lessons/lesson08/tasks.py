@@ -76,10 +76,6 @@ def of_one_place(robot, q_a, guess) -> np.ndarray:
     return np.linalg.pinv(rows[0]) @ gap[0]
 
 
-def of_three_places(robot, q_a, guess) -> np.ndarray:
-    return self_calibrate(robot, q_a[:3], guess[:3])
-
-
 def reading_cases(rng) -> list[tuple]:
     cases = []
     machines = (("testbed", "the testbed"), ("asymmetric", "three different arms"), ("four_arms", "four drives"))
