@@ -41,7 +41,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
+    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3, centre=robot.base.mean(axis=0))
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
@@ -133,7 +133,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         base = middle + 1e-3 * radius * out
         own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
         # A sample for each pixel or two.
-        path = triangle(own, dt=0.02)
+        path = triangle(own, dt=0.02, centre=middle)
         A = control_matrix(own, path.q)
         inverse = weighted_pseudoinverse(A)
         moving = matvec(inverse, required_wrench(own, path.q, path.qd, path.qdd))
