@@ -29,6 +29,7 @@ GROUPS = {
     "long": [
         "test_causes",
         "test_properties_of_gains",
+        "test_properties_of_runs",
         "test_published",
         "test_self_calibration",
         "test_statements",

@@ -215,6 +215,15 @@ def test_common_sign_of_made_up_prestress_and_of_rows_in_a_half_space(m, delta):
     assert not rk.common_sign(A)
 
 
+def test_opposite_rows_leave_the_third_drive_without_a_share_in_any_frame():
+    """Symmetry: A^T n = 0 has n_3 = 0 where rows 1 and 2 are opposite, however the plane is turned and A is scaled."""
+    rng = np.random.default_rng(4)
+    A, angle = rng.normal(size=(200, 3, 2)), rng.uniform(0.0, 2 * np.pi, 200)
+    A[:, 1] = -A[:, 0]
+    turn = np.moveaxis([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], -1, 0)
+    assert not rk.common_sign(rng.uniform(0.1, 9.0, (200, 3, 1)) * A @ turn).any()
+
+
 @pytest.mark.parametrize("delta", [1, 2, 3])
 def test_a_drive_that_moves_nothing_has_any_sign(delta):
     A = np.random.default_rng(3).normal(size=(6, delta + 2, delta))

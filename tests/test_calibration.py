@@ -47,6 +47,17 @@ def test_lengths_are_found_exactly(name):
     assert found.rank == 3 * robot.n_arms and found.unseen == ()
 
 
+@pytest.mark.parametrize("unknowns", ["offsets+lengths", "all"])
+def test_angles_know_no_masses(unknowns):
+    """Closure is kinematics: a machine with its masses at the outer joints of links, some too long, is found alike."""
+    true, _ = disturbed(TESTBED)
+    heavy = TESTBED.replace(centers=TESTBED.lengths, inertias=1e-4)
+    found, again = (rk.calibrate(robot, readings(true), unknowns) for robot in (TESTBED, heavy))
+    assert np.any(found.lengths < heavy.centers)
+    np.testing.assert_array_equal(again.estimate, found.estimate)
+    assert np.all(again.corrected.centers == np.minimum(heavy.centers, found.lengths))
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_base_points_are_found_but_for_a_similarity_of_the_plane(name):
     robot = MACHINES[name]

@@ -63,6 +63,19 @@ def test_a_wrench_on_the_edge_has_one_answer_and_one_beyond_is_refused_with_the_
         rk.allocate_torques(CENTRE, 1.25 * corner, 0.1)
 
 
+@pytest.mark.parametrize(
+    ("A", "wrench", "W", "want"),
+    [
+        ([[1.0, 1.0], [0.0, 0.0], [1.0, 0.0]], [0.4, 0.2], [0.7, 0.7, 2.8], [0.2, 0.0, 0.2]),  # drive 2 moves nothing
+        ([[1.0, -1.0], [1.0, 0.0], [0.0, 0.0]], [0.4, -0.2], [2.6, 1.6, 1.3], [0.2, 0.2, 0.0]),
+        ([[1.0, 0.0], [1.0, 1.0], [-1.0, 0.0]], [0.3, 0.2], [1.5, 1.0, 1.0], [0.04, 0.2, -0.06]),  # 1 and 3 pull alike
+    ],
+)
+def test_on_an_edge_drives_that_do_not_hold_it_still_choose(A, wrench, W, want):
+    """Lagrange, by hand: what the drives at their limits leave, the others share inversely to their weights."""
+    assert_allclose(rk.allocate_torques(A, wrench, 0.2, W), want, rtol=0, atol=1e-12)
+
+
 def test_corners_of_the_force_polygon_go_round_once_from_the_lowest_one_on():
     """Every corner is a sum of the rows with signs, of all of which none lies lower; the edges turn by 2 pi in all."""
     many = np.random.default_rng(2).normal(size=(6, 4, 2))

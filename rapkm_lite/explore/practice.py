@@ -41,7 +41,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
+    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3, centre=robot.base.mean(axis=0))
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
@@ -126,7 +126,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     along = robot.base - middle
     out = along / np.linalg.norm(along, axis=1, keepdims=True)
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
-    offset, way = np.resize(OFFSET, N), triangle(load(), dt=0.02).x
+    offset, way = np.resize(OFFSET, N), middle + triangle(load(), dt=0.02).x
 
     def draw(picture, radius, proximal, distal, load, mode):
         lengths = 1e-3 * np.array([proximal, distal])
@@ -136,7 +136,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         if reachable(own, middle):
             marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
         try:
-            path = triangle(own, dt=0.02)  # a sample for each pixel or two
+            path = triangle(own, dt=0.02, centre=middle)  # a sample for each pixel or two
         except ValueError:
             marks.draw_workspace(picture, "machine", own)
             raise

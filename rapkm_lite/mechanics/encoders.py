@@ -69,7 +69,10 @@ def changed(robot: Manipulator, p: np.ndarray) -> Manipulator:
     N = robot.n_arms
     if len(p) == N:
         return robot
-    changes = {"lengths": p[N : 3 * N].reshape(N, 2)}
+    lengths = p[N : 3 * N].reshape(N, 2)
+    changes = {"lengths": lengths}
+    if np.any(robot.centers > lengths):  # a centre of mass at its outer joint moves with it
+        changes["centers"] = np.minimum(robot.centers, lengths)
     if len(p) > 3 * N:
         changes["base"] = p[3 * N :].reshape(N, 2)
     return robot.replace(**changes)

@@ -44,14 +44,16 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
             f"wrench = {wrench.tolist()} needs {peak:.4g} times limit = {limit.tolist()} at least; allowed: a wrench "
             "inside the force polygon of the limits"
         )
-    # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.
+    # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.  On the edge of the force
+    # polygon rounding would leave nothing between them, though drives that hold no part of the edge are free there.
     n = cores.null_space(A)
     n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ W @ n)).T
-    G, h = np.concatenate([-n, n]), np.concatenate([best - limit, -best - limit])
+    wide = limit + (1e-12 * limit.max() if peak > 1.0 - 1e-9 else 0.0)
+    G, h = np.concatenate([-n, n]), np.concatenate([best - wide, -best - wide])
     size = np.abs(h).max()
     u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
     r, slack = G.T @ u, 1.0 - h @ u / size
-    # On the edge of the force polygon there is one choice, and nothing to divide by.
+    # Where rounding leaves nothing to divide by, torques of least peak.
     c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
     # So close to it that rounding was magnified, what was clipped is another force.
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()

@@ -171,7 +171,7 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
 
 def refusal(robot: Manipulator, x, given: dict, error: ValueError) -> ValueError:
     """The error of a path that leaves the workspace or touches its edge, with what the caller was asked for."""
-    words = ", ".join(f"{name} = {short(value)}" for name, value in given.items())
+    words = ", ".join(f"{k} = {short(v.tolist() if isinstance(v, np.ndarray) else v)}" for k, v in given.items())
     try:
         elbows = inverse_kinematics(robot, x)[:, robot.n_arms :]
     except ValueError as outside:
