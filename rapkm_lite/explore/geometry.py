@@ -16,11 +16,20 @@ from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import null_vector
 from ..mechanics.kinematics import cross, inverse_kinematics, working_modes
-from ..mechanics.trajectory import circle, triangle
+from ..mechanics.trajectory import circle
 from ..simulation.energy import copper_loss
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, over_time, place_sliders, ready_made
+from .shared import (
+    central_triangle,
+    draw_forces,
+    force_panel,
+    frictionless,
+    held_machine,
+    over_time,
+    place_sliders,
+    ready_made,
+)
 
 # Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.5.
 WEAK = 1.5
@@ -93,7 +102,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
     small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | bare
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
-    controls = place_sliders(20, 30) | {
+    controls = place_sliders(robot, 20, 30) | {
         "mode": choice("working mode", modes),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
@@ -114,8 +123,10 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
-        side = 1e-3 * size
-        t = triangle(robot, side, dt=0.01) if path == "triangle" else circle(robot, side / 2, dt=0.01)
+        if path == "triangle":
+            t = central_triangle(robot, size, dt=0.01)
+        else:
+            t = circle(robot, 5e-4 * size, dt=0.01, centre=robot.base.mean(axis=0))
         A = act.control_matrix(robot, t.q)
         if robot.n_arms == 3:
             null = null_vector(robot, t.q)
@@ -187,7 +198,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=8)
     def along(side: int):
-        t = triangle(robot, 1e-3 * side, dt=0.005)
+        t = central_triangle(robot, side, dt=0.005)
         A = act.control_matrix(robot, t.q)
         return t, act.inverse_dynamics(robot, t.q, t.qd, t.qdd), act.prestress_projector(A)
 

@@ -63,7 +63,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
         "force": force_panel(1.8) | {"legend": reaches},
         "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
     }
-    controls = place_sliders(0, 0, -150, 150, 5) | {
+    controls = place_sliders(robot, 0, 0, -150, 150, 5) | {
         "f_x": slider("force f_x in N", -1.5, 1.5, 0.05, 0.0),
         "f_y": slider("force f_y in N", -1.5, 1.5, 0.05, 0.75),
         "limit": slider("limit in mN m", 20, 200, 5, 85),

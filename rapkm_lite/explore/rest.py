@@ -72,8 +72,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
     controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
-    middle = np.round(500 * robot.base.mean(axis=0)).astype(int) * 2
-    controls |= place_sliders(int(middle[0]), int(middle[1]))
+    controls |= place_sliders(robot, 0, 0)
     layout = [["plane", "error"], ["rest", "torque"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
 
@@ -137,11 +136,8 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
-    controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
-        "x": slider("desired x in mm", -100, 100, 5, 20),
-        "y": slider("desired y in mm", -100, 100, 5, 30),
-    }
+    controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05)}
+    controls |= place_sliders(robot, 20, 30, -100, 100, 5, "desired ")
     return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
 
 

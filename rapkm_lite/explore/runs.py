@@ -13,13 +13,13 @@ from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..lessons.lesson07.tasks import set_points
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
-from ..mechanics.trajectory import polygon, triangle
+from ..mechanics.trajectory import polygon
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, over_time, ready_made
+from .shared import central_triangle, curves, frictionless, over_time, ready_made
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -35,7 +35,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
     friction = robot.friction if np.any(robot.friction) else load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
-    paths = {"centred triangle": triangle(robot)}
+    paths = {"centred triangle": central_triangle(robot)}
     if robot.same_kinematics(load()):
         paths["reading of Table 1"] = experiment("table1_reading").trajectory
     table = measured_energies() if N == 3 else None
@@ -94,7 +94,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     N = robot.n_arms
-    path = triangle(robot)
+    path = central_triangle(robot)
     calibration = {False: np.zeros(N), True: 1e-3 * np.resize([4.0, -2.0, 5.0], N)}
 
     @lru_cache(maxsize=8)

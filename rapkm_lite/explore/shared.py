@@ -12,6 +12,7 @@ from ..figures.style import AFTER, ALARM
 from ..machine.manipulator import Manipulator, load
 from ..mechanics.actuation import force_polygon
 from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.trajectory import Trajectory, triangle
 from .controls import slider
 from .explorer import Explorer
 
@@ -35,9 +36,18 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
     return load().replace(friction=0.0) if robot is None else robot
 
 
-def place_sliders(x: int, y: int, low: int = -200, high: int = 230, step: int = 2) -> dict:
-    """Sliders x and y in mm for the place of the end-effector."""
-    return {"x": slider("x in mm", low, -low, step, x), "y": slider("y in mm", low, high, step, y)}
+def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
+    """Sliders x and y in mm for the place of the end-effector; all but `step` count from the middle of the drives."""
+    right, up = (step * round(1e3 * v / step) for v in robot.base.mean(axis=0))
+    return {
+        "x": slider(f"{which}x in mm", right + low, right - low, step, right + x),
+        "y": slider(f"{which}y in mm", up + low, up + high, step, up + y),
+    }
+
+
+def central_triangle(robot: Manipulator, side: float = 240, **times) -> Trajectory:
+    """The triangle of `side` in mm about the middle of the drives."""
+    return triangle(robot, 1e-3 * side, centre=robot.base.mean(axis=0), **times)
 
 
 def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -14,11 +14,10 @@ from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive
 from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
-from ..mechanics.trajectory import triangle
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import beyond, curves, frictionless, over_time, ready_made
+from .shared import beyond, central_triangle, curves, frictionless, over_time, ready_made
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -47,8 +46,8 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     words = [*fixed, "switched pair", "redundant coordinates"]
-    path = lru_cache(maxsize=16)(lambda side: triangle(robot, 1e-3 * side))
-    coarse = lru_cache(maxsize=64)(lambda side: triangle(robot, 1e-3 * side, dt=0.01))
+    path = lru_cache(maxsize=16)(partial(central_triangle, robot))
+    coarse = lru_cache(maxsize=64)(partial(central_triangle, robot, dt=0.01))
 
     def law_of(word, rate):
         # Two equal real poles at -rate.
