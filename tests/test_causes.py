@@ -117,6 +117,14 @@ SETS += [
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2))), TRIANGLE, {"offset": OFFSET}),
     ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
+    # Neither limit is to blame, nor are both.
+    (
+        r"\(unstable gain: ",
+        ROBOT,
+        rk.PID(1e4, 10.0, 0.2, 1e3),
+        TRIANGLE,
+        fault(rk.TorqueLimit(900.0)) | {"offset": OFFSET},
+    ),
     (
         "TorqueLimit\\(0.01\\) acts, and the law's own limit",
         HANGING,

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED, user
 from rapkm_lite.engine.pointer import MATRICES, places
+from rapkm_lite.engine.refusal import refusal
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
@@ -324,6 +325,31 @@ def test_what_does_not_compile_is_one_sentence_with_its_line(function):
         first = function.__code__.co_firstlineno
         assert first < number <= first + 4
         assert said.split(".py: ")[-1].split(")); ")[0].split("); ")[0] in linecache.getline(__file__, number)
+
+
+def test_words_of_the_compiler_that_nobody_foresaw_are_told_without_its_steps():
+    """The first line that says something, as far as a sentence goes."""
+    odd = "Failed in nopython mode (step: frontend)\n\n \x1b[1mThe moon is full of array(float64, 1d, C)\x1b[0m"
+    assert refusal(helper, ValueError(f"{odd}\nFile elsewhere")) == "The moon is full of an array"
+    assert refusal(helper, ValueError("")) == "no reason given"
+    assert refusal(helper, ValueError("moon " * 90)) == ("moon " * 90)[:160]
+    # What is no function of Python's has no lines.
+    assert refusal(len, ValueError('the moon\nFile "test_compiled_law.py", line 3')) == "the moon"
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("array(complex128, 1d, C)", "it returns complex numbers"),
+        ("array(float64, 0d, C)", "it returns an array with 0 dimensions"),
+        ("complex128", "it returns a complex number"),
+        ("Literal[int](7)", "it returns 7"),
+        ("reflected list(float64)<iv=None>", "it returns a list"),
+        ("generator(func=<function f at 0x7f>, args=(float64,), has_finalizer=True)", "it yields: a return is needed"),
+    ],
+)
+def test_what_it_returns_instead_of_torques_is_told_without_names_of_types(kind, words):
+    assert refusal(len, ValueError("not to be read"), kind).startswith(words)
 
 
 def test_arguments_are_counted_before_the_run():
