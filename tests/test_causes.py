@@ -116,6 +116,8 @@ SETS += [
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2))), TRIANGLE, {"offset": OFFSET}),
     ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
+    # Lost only with the integral, which is stable by Routh: it follows wrong encoders.
+    (r"\(offset = ", ROBOT, rk.PID(7.05, 60.0, 0.225), HOLD, {"offset": [1.5, 1.5, -1.5]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
     # Neither limit is to blame, nor are both.
     (
