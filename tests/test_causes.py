@@ -146,6 +146,10 @@ def stiffer(t, q_a, qd_a, desired):
     return 20.0 * stiff(t, q_a, qd_a, desired)
 
 
+def pushing(t, q_a, qd_a, desired):
+    return 60.0 * (q_a - desired.q_a)
+
+
 @rk.compiled
 def empty(t, q_a, qd_a, d):
     if t > 0.1:
@@ -186,6 +190,15 @@ SETS += [
         rk.AntagonismFilter(stiff),
         HOLD_FOUR,
         {"offset": [4e-3, 0.0, 0.0, 1e-3]},
+    ),
+    # A law of a user is not asked again: a drive or an encoder that failed may always have cost the run.
+    (r"\(DeadDrive\(0, 0.01\) acts", ROBOT, pushing, HOLD, fault(rk.DeadDrive(0, 0.01)) | {"offset": OFFSET}),
+    (
+        r"\(EncoderDropout\(0, 0.01, 1.0\) acts",
+        ROBOT,
+        pushing,
+        HOLD,
+        fault(rk.EncoderDropout(0, 0.01, 1.0)) | {"offset": OFFSET},
     ),
     ("velocity_filter = 0.5 s delays", FOUR, mine, FAST, {"velocity_filter": 0.5}),
     (
