@@ -508,6 +508,7 @@ def test_what_cannot_be_read_is_refused(tmp_path):
         ({"use": "both"}, "use = 'both'"),
         ({"noise": -1.0}, "noise"),
         ({"use": "torques", "log": [[0.0, 0.0, 0.0]]}, "no log holds still for 20 records"),
+        ({"use": "torques", "K_P": 0.0}, r"K_P\[0\] = 0; allowed: > 0"),
         ({"use": "torques", "K_P": -1.0}, "K_P"),
         ({"use": "torques", "K_P": [1.0, 2.0]}, "K_P"),
     ],

@@ -116,7 +116,17 @@ SETS += [
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2))), TRIANGLE, {"offset": OFFSET}),
     ("offset = ", ROBOT, rk.PID(7.05, 10.0, 0.225), CIRCLE, {"offset": [1.9, 1.9, -1.9]}),
+    # Lost only with the integral, which is stable by Routh: it follows wrong encoders.
+    (r"\(offset = ", ROBOT, rk.PID(7.05, 60.0, 0.225), HOLD, {"offset": [1.5, 1.5, -1.5]}),
     ("unstable gain: ", ROBOT, rk.PID(1e4, 10.0, 0.2), TRIANGLE, {"offset": OFFSET}),
+    # Neither limit is to blame, nor are both.
+    (
+        r"\(unstable gain: ",
+        ROBOT,
+        rk.PID(1e4, 10.0, 0.2, 1e3),
+        TRIANGLE,
+        fault(rk.TorqueLimit(900.0)) | {"offset": OFFSET},
+    ),
     (
         "TorqueLimit\\(0.01\\) acts, and the law's own limit",
         HANGING,
@@ -134,6 +144,10 @@ def stiff(t, q_a, qd_a, desired):
 
 def stiffer(t, q_a, qd_a, desired):
     return 20.0 * stiff(t, q_a, qd_a, desired)
+
+
+def pushing(t, q_a, qd_a, desired):
+    return 60.0 * (q_a - desired.q_a)
 
 
 @rk.compiled
@@ -176,6 +190,15 @@ SETS += [
         rk.AntagonismFilter(stiff),
         HOLD_FOUR,
         {"offset": [4e-3, 0.0, 0.0, 1e-3]},
+    ),
+    # A law of a user is not asked again: a drive or an encoder that failed may always have cost the run.
+    (r"\(DeadDrive\(0, 0.01\) acts", ROBOT, pushing, HOLD, fault(rk.DeadDrive(0, 0.01)) | {"offset": OFFSET}),
+    (
+        r"\(EncoderDropout\(0, 0.01, 1.0\) acts",
+        ROBOT,
+        pushing,
+        HOLD,
+        fault(rk.EncoderDropout(0, 0.01, 1.0)) | {"offset": OFFSET},
     ),
     ("velocity_filter = 0.5 s delays", FOUR, mine, FAST, {"velocity_filter": 0.5}),
     (

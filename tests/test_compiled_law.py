@@ -11,7 +11,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rapkm_lite as rk
-from rapkm_lite.engine import COMPILED
+from rapkm_lite.engine import COMPILED, user
+from rapkm_lite.engine.pointer import MATRICES, places
+from rapkm_lite.engine.refusal import refusal
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
@@ -79,8 +81,11 @@ def test_model_at_every_pose_against_the_textbook_layer(source):
 
 @pytest.mark.parametrize("name", ["asymmetric", "four_arms", "five_bar"])
 def test_every_matrix_of_at(name):
-    """Each entry with a weight of its own: what the law adds to PD is the same from the engine and from `at`."""
-    robot = rk.load(name).replace(gravity=(0.3, -9.0), load=0.1)
+    """Each entry, and each of `d`, with a weight of its own: engine and `at` make the same torque of them."""
+    robot = rk.load(name)
+    # The matrices are those of the model, which differs from the machine in all that they depend on.
+    model = robot.replace(gravity=(0.3, -9.0), load=0.1, lengths=1.001 * robot.lengths, inertias=1.2 * robot.inertias)
+    model = model.replace(friction=robot.friction + 2e-3, friction_velocity=2.0 * robot.friction_velocity)
     path = rk.circle(robot, radius=0.02, duration=0.02)
 
     @rk.compiled(at="desired")
@@ -108,15 +113,46 @@ def test_every_matrix_of_at(name):
                 for j in range(M.shape[1]):
                     k += 1
                     total += M[i, j] * np.cos(0.37 * k)
-        for v in (at.x, at.xd, at.Q, at.minimal[2], at.redundant[2]):
+        poses = (at.x, at.xd, at.Q, at.minimal[2], at.redundant[2])
+        for v in (*poses, d.x, d.xd, d.xdd, d.q, d.qd, d.qdd, d.q_a, d.qd_a, d.qdd_a):
             for i in range(v.shape[0]):
                 k += 1
                 total += v[i] * np.cos(0.37 * k)
         return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a) + 1e-4 * total
 
-    fast, slow = rk.simulate(robot, weigh, path), rk.simulate(robot, InPython(weigh), path)
+    fast, slow = (rk.simulate(robot, law, path, model=model) for law in (weigh, InPython(weigh)))
     assert np.abs(fast.c).max() > 1e-4
     assert_allclose(fast.c, slow.c, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["five_bar", "asymmetric", "four_arms"])
+def test_the_buffer_has_room_for_the_matrices_of_at_and_no_more(name):
+    """Those that `at` finds, five matrices (2N, 2) between, and the desired motion; then memory and answer."""
+    robot = rk.load(name)
+    q = rk.inverse_kinematics(robot, [0.02, 0.03])
+    at, N = rk.at(robot, q, 0.0 * q), robot.n_arms
+    found = [getattr(at, field) for field in MATRICES]
+    numbers = sum(np.size(part) for M in found for part in (M if isinstance(M, tuple) else (M,)))
+    desired = 1 + 2 * N + 6 + 3 * 2 * N
+    for matrices, start in ((False, desired), (True, desired + numbers + 5 * 2 * N * 2)):
+        assert places(N, matrices, 4) == (start, start + 4, start + 4 + N)
+
+
+def test_the_projector_is_one_where_its_two_columns_are_nearly_parallel(monkeypatch):
+    """P = P P, P F = F, and the derivatives of both; columns at an angle of 1e-7 lose seven digits in one pass."""
+    rng, n = np.random.default_rng(5), 6
+    F, F_dot = rng.normal(size=(2, n, 2))
+    F[:, 1] = F[:, 0] + 1e-7 * F[:, 1]
+    U, V, P, P_dot = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, n)), np.empty((n, n))
+    # Only kernels call compiled parts: here both run in Python.
+    spread, project = (getattr(part, "py_func", part) for part in (user.spread, user.project))
+    monkeypatch.setattr(user, "spread", spread)
+    project(F, F_dot, U, V, P, P_dot, n)
+    assert_allclose(P @ P, P, rtol=0, atol=1e-15)
+    assert_allclose(P @ F, F, rtol=0, atol=1e-14)
+    size = np.abs(P_dot).max()
+    assert_allclose(P @ P_dot + P_dot @ P, P_dot, rtol=0, atol=1e-14 * size)
+    assert_allclose(P_dot @ F + P @ F_dot, F_dot, rtol=0, atol=1e-14 * size)
 
 
 def test_what_a_compiled_pose_has_not_is_told_with_what_it_has():
@@ -289,6 +325,31 @@ def test_what_does_not_compile_is_one_sentence_with_its_line(function):
         first = function.__code__.co_firstlineno
         assert first < number <= first + 4
         assert said.split(".py: ")[-1].split(")); ")[0].split("); ")[0] in linecache.getline(__file__, number)
+
+
+def test_words_of_the_compiler_that_nobody_foresaw_are_told_without_its_steps():
+    """The first line that says something, as far as a sentence goes."""
+    odd = "Failed in nopython mode (step: frontend)\n\n \x1b[1mThe moon is full of array(float64, 1d, C)\x1b[0m"
+    assert refusal(helper, ValueError(f"{odd}\nFile elsewhere")) == "The moon is full of an array"
+    assert refusal(helper, ValueError("")) == "no reason given"
+    assert refusal(helper, ValueError("moon " * 90)) == ("moon " * 90)[:160]
+    # What is no function of Python's has no lines.
+    assert refusal(len, ValueError('the moon\nFile "test_compiled_law.py", line 3')) == "the moon"
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("array(complex128, 1d, C)", "it returns complex numbers"),
+        ("array(float64, 0d, C)", "it returns an array with 0 dimensions"),
+        ("complex128", "it returns a complex number"),
+        ("Literal[int](7)", "it returns 7"),
+        ("reflected list(float64)<iv=None>", "it returns a list"),
+        ("generator(func=<function f at 0x7f>, args=(float64,), has_finalizer=True)", "it yields: a return is needed"),
+    ],
+)
+def test_what_it_returns_instead_of_torques_is_told_without_names_of_types(kind, words):
+    assert refusal(len, ValueError("not to be read"), kind).startswith(words)
 
 
 def test_arguments_are_counted_before_the_run():

@@ -1,5 +1,7 @@
 """Control laws: what (12), (16)-(20), (28)-(35) promise, by algebra, linearization, independent integration."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
 from rapkm_lite.control.grammar import joint_gain
+from rapkm_lite.simulation import energy
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
@@ -465,6 +468,35 @@ def test_energies_of_a_run_by_their_definitions():
     assert_allclose(run.energy, rk.copper_loss(FRICTIONLESS, run.c[:-1], 1e-3) + rk.mechanical_work(run), rtol=1e-12)
     gained = rk.kinetic_energy(FRICTIONLESS, run.q[-1], run.qd[-1])
     assert_allclose(rk.mechanical_work(run).sum(), gained, atol=1e-9)
+
+
+def test_energies_of_long_runs_are_summed_in_parts(monkeypatch):
+    """Sums do not depend on where they are cut: by their definitions, for all remainders of parts of four holds."""
+    monkeypatch.setattr(energy, "PART", 4)
+    rng = np.random.default_rng(6)
+    for k in range(1, 14):
+        c, q_a = rng.normal(size=(2, k, 3))
+        run = SimpleNamespace(robot=FRICTIONLESS, c=c, q_a=q_a, dt=1e-3)
+        assert_allclose(rk.mechanical_work(run), (c[:-1] * (q_a[1:] - q_a[:-1])).sum(axis=0), rtol=0, atol=1e-14)
+        heat = 0.611 / 0.0259**2 * (c**2).sum(axis=0) * 1e-3
+        assert_allclose(rk.copper_loss(FRICTIONLESS, c, 1e-3), heat, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("ask", "reads"),
+    [
+        (rk.mechanical_work, ["robot", "q_a", "c", "dt"]),
+        (rk.antagonistic_torque, ["robot", "q", "q_a", "c", "dt"]),
+        (rk.antagonistic_energy, ["robot", "q", "q_a", "c", "dt"]),
+    ],
+)
+def test_what_is_no_run_is_refused_by_the_functions_of_runs(ask, reads):
+    run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), rk.hold(FRICTIONLESS, [0.0, 0.0], 0.01), [1e-3, 0.0, 0.0])
+    known = {name: getattr(run, name) for name in reads}
+    assert_allclose(ask(SimpleNamespace(**known)), ask(run), rtol=1e-12)
+    for name in reads:
+        with pytest.raises(ValueError, match=r"run = .*; allowed: a Run, such as simulate returns"):
+            ask(SimpleNamespace(**{key: value for key, value in known.items() if key != name}))
 
 
 def test_antagonism_form_is_that_of_the_machine_not_of_the_one_that_the_path_was_made_for():

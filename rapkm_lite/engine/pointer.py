@@ -18,7 +18,7 @@ Matrices = namedtuple("Matrices", MATRICES)
 def matrix_room(N: int) -> int:
     """How many numbers the matrices of `engine.user` take, and the intermediate ones after them."""
     n, r = 2 * N, 2 * N - 2
-    return 4 + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 14 * n
+    return 4 + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 10 * n
 
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:

@@ -122,7 +122,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     Qn, p = matrix(room, p, n, 1)
     A_tilde, p = matrix(room, p, N, n)
     pinv, p = matrix(room, p, N, n)
-    scratch = room[p : p + 14 * n].reshape(7, n, 2)
+    scratch = room[p : p + 10 * n].reshape(5, n, 2)
     J[:], J_dot[:], G[:], C_[:] = 0.0, 0.0, 0.0, 0.0
     env = ENVIRONMENT + GRAVITY_X
     gx, gy = w[of(env, 0, W, 1)], w[of(env + 1, 0, W, 1)]
@@ -149,7 +149,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         drag = w[m + FRICTION * W] * tanh(base * sharpness)
         Q_[i, 0], Q_[N + i, 0] = w[m + W1 * W] * (gx * ay - gy * ax) + distal + drag, distal
         fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link)
-    U, V, H, T = scratch[0], scratch[1], scratch[2], scratch[3]
+    U, H, T = scratch[0], scratch[1], scratch[2]
     for i in range(N):
         A[i, 0], A[i, 1] = F[i, 0], F[i, 1]
     # Minimal coordinates: F^T G F, F^T (C F + G Fdot), F^T Q.
@@ -162,8 +162,8 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     transposed(C2, F, H, 2, n, 2)
     transposed(Q2, F, Q_, 2, n, 1)
     # Redundant coordinates with N = U U^T: U (U^T G U) U^T and so on.
-    project(F, F_dot, U, V, P, P_dot, n)
-    small, wide = scratch[4], scratch[5:7].reshape(2, 2 * n)
+    project(F, F_dot, U, T, P, P_dot, n)
+    small, wide = scratch[3], scratch[4].reshape(2, n)
     product(H, G, U, n, n, 2)
     transposed(small, U, H, 2, n, 2)
     product(T, U, small, n, 2, 2)

@@ -165,7 +165,7 @@ def kinds() -> dict[str, type[Fault]]:
 
 def _from(t: np.ndarray, time: float) -> np.ndarray:
     """True from `time` on; a sample that misses it by rounding only counts."""
-    return t >= time - 1e-6 * t[-1] / (len(t) - 1)
+    return t >= time - 1e-6 * t[1]
 
 
 def blank_table(t: np.ndarray, N: int) -> FaultTable:
