@@ -9,6 +9,7 @@ from matplotlib.colors import BoundaryNorm
 from ...figures.machine import plane_axes
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...machine.arguments import positive_number
 from ...mechanics.closure import estimate_pose
 from ...mechanics.kinematics import inverse_kinematics, wrap
 
@@ -16,11 +17,13 @@ from ...mechanics.kinematics import inverse_kinematics, wrap
 def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
     """Norm of the rest torques of PD drives over the workspace, one map for each wrong model.
 
-    models : dict of title -> Manipulator, which demands the angles.  K_P in N m/rad.  Returns the axes.
+    models : dict of title -> Manipulator, which demands the angles.  K_P : one gain of all drives in N m/rad.
+    Returns the axes.
 
     >>> import rapkm_lite as rk; robot = rk.load()
     >>> ax = plot_geometry_maps(robot, {"longer": robot.replace(lengths=0.2002)}, 7.05, n=21)
     """
+    K_P = positive_number("K_P", K_P)
     axes = plt.subplots(1, len(models), figsize=(4.8 * len(models), 3.9))[1] if axes is None else axes
     for ax, (title, model) in zip(np.atleast_1d(axes), models.items(), strict=True):
         x, y, inside, points = grid_points(robot, n)
