@@ -577,6 +577,27 @@ def test_knobs_stay_in_their_panel_and_numbers_of_level_lines_apart():
     assert all(np.any(np.abs(p - q) >= [4.0, 1.8]) for p, q in itertools.combinations(places, 2))
 
 
+@pytest.mark.parametrize("times", [0.5, 2])
+def test_a_machine_of_another_size_fills_the_pictures_alike(times):
+    """Lengths scale: A with one over them, forces of equal torques too, distances with them."""
+    robot = rk.load().replace(friction=0.0)
+    scaled = {name: times * getattr(robot, name) for name in ("base", "lengths", "centers")}
+    other = robot.replace(inertias=times**2 * robot.inertias, **scaled)
+    for name in NAMES:
+        assert set(getattr(explore, name)(other).controls) == set(getattr(explore, name)(robot).controls)
+    for name in ("actuation", "allocation", "calibration", "computed_torque", "landscape", "machine", "prestress"):
+        assert not getattr(explore, name)(other).problem
+
+    def values(explorer, what):
+        return np.array([float(word) for word in re.findall(r"[-\d.]+", explorer.numbers[what])])
+
+    for name in ("actuation", "machine"):
+        own, same = (values(getattr(explore, name)(r), "σ_min of all drives") for r in (other, robot))
+        np.testing.assert_allclose(times * own, same, atol=0.011)
+    own, same = (values(explore.allocation(r), "torques") for r in (other, robot))
+    np.testing.assert_allclose(own, same, atol=0.11)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_machine_that_stands_elsewhere_has_the_same_numbers(name):
     """Translation: what is asked of a machine about its own middle does not depend on where that is."""

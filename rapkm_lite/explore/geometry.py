@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -26,12 +27,14 @@ from .shared import (
     force_panel,
     frictionless,
     held_machine,
+    length_slider,
     over_time,
     place_sliders,
     ready_made,
+    size,
 )
 
-# Smallest singular value, in rad/m, below which a map and a number are marked; the testbed's centroid has 6.5.
+# Smallest singular value, in rad/m on the testbed, below which a number is marked; its centroid has 6.5.
 WEAK = 1.5
 # Steps of the map on which the arms stand out; weak is far from the colour of the paper.
 MAP = marks.Palette(
@@ -49,6 +52,9 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     '2 of 2 (redundantly actuated)'
     """
     robot = frictionless(robot)
+    # A goes with one over the lengths.
+    times = size(robot)
+    palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
     pairs = act.drive_pairs(robot)[:3]
     modes = {mode_name(m): m for m in working_modes(robot)}
     which = {"all drives": None} | {f"pair {pair_name(p)}": p for p in pairs}
@@ -73,7 +79,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         return marks.zero_lines(gx, gy, inside, cross(one, other))
 
     def draw(picture, x, y, mode, drives):
-        picture.image("machine", sigma_map(mode, drives), extent, MAP, clip=outline)
+        picture.image("machine", sigma_map(mode, drives), extent, palette, clip=outline)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
         point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
         for curve in curves(mode, which[drives]) if which[drives] else ():
@@ -87,7 +93,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         }
         chains = arm_points(robot, q)
         for pair, name, value in zip(pairs, "abc", pair_measures(robot, q), strict=False):
-            weak = value < WEAK
+            weak = value < WEAK / times
             # The distal links that lie almost along each other are what makes a pair weak.
             for i in pair if weak else ():
                 picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
@@ -107,7 +113,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
     layout = [["machine", name] for name in "abc"[: len(pairs)]]
-    scale = partial(marks.Picture.scale, panel="machine", palette=MAP, label="σ_min in rad/m")
+    scale = partial(marks.Picture.scale, panel="machine", palette=palette, label="σ_min in rad/m")
     return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.0), setup=scale, live=True)
 
 
@@ -172,14 +178,19 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
         "sigma": way
-        | {"title": "Pairs", "ylabel": "σ_min in rad/m", "ylim": (0, 8), "legend": marks.pair_lines(robot)},
+        | {
+            "title": "Pairs",
+            "ylabel": "σ_min in rad/m",
+            "ylim": (0, 8 / size(robot)),
+            "legend": marks.pair_lines(robot),
+        },
         "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
-        "force": force_panel(2) | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
+        "force": force_panel(2 / size(robot)) | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
         "path": choice("path", ["triangle", "circle"]),
-        "size": slider("side or diameter in mm", 40, 320, 5, 240),
+        "size": length_slider(robot, "side or diameter in mm", 40, 320, 5, 240),
         "torque": slider("torque limit in mN m", 20, 200, 5, 85),
     }
     layout = [["plane", "sigma"], ["force", "null"]]
@@ -224,7 +235,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
     panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
-        "side": slider("side of the triangle in mm", 60, 300, 5, 240),
+        "side": length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240),
     }
     return explorer(draw, controls, panels, live=True)
 

@@ -19,7 +19,17 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, place_sliders, ready_made, stopped
+from .shared import (
+    draw_forces,
+    force_panel,
+    frictionless,
+    held_machine,
+    length_slider,
+    place_sliders,
+    ready_made,
+    size,
+    stopped,
+)
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -57,15 +67,16 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
             "largest": f"{np.abs(torques).max() / limit * 1e5:.0f} % of the limit",
         } | stopped(point, x, y)
 
+    times = size(robot)
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "force": force_panel(1.8) | {"legend": reaches},
+        "force": force_panel(1.8 / times) | {"legend": reaches},
         "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
     }
     controls = place_sliders(robot, 0, 0, -150, 150, 5) | {
-        "f_x": slider("force f_x in N", -1.5, 1.5, 0.05, 0.0),
-        "f_y": slider("force f_y in N", -1.5, 1.5, 0.05, 0.75),
+        "f_x": slider("force f_x in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.0),
+        "f_y": slider("force f_y in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.75 / times),
         "limit": slider("limit in mN m", 20, 200, 5, 85),
         "rule": choice("rule", RULES.keys(), "within the limits"),
     }
@@ -132,7 +143,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         "error": {"ylabel": "error in mrad", "legend": both, **marks.drive_axis(N)},
     }
     controls = {
-        "radius": slider("radius in mm", 10, 125, 5, 120),
+        "radius": length_slider(robot, "radius in mm", 10, 125, 5, 120),
         "turn": slider("turn of the first place in °", 0, 120, 5, 0),
         "places": choice("places on the circle", [1, 2, 3, 6, 24, 1000], 3),
         "counts": choice("counts a turn", [("2000", 2000), ("20 000", 20_000), ("200 000", 200_000)], 20_000),

@@ -17,9 +17,19 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
 from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
-from .controls import log_slider, offset_sliders, slider
+from .controls import log_slider, offset_sliders
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, held_machine, over_time, place_sliders, ready_made, stopped
+from .shared import (
+    curves,
+    frictionless,
+    held_machine,
+    length_slider,
+    over_time,
+    place_sliders,
+    ready_made,
+    size,
+    stopped,
+)
 
 
 @ready_made
@@ -130,7 +140,8 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
         }
 
-    away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": (-3, 3), "ylim": (-3, 3)}
+    seen = (-3 * size(robot), 3 * size(robot))
+    away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": seen, "ylim": seen}
     panels = {
         "opinions": away | {"aspect": "equal", "title": "Where each drive is content"},
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
@@ -220,7 +231,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
         "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
-        "side": slider("side of the triangle in mm", 20, 240, 10, 120),
-        "shift": slider("triangle moved to the right in mm", -60, 60, 5, 40),
+        "side": length_slider(robot, "side of the triangle in mm", 20, 240, 10, 120),
+        "shift": length_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40),
     }
     return explorer(draw, controls, panels, size=(9.4, 3.8))

@@ -19,7 +19,7 @@ from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, over_time, ready_made
+from .shared import central_triangle, curves, frictionless, over_time, ready_made, size
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -38,7 +38,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     paths = {"centred triangle": central_triangle(robot)}
     if robot.same_kinematics(load()):
         paths["reading of Table 1"] = experiment("table1_reading").trajectory
-    table = measured_energies() if N == 3 else None
+    table = measured_energies() if robot.same_kinematics(load()) else None
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
         offset = marks.offset_values(offsets, N)
@@ -81,7 +81,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=[["torque", "energy"], ["error", "energy"]], size=(9.4, 4.6))
 
 
-# Metres of arrow for 1 N, and the newtons of the arrow that shows it.
+# Metres of arrow for 1 N on the testbed, and the newtons of the arrow that shows it.
 SCALE, UNIT = 0.4, 0.25
 
 
@@ -94,7 +94,9 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     N = robot.n_arms
-    path = central_triangle(robot)
+    path, times = central_triangle(robot), size(robot)
+    # Forces of equal torques go with one over the length.
+    scale, unit, wide = SCALE * times**2, UNIT / times, 0.009 * times
     calibration = {False: np.zeros(N), True: 1e-3 * np.resize([4.0, -2.0, 5.0], N)}
 
     @lru_cache(maxsize=8)
@@ -109,7 +111,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         marks.draw_machine(picture, "plane", robot, run.q[k])
         total = force[k].sum(axis=0)
         for vector, colour in [*zip(force[k], map(arm_colour, range(N)), strict=True), (total, AFTER)]:
-            picture.arrow("plane", run.x[k], SCALE * vector, 0.009, facecolor=colour, edgecolor="white", zorder=6)
+            picture.arrow("plane", run.x[k], scale * vector, wide, facecolor=colour, edgecolor="white", zorder=6)
         picture.handle("plane", *run.x[k], along=path.x[::25], time=1e3 * path.t[::25])
         for panel, values in (("torque", 1e3 * run.c), ("error", error[:, None])):
             for i, column in enumerate(values.T):
@@ -131,10 +133,10 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     def setup(picture):
         marks.draw_workspace(picture, "plane", robot)
         picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
-        corner = np.array([picture.xlim("plane")[1] - 1.15 * SCALE * UNIT, picture.ylim("plane")[1] - 0.06])
-        picture.arrow("plane", corner, [SCALE * UNIT, 0], 0.009, facecolor=AFTER)
+        corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, picture.ylim("plane")[1] - 0.06])
+        picture.arrow("plane", corner, [scale * unit, 0], wide, facecolor=AFTER)
         words = {"ha": "center", "va": "bottom", "fontsize": 10}
-        picture.text("plane", corner[0] + SCALE * UNIT / 2, corner[1] + 0.015, f"{UNIT:g} N", **words)
+        picture.text("plane", corner[0] + scale * unit / 2, corner[1] + 0.015, f"{unit:g} N", **words)
 
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},

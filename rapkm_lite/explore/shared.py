@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import wraps
 
@@ -12,6 +13,7 @@ from ..figures.style import AFTER, ALARM
 from ..machine.manipulator import Manipulator, load
 from ..mechanics.actuation import force_polygon
 from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.maps import sampling_box
 from ..mechanics.trajectory import Trajectory, triangle
 from .controls import slider
 from .explorer import Explorer
@@ -36,17 +38,33 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
     return load().replace(friction=0.0) if robot is None else robot
 
 
+def size(robot: Manipulator) -> float:
+    """How wide the workspace is, on the testbed 1: 1, 2 or 5 times a power of ten, for round numbers on sliders."""
+    left, right, low, high = sampling_box(robot)
+    wide = 1.25 * max(min(right - left, high - low), 1e-6) / 0.4
+    power = 10 ** math.floor(math.log10(wide))
+    return next(n for n in (5, 2, 1) if n * power <= wide) * power
+
+
+def length_slider(robot: Manipulator, label: str, low: int, high: int, step: int, value: int, middle: float = 0.0):
+    """A slider of a length in mm, given for the testbed, for a robot of another size; from `middle` in m on."""
+    low, high, step, value = (size(robot) * v for v in (low, high, step, value))
+    first = step * round(1e3 * middle / step)
+    return slider(label, first + low, first + high, step, first + value)
+
+
 def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
-    """Sliders x and y in mm for the place of the end-effector; all but `step` count from the middle of the drives."""
-    right, up = (step * round(1e3 * v / step) for v in robot.base.mean(axis=0))
+    """Sliders x and y in mm for the place of the end-effector; the numbers are the testbed's, from its middle on."""
+    right, up = robot.base.mean(axis=0)
     return {
-        "x": slider(f"{which}x in mm", right + low, right - low, step, right + x),
-        "y": slider(f"{which}y in mm", up + low, up + high, step, up + y),
+        "x": length_slider(robot, f"{which}x in mm", low, -low, step, x, right),
+        "y": length_slider(robot, f"{which}y in mm", low, high, step, y, up),
     }
 
 
-def central_triangle(robot: Manipulator, side: float = 240, **times) -> Trajectory:
-    """The triangle of `side` in mm about the middle of the drives."""
+def central_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
+    """The triangle of `side` in mm, 240 on the testbed, about the middle of the drives."""
+    side = 240 * size(robot) if side is None else side
     return triangle(robot, 1e-3 * side, centre=robot.base.mean(axis=0), **times)
 
 

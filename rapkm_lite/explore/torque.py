@@ -17,7 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import beyond, central_triangle, curves, frictionless, over_time, ready_made
+from .shared import beyond, central_triangle, curves, frictionless, length_slider, over_time, ready_made
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -112,7 +112,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     }
     controls = {
         "law": choice("law", words),
-        "side": slider("side of the triangle in mm", 100, 300, 5, 170),
+        "side": length_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
         "rate": slider("poles at −1/s times", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
     layout = [["plane", "map"], ["torque", "error"]]
