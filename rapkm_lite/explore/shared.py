@@ -46,7 +46,7 @@ def size(robot: Manipulator) -> float:
     return next(n for n in (5, 2, 1) if n * power <= wide) * power
 
 
-def length_slider(robot: Manipulator, label: str, low: int, high: int, step: int, value: int, middle: float = 0.0):
+def length_slider(robot, label: str, low: float, high: float, step: float, value: float, middle: float = 0.0):
     """A slider of a length in mm, given for the testbed, for a robot of another size; from `middle` in m on."""
     low, high, step, value = (size(robot) * v for v in (low, high, step, value))
     first = step * round(1e3 * middle / step)
