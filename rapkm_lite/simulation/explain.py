@@ -102,9 +102,12 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
     if not ours:
         yield from _seen(setup, begun, c)
         return
-    factor = growth(setup, law, k)
-    if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
+    factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
+    if wrong and _runs(setup._replace(model=setup.robot), law, k):
         yield f"the controller's model has {wrong}; with the machine's own it is not lost"
+    if wrong and factor is not None and _steadies(setup, law, k, factor):
+        grows = magnified(factor, setup.trajectory.dt)
+        yield f"the controller's model has {wrong}: the sampled loop {grows}; with the machine's own it does not"
     yield from _broken(setup, law, k, begun)
     yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
@@ -236,10 +239,10 @@ def _with(setup: Setup, faults: list[Fault]) -> Setup:
     return setup._replace(faults=table)
 
 
-def _steadies(setup: Setup, law, k: int, factor: float | None) -> bool:
+def _steadies(setup: Setup, law, k: int, factor: float) -> bool:
     """Is a loop that grows with the model stable with the machine's own?"""
     own = growth(setup._replace(model=setup.robot, trajectory=setup.trajectory.for_robot(setup.robot)), law, k)
-    return factor is not None and own is not None and factor > 1.001 >= own
+    return own is not None and factor > 1.001 >= own
 
 
 def _runs(setup: Setup, law, k: int) -> bool:
