@@ -10,8 +10,19 @@ from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
-from rapkm_lite.mechanics.encoders import _crossings, cautions, certain, closure, gauge, poses, rounding
-from rapkm_lite.mechanics.rests import Gain, Rests, fitted_gain, one_sided, rests
+from rapkm_lite.mechanics.encoders import (
+    _crossings,
+    _fit,
+    cautions,
+    certain,
+    changed,
+    closure,
+    gauge,
+    poses,
+    rounding,
+    unknown_names,
+)
+from rapkm_lite.mechanics.rests import Gain, Rests, angles_of_torques, fitted_gain, one_sided, rests
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3, 1e-3])
 NAMES = ("testbed", "four_arms")
@@ -101,6 +112,44 @@ def test_one_place_on_the_other_assembly_does_not_bend_the_offsets(count):
     assert_allclose(found.offset, UNEVEN_OFFSET, rtol=0, atol=1e-9)
     assert_allclose(found.lengths, BUILT.lengths, rtol=0, atol=1e-9)
     assert found.residual < 1e-12
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_reading_is_certain_where_a_second_assembly_fits_worse_than_2N_minus_3_times_the_worst(name):
+    """Exact readings at places near a second crossing of their circles, and others e n apart, n^T A = 0, |n| = 1, of
+    which the misfit e^2 is known to first order."""
+    robot = MACHINES[name]
+    N = robot.n_arms
+    x = random_points(robot, 200, seed=2, bend=0.1)
+    q = rk.inverse_kinematics(robot, np.vstack([x, [0.0, 0.0]]))
+    crossed = _crossings(robot, q[:-1, :N])
+    fit = _fit(robot, q[:-1, :N], crossed)
+    second = np.where(np.linalg.norm(crossed - x, axis=-1) > 1e-3, fit, np.inf).min(axis=0)
+    n = np.linalg.svd(rk.at(robot, q[-1]).A)[0][:, -1]
+    for k in np.argsort(second)[:8]:
+        for times in (1.5, 1.0 / 1.5):
+            wrong = np.sqrt(second[k] / (2 * N - 3) / times)
+            assert certain(robot, np.array([q[k, :N], q[-1, :N] + wrong * n]))[0][0] == (times > 1.0)
+
+
+@pytest.mark.parametrize("off", [0.7, 1.5, -1.5, 1.6, -1.6])
+def test_a_place_fits_readings_that_are_off_by_up_to_a_quarter_of_a_turn(off):
+    x = np.array([[0.02, 0.03]])
+    angles = rk.inverse_kinematics(TESTBED, x)[:, :3] + [0.0, off, 0.0]
+    assert_allclose(_fit(TESTBED, angles, x), off**2 if abs(off) < np.pi / 2 else np.inf, rtol=1e-12)
+
+
+def test_centres_in_the_middle_of_links_stay_there():
+    lengths = 1.01 * TESTBED.lengths
+    other = changed(TESTBED, np.concatenate([np.zeros(3), lengths.ravel()]))
+    assert_allclose(other.centers, lengths / 2, rtol=1e-15)
+
+
+def test_names_of_the_unknowns_follow_their_vector():
+    """Offsets (N,), lengths (2N,) arm by arm and base points (2N,); in words, drives count from one."""
+    names = unknown_names(3)
+    assert names[:4] == ("offset 1", "offset 2", "offset 3", "length proximal 1") and len(names) == 15
+    assert names[8:11] == ("length distal 3", "base x 1", "base y 1") and names[-1] == "base y 3"
 
 
 def test_an_assembly_is_chosen_again_with_the_guess_that_it_belongs_to():
@@ -397,6 +446,29 @@ def test_friction_before_a_torque_sensor_biases_one_sided_rests_by_fc_over_KP():
     assert_allclose(rk.calibrate(FRICTIONLESS, log_behind_friction([1.0])).offset, OFFSET[:3], rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize(("felt", "sigma", "mute"), [(0.08, 7.0, 1), (0.08, 4.0, 0), (0.12, 7.0, 0)])
+def test_torques_are_mute_that_contradict_a_tenth_as_much_as_angles_far_above_their_noise(felt, sigma, mute):
+    """Angles that are off by e n, n^T A = 0, and torques of drives that are off by a part of that; of equal standard
+    errors of the torques, K_P times e / sigma, the readings have e / sigma.  Far above is five times."""
+    off, K_P, notes = 1e-4, np.full(3, 7.05), []
+    q = rk.inverse_kinematics(FRICTIONLESS, [[0.03, 0.02], [-0.04, 0.05]])
+    n = np.linalg.svd(rk.at(FRICTIONLESS, q).A)[0][:, :, -1]
+    # What the angles contradict each other by is off, and that is sigma times their noise.
+    error = np.full((2, 3), 7.05 * off / sigma)
+    stand = Rests(q[:, :3], q[:, :3] + off * n, -K_P * felt * off * n, error, np.full(2, 10))
+    angles, spread = angles_of_torques(FRICTIONLESS, stand, None, K_P, notes)
+    assert_allclose(angles, q[:, :3] + felt * off * n, rtol=0, atol=1e-15)
+    assert spread == pytest.approx(off / sigma, rel=1e-12)
+    assert sum("mute" in note for note in notes) == mute
+
+
+def test_a_dead_drive_shows_no_gain_with_which_its_torques_could_be_read():
+    log = log_behind_friction([0.0])
+    dead = rk.Log("dead", log.t, log.q_a, log.q_a_desired, log.c * [1.0, 0.0, 1.0])
+    with pytest.raises(ValueError, match=r"K_P\[1\] = -?0; allowed: > 0"):
+        rk.calibrate(FRICTIONLESS, dead, use="torques")
+
+
 def test_small_torques_say_what_large_ones_say():
     """Offsets and errors of angles have no unit of torque, whose errors weigh the rests against each other."""
     log = log_behind_friction([1.0])
@@ -508,6 +580,8 @@ def test_what_cannot_be_read_is_refused(tmp_path):
         ({"use": "both"}, "use = 'both'"),
         ({"noise": -1.0}, "noise"),
         ({"use": "torques", "log": [[0.0, 0.0, 0.0]]}, "no log holds still for 20 records"),
+        ({"log": [0.0, 0.0, 0.0]}, r"log has shape \(3,\); allowed: angles \(k, 3\)"),
+        ({"log": np.empty((0, 3))}, r"log has shape \(0, 3\); allowed: angles \(k, 3\)"),
         ({"use": "torques", "K_P": 0.0}, r"K_P\[0\] = 0; allowed: > 0"),
         ({"use": "torques", "K_P": -1.0}, "K_P"),
         ({"use": "torques", "K_P": [1.0, 2.0]}, "K_P"),
@@ -598,6 +672,8 @@ def test_a_log_of_six_digits_with_noise_is_not_said_to_have_wrong_lengths():
 def test_cautions_from_their_bounds_on():
     """Three times the noise, a quarter of the longest link, a condition of fifty; half the width of two places."""
     far = 0.3 * TESTBED.lengths.max() * np.array([[1.0, 0.0], [-1.0, 0.0]])
+    assert cautions(far + 0.5, TESTBED, 49.0, 0.0, 0.0, None) == []  # wherever the places are
+    assert len(cautions(far / 1.3 + 0.5, TESTBED, 49.0, 0.0, 0.0, None)) == 1
     assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5, None) == cautions(far, TESTBED, 49.0, 2.9e-5, 0.0, 1e-5) == []
     for given, words in (
         ((far, TESTBED, 49.0, 3.1e-5, 0.0, 1e-5), "exceeds the noise 0.01 mrad: something else is wrong"),

@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import fsolve
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.actuation import distal_cross_products, drive_pairs
 from rapkm_lite.simulation.explain import _difference
-from rapkm_lite.simulation.growth import growth, magnified
+from rapkm_lite.simulation.growth import growth, magnified, swinging
 from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
@@ -100,13 +101,22 @@ SETS = [
     ("drives 1 and 2", ROBOT, rk.CTC(900.0, 60.0, (0, 1)), TRIANGLE, {"offset": OFFSET}),
     ("drives 2 and 3", ROBOT, rk.APD(7.0, 0.2, (1, 2)), TRIANGLE, {"offset": OFFSET}),
     ("the gains do not hold it", HANGING, rk.PD(0.1, 0.01), HOLD, {}),
-    ("law returned None", ROBOT, silent, CIRCLE, {}),
+    ("s law returned None; allowed", ROBOT, silent, CIRCLE, {}),
     (r"KeyError: 'the gain table' \(line \d+ of test_causes.py: return gains", ROBOT, raising, CIRCLE, {}),
     ("inf; allowed: finite numbers", ROBOT, infinite, CIRCLE, {}),
-    ("friction is too stiff", ROBOT.replace(friction=1e3, friction_velocity=1e-6), PD, CIRCLE, {}),
+    # f_c / v0 is the ratio of the two; no other cause is looked for.
+    (
+        r"f_c / v0 = 1e\+09 N m s/rad .*shorter dt$",
+        ROBOT.replace(friction=1e3, friction_velocity=1e-6),
+        PD,
+        CIRCLE,
+        {},
+    ),
 ]
 
 
+TWICE, LATER = rk.AntagonismFilter(FILTER), rk.OffsetJump(1, 0.4, 2.0)
+FASTER, SMALL = rk.triangle(ROBOT, duration=0.6), [1e-4, 0.0, 0.0]
 FOUR = rk.load("four_arms").replace(friction=0.0)
 HOLD_FOUR = rk.hold(FOUR, [0.02, 0.03], 2.0)
 UNSTABLE = "unstable gain K_I = .* of the integral: .*; without it it is not lost"
@@ -201,6 +211,16 @@ SETS += [
         fault(rk.EncoderDropout(0, 0.01, 1.0)) | {"offset": OFFSET},
     ),
     ("velocity_filter = 0.5 s delays", FOUR, mine, FAST, {"velocity_filter": 0.5}),
+    ("velocity_filter = 0.5 s delays the rates; with the true ones", FOUR, PD, FAST, {"velocity_filter": 0.5}),
+    # Of what the encoders add, only the offset is to blame; a drive without one is no obstacle.
+    (r"\(offset = ", ROBOT, FILTER, HOLD, {"offset": [2.5, -2.5, 2.5], "velocity_filter": 2e-3, "encoder": 10**5}),
+    (r"\(offset = ", ROBOT, TASK, HOLD, {"offset": [2.5, 0.0, 2.5]}),
+    (r"\(offset = ", ROBOT, TWICE, HOLD, fault(rk.TorqueLimit(5.0)) | {"offset": [2.5, -2.5, 2.5]}),
+    # A fault that comes later would have cost the run with the right model.
+    ("working mode.*; with the machine's own it is", ROBOT, TASK, CIRCLE, mode(1, 1, -1) | fault(LATER)),
+    # Its singularity was passed a dozen samples before.
+    ("singularity of its independent drives 1 and 3", ROBOT, rk.CTC(900.0, 60.0, (0, 2)), FASTER, {"offset": SMALL}),
+    (UNSTABLE, ROBOT, rk.PID(0.02, 1.0, 1e-3), rk.hold(ROBOT, [0.0, 0.0], 2.0), {"offset": [0.08, -0.04, 0.1]}),
     (
         r"OffsetJump\(1, 0.1, -2.0\)",
         ROBOT,
@@ -277,6 +297,10 @@ def test_growth_is_that_of_a_double_integrator_under_feedback(name):
         felt = -np.hstack([900.0 * one, 20.0 * one])
         law = rk.CTC(900.0, 20.0, None, pose=pose)
         assert growth(setup, law, 0) == pytest.approx(per_sample(felt), rel=1e-11, abs=0.0)
+    # Gains that throw it out of the workspace by 1e-6 m, or by 1e-9 m too: smaller differences err by more rounding.
+    for K_P, error in ((1e10, 5e-6), (1e13, 2e-4)):
+        felt = -np.hstack([K_P * push @ at.A, 0.2 * push @ at.A])
+        assert growth(setup, rk.PD(K_P, 0.2), 0) == pytest.approx(per_sample(felt), rel=error, abs=0.0)
 
 
 def test_a_loop_that_grows_slowly_is_told_by_the_samples_in_which_it_doubles():
@@ -293,6 +317,12 @@ def test_a_loop_that_grows_slowly_is_told_by_the_samples_in_which_it_doubles():
     said = rf"sampled loop doubles an error in {np.log(2.0) / (square**0.5 * 1e-3):.3g} samples of 0.001 s\)$"
     with pytest.raises(rk.SimulationError, match=said):
         rk.simulate(HANGING, rk.PD(1e-9, 1e-9), rk.hold(HANGING, rest + [1e-7, 0.0], 3.0))
+    # It is called unstable where an error has grown a hundredfold by then.
+    for aside, hundredfold in ((2e-3, False), (1e-3, True)):
+        with pytest.raises(rk.SimulationError) as caught:
+            rk.simulate(HANGING, rk.PD(1e-9, 1e-9), rk.hold(HANGING, rest + [aside, 0.0], 1.0))
+        assert (np.exp(square**0.5 * caught.value.time) > 100.0) == hundredfold
+        assert ("unstable gain" in caught.value.reason) == hundredfold
 
 
 @pytest.mark.parametrize("factor", [1.0 + 1e-6, 1.0004, 1.004, 1.0499, 1.0501, 1.5, 40.0])
@@ -313,6 +343,10 @@ def test_torques_that_swing_are_an_unstable_gain_from_one_and_a_half_times_in_si
 
     said = lost(law=swing, path=HOLD)
     assert cause in said and ("unstable gain" in said) == (times > 1.5)
+
+
+def test_fewer_than_two_torques_do_not_swing():
+    assert swinging(np.zeros((0, 3))) == swinging(np.ones((1, 3))) == 0.0
 
 
 @pytest.mark.parametrize(("cause", "robot", "law", "path", "options"), SETS, ids=range(len(SETS)))
@@ -356,13 +390,63 @@ def test_a_wrong_model_is_not_blamed_where_the_right_one_would_not_help():
         assert "(unstable gain: near the desired state" in lost(law=law, **options)
 
 
+APART = CIRCLE.with_set_points(CIRCLE.q_a + np.where(CIRCLE.t[:, None] > 0.2, [2.0, -2.0, 2.0], 0.0), CIRCLE.qd_a)
+
+
 def test_a_model_is_not_blamed_for_set_points():
     """Drives that are told to part by 4 rad from the middle on lose the run without a wrong model, so also with it."""
-    apart = np.where(CIRCLE.t[:, None] > 0.2, [2.0, -2.0, 2.0], 0.0)
-    path, model = CIRCLE.with_set_points(CIRCLE.q_a + apart, CIRCLE.qd_a), ROBOT.replace(lengths=0.2 * (1 + 1e-9))
+    model = ROBOT.replace(lengths=0.2 * (1 + 1e-9))
     assert not model.same_kinematics(ROBOT)
-    said = lost(path=path)
-    assert lost(path=path, model=model) == said and "controller's model has" not in said
+    said = lost(path=APART)
+    assert lost(path=APART, model=model) == said and "controller's model has" not in said
+
+
+def test_coordinates_are_not_blamed_on_a_path_far_from_their_singularities():
+    """The desired |d_1 x d_2| stays above 0.5, gains are such that an error grows by less than a hundredfold."""
+    with pytest.raises(rk.SimulationError, match=r"\(the gains do not hold it") as caught:
+        rk.simulate(ROBOT, rk.APD(7.05, 0.225, (0, 1)), APART)
+    crossed = np.abs(distal_cross_products(ROBOT, APART.q[: round(caught.value.time / APART.dt)]))
+    assert crossed[:, drive_pairs(ROBOT).index((0, 1))].min() > 0.5
+
+
+def test_a_loop_whose_errors_hardly_change_is_said_to_be_weak():
+    """Set points that part lose a run of a law that is stable near the desired state."""
+    said = lost(law=rk.SwitchedCTC(900.0, 60.0), path=APART)
+    found = re.search(r"an error changes only by the factor ([\d.]+) per sample, so look at a weak gain", said)
+    assert found is not None and 0.9 < float(found[1]) < 1.0
+
+
+@pytest.mark.parametrize("duration", [0.3, 0.5, 0.8])
+def test_a_singularity_is_that_of_the_desired_pose_at_which_the_run_was_lost(duration):
+    """Its measure there is the sine of the angle between the distal links of the two independent drives."""
+    path = rk.triangle(ROBOT, duration=duration)
+    with pytest.raises(rk.SimulationError, match="independent drives 1 and 2") as caught:
+        rk.simulate(ROBOT, rk.CTC(900.0, 60.0, (0, 1)), path, OFFSET)
+    at = rk.at(ROBOT, path.q[round(caught.value.time / path.dt)])
+    (x1, y1), (x2, y2) = (d / np.linalg.norm(d) for d in at.d[:2])
+    assert f"|d_j x d_k| = {abs(x1 * y2 - x2 * y1):.2g} at" in caught.value.reason
+
+
+def test_a_model_that_makes_a_loop_unstable_is_named_so_where_the_machines_own_would_be_lost_too():
+    """Computed torque with 35 times the inertia has 35 times the gains: K_D dt = 60 * 35 * 1e-3 > 2, unstable."""
+    names = ("masses", "inertias", "rotor_inertia")
+    heavy = ROBOT.replace(**{name: 35.0 * getattr(ROBOT, name) for name in names})
+    options = {"law": TASK, "path": TRIANGLE, "offset": OFFSET, "faults": [rk.DeadDrive(i, 0.01) for i in (0, 1)]}
+    assert "DeadDrive" in lost(**options)
+    said = lost(**options, model=heavy)
+    assert "the sampled loop magnifies an error" in said and said.endswith("with the machine's own it does not)")
+    assert "not lost" not in said and all(name in said for name in names)
+    # Where the readings fit no pose from the start, no torque has acted.
+    assert "(offset = " in lost(law=TASK, path=HOLD, model=heavy, offset=[2.5, -2.5, 2.5])
+
+
+def test_a_model_is_not_blamed_where_the_right_one_would_be_refused():
+    """|d_1 x d_2| = 0 at the desired pose of the machine's own: its run does not begin."""
+    still = rk.hold(ROBOT, [-0.00785686747112148, -0.12], 0.2)
+    law = rk.AntagonismFilter(rk.AntagonismFilter(rk.CTC(400.0, 40.0, (0, 1))))
+    with pytest.raises(ValueError, match="is singular"):
+        rk.simulate(ROBOT, law, still)
+    assert "controller's model" not in lost(law=law, path=still, model=ROBOT.replace(lengths=1.02 * ROBOT.lengths))
 
 
 def test_a_right_model_and_right_encoders_are_not_blamed():

@@ -389,6 +389,24 @@ def test_what_it_raises_at_the_first_sample_belongs_to_the_caller():
         assert "ValueError: mine (line " in rk.sweep(ROBOT, one, PATH, OFFSET, failed="mask").reasons[0]
 
 
+@pytest.mark.skipif(not COMPILED, reason="Python's integers have no end")
+def test_a_law_that_fails_only_as_a_compiled_one_is_named():
+    """2^n doubled sample by sample is zero from n = 64 on in 64 bits, and the reciprocal of zero no torque."""
+
+    def doubling(t, q_a, qd_a, d):
+        double = 1
+        for _ in range(round(1e3 * t)):
+            double *= 2
+        return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a) + 1e-3 / double
+
+    assert np.all(np.isfinite(rk.simulate(ROBOT, doubling, PATH, OFFSET).c))
+    law = rk.compiled(doubling)
+    for around in (law, rk.AntagonismFilter(law)):
+        with pytest.raises(rk.SimulationError, match="law doubling returned torques that are not 3") as caught:
+            rk.simulate(ROBOT, around, PATH, OFFSET)
+        assert caught.value.time == PATH.t[64]
+
+
 @pytest.mark.filterwarnings("error")  # nothing is written to the error stream
 @pytest.mark.parametrize("wrapped", [False, True])
 @pytest.mark.parametrize("how", ["raises", "writes beyond the end", "answers nothing finite"])

@@ -217,11 +217,13 @@ def test_a_run_knows_its_sensors_and_faults():
 
 
 def test_times_between_samples_and_on_them():
-    """A fault acts from the first sample at or after its time."""
+    """A fault acts from the first sample at or after its time, of which a millionth of a sample is rounding."""
     t = np.arange(301) * (0.3 / 300)
     for k in range(301):
         assert np.argmin(fault_table([rk.DeadDrive(0, k * 1e-3)], t, 3).alive[:, 0]) == k
     assert np.argmin(fault_table([rk.DeadDrive(0, 0.1004)], t, 3).alive[:, 0]) == 101
+    for late, first in ((0.7e-9, 100), (1.4e-9, 101)):
+        assert np.argmin(fault_table([rk.DeadDrive(0, 0.1 + late)], t, 3).alive[:, 0]) == first
     assert fault_table([], t, 3) is None
 
 

@@ -391,12 +391,19 @@ def test_a_process_that_dies_takes_no_finished_rows_along():
     assert_array_equal(part.energies[0], rk.simulate(ROBOT, pd, PATH).energy)
 
 
-def test_a_law_that_fails_within_a_library_is_named_by_its_own_line():
-    def law(t, q_a, qd_a, desired):
-        return pd(t, q_a, qd_a, desired) if t < 0.1 else np.linalg.solve(np.zeros((3, 3)), q_a)
-
-    with pytest.raises(rk.SimulationError, match=r"LinAlgError.*\(line \d+ of test_lost_runs.py: return pd"):
-        rk.simulate(ROBOT, law, PATH, OFFSET)
+@pytest.mark.parametrize(
+    ("fails", "kind"),
+    [
+        (lambda: np.linalg.solve(np.zeros((3, 3)), np.ones(3)), "LinAlgError"),
+        (lambda: os.environ["no gain"], "KeyError"),
+    ],
+    ids=["installed", "frozen"],
+)
+def test_a_law_that_fails_within_a_library_is_named_by_its_own_line(fails, kind):
+    """Of the traceback the last line that is neither of an installed library nor of one that came with Python."""
+    with pytest.raises(rk.SimulationError, match=rf"{kind}.*\(line \d+ of test_lost_runs.py: \[?\(lambda") as caught:
+        rk.simulate(ROBOT, FailsAt(0.1, fails), PATH, OFFSET)
+    assert "frozen" not in caught.value.reason
 
 
 @pytest.mark.parametrize("law", [rk.PD, rk.APD, rk.CTC, rk.RedundantAPD, rk.RedundantCTC])

@@ -96,15 +96,13 @@ def too_stiff(setup: Setup) -> str:
 
 def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
     """What may have been the cause, the surest first."""
-    t, wrong = float(setup.trajectory.t[k]), _difference(setup.model, setup.robot)
-    begun = sorted((fault for fault in setup.broken if _begin(fault) <= t), key=_begin)
+    begun = sorted((fault for fault in setup.broken if _begin(fault) <= setup.trajectory.t[k]), key=_begin)
     setup = _with(setup, begun)  # what comes later is not to blame, and acts in no repetition
     if not ours:
         yield from _seen(setup, begun, c)
         return
-    factor = growth(setup, law, k)
-    if wrong and (_runs(setup._replace(model=setup.robot), law, k) or _steadies(setup, law, k, factor)):
-        yield f"the controller's model has {wrong}; with the machine's own it is not lost"
+    factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
+    yield from _model(setup, law, k, factor)
     yield from _broken(setup, law, k, begun)
     yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
@@ -117,6 +115,18 @@ def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[st
     if factor is not None:
         words = f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at a weak"
         yield f"{words} gain{_too(setup)}, or a path too near the boundary"
+
+
+def _model(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
+    """Another model than the machine's own, with which the run is not lost, or at least no error grows."""
+    wrong, right = _difference(setup.model, setup.robot), setup._replace(model=setup.robot)
+    if wrong and _runs(right, law, k):
+        yield f"the controller's model has {wrong}; with the machine's own it is not lost"
+    if wrong and factor is not None and factor > 1.001:
+        own = growth(right._replace(trajectory=setup.trajectory.for_robot(setup.robot)), law, k)
+        if own is not None and own <= 1.001:
+            grows = magnified(factor, setup.trajectory.dt)
+            yield f"the controller's model has {wrong}: the sampled loop {grows}; with the machine's own it does not"
 
 
 def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
@@ -234,12 +244,6 @@ def _with(setup: Setup, faults: list[Fault]) -> Setup:
     for fault in faults:
         copy.deepcopy(fault).mark(table, setup.trajectory.t)
     return setup._replace(faults=table)
-
-
-def _steadies(setup: Setup, law, k: int, factor: float | None) -> bool:
-    """Is a loop that grows with the model stable with the machine's own?"""
-    own = growth(setup._replace(model=setup.robot, trajectory=setup.trajectory.for_robot(setup.robot)), law, k)
-    return factor is not None and own is not None and factor > 1.001 >= own
 
 
 def _runs(setup: Setup, law, k: int) -> bool:
