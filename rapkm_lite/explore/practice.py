@@ -22,7 +22,7 @@ from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import beyond, distance_panels, draw_distance, frictionless, over_time, ready_made
+from .shared import beyond, central_triangle, distance_panels, draw_distance, frictionless, over_time, ready_made
 
 FAULTS = {
     "nothing": [],
@@ -41,7 +41,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3, centre=robot.base.mean(axis=0))
+    path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
@@ -80,7 +80,8 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     middle = robot.base.mean(axis=0)
-    path, q = triangle(robot, 0.3 * np.ptp(robot.base[:, 0]), 2.5, centre=middle), inverse_kinematics(robot, middle)
+    path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5)
+    q = inverse_kinematics(robot, middle)
     A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
     # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
     carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
