@@ -31,12 +31,26 @@ def test_the_users_script_runs():
     assert done.returncode == 0, done.stderr
 
 
-def errors(config):
-    """Sentences of pyright by file name, for a configuration file."""
+@pytest.fixture(scope="module")
+def errors(tmp_path_factory):
+    """Sentences of pyright by room of the package or name of a script, from one run over both."""
     pytest.importorskip("pyright")
+    folder = tmp_path_factory.mktemp("scripts").resolve()
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
+    (folder / "README.py").write_text("\n".join(blocks), encoding="utf-8")
+    (folder / "user_script.py").write_text((ROOT / "tests" / "user_script.py").read_text(encoding="utf-8"))
+    for path in LESSONS:
+        cells = [c.source for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
+        text = "\n\n".join(["from IPython.display import display", *cells])
+        (folder / f"lesson_{path.stem}.py").write_text(text, encoding="utf-8")
+    config = folder / "pyrightconfig.json"
+    roots = [{"root": str(folder), "extraPaths": [str(ROOT)], **CELLS}, {"root": str(ROOT)}]
+    # What is to be read has to be named relative to the configuration.
+    settings = {"include": [os.path.relpath(PACKAGE, folder), "."], "executionEnvironments": roots}
+    config.write_text(json.dumps(settings | {"extends": str(ROOT / "pyproject.toml")}), encoding="utf-8")
     command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", sys.executable, "-p", str(config)]
     said = json.loads(subprocess.run(command, capture_output=True, text=True).stdout)
-    assert said["summary"]["filesAnalyzed"] > 0
+    assert said["summary"]["filesAnalyzed"] >= len(list(PACKAGE.rglob("*.py"))) + len(LESSONS) + 2
     found = defaultdict(list)
     for item in said["generalDiagnostics"]:
         if item["severity"] == "error":
@@ -46,31 +60,11 @@ def errors(config):
     return found
 
 
-@pytest.fixture(scope="module")
-def package():
-    return errors(ROOT / "pyproject.toml")
-
-
-@pytest.fixture(scope="module")
-def scripts(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("scripts")
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
-    (folder / "README.py").write_text("\n".join(blocks), encoding="utf-8")
-    (folder / "user_script.py").write_text((ROOT / "tests" / "user_script.py").read_text(encoding="utf-8"))
-    for path in LESSONS:
-        cells = [c.source for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
-        text = "\n\n".join(["from IPython.display import display", *cells])
-        (folder / f"lesson_{path.stem}.py").write_text(text, encoding="utf-8")
-    config = {"include": ["."], "extraPaths": [str(ROOT)], "typeCheckingMode": "basic", "pythonVersion": "3.11"}
-    (folder / "pyrightconfig.json").write_text(json.dumps(config | CELLS), encoding="utf-8")
-    return errors(folder / "pyrightconfig.json")
-
-
 @pytest.mark.parametrize("room", ROOMS)
-def test_package_is_sound(room, package):
-    assert not package[room], "\n".join(package[room])
+def test_package_is_sound(room, errors):
+    assert not errors[room], "\n".join(errors[room])
 
 
 @pytest.mark.parametrize("name", ["README", "user_script", *(f"lesson_{path.stem}" for path in LESSONS)])
-def test_what_users_write_is_sound(name, scripts):
-    assert not scripts[name], "\n".join(scripts[name])
+def test_what_users_write_is_sound(name, errors):
+    assert not errors[name], "\n".join(errors[name])
