@@ -109,7 +109,7 @@ def prepare(notebooks: Path, repository: str) -> None:
     write(WORK / "lessons/instructor.md", lessons.linked(instructor))
     reference.write(WORK / "reference")
     develop = pages(HERE, "develop")
-    teaching = pages(HERE / "teaching", "teaching") if (HERE / "teaching").is_dir() else []
+    teaching = pages(HERE / "teaching", "teaching")
     taught = "\n".join(["lessons/instructor", *teaching])
     plan = f"\n```{{toctree}}\n:caption: Teach\n:maxdepth: 1\n\n{taught}\n```\n"
     listed = "\n".join(f"lessons/{name}" for name in names)

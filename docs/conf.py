@@ -28,7 +28,7 @@ myst_dmath_double_inline = True
 # What can be run, not what it printed; examples without their prompts.
 copybutton_selector = "div:not(.output) > div.highlight pre"
 copybutton_prompt_text = ">>> "
-# The stored Python version of a lesson is not that of the reader.
+# Widgets are left to a kernel, and a part of a lesson may begin with a heading of any level.
 suppress_warnings = ["mystnb.unknown_mime_type", "myst.header"]
 mathjax_path = "tex-svg.js"
 mathjax3_config = {"tex": {"tags": "none"}, "svg": {"fontCache": "local"}}

@@ -63,9 +63,15 @@ def test_generic_mistakes_are_named(exercise, answer, words):
 
 
 def test_close_answers_say_how_far_and_what_would_improve_them():
-    result = judged(VECTOR, lambda K, v, m: 1.01 * K * v / m)
-    assert result.word == "close" and "more steps" in result.sentence and "1 %" in result.sentence
+    result = judged(VECTOR, lambda K, v, m: 1.005 * K * v / m)
+    assert result.word == "close" and "more steps" in result.sentence and "0.5 %" in result.sentence
+    assert judged(VECTOR, lambda K, v, m: K * v / m + 0.01 * np.sin(1e3 * v)).word == "close"
     assert judged(VECTOR, lambda K, v, m: 1.03 * K * v / m).word == "wrong"
+
+
+def test_a_constant_factor_is_a_mistake_though_it_is_near():
+    result = judged(VECTOR, lambda K, v, m: 1.015 * K * v / m)
+    assert result.word == "wrong" and "1.015 times the right one" in result.sentence
 
 
 def test_a_mistake_with_a_name_is_not_close():

@@ -1,5 +1,6 @@
 """The explorers: drawn at corners and defaults of their controls, honest about mistakes, and without leaks."""
 
+import datetime
 import importlib.util
 import inspect
 import itertools
@@ -19,7 +20,7 @@ from matplotlib.text import Text
 import rapkm_lite as rk
 from rapkm_lite import explore
 from rapkm_lite.explore.controls import moved, snap
-from rapkm_lite.figures.marks import encode, figure
+from rapkm_lite.figures.marks import encode, figure, workspace_outline
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
@@ -282,6 +283,57 @@ def test_controls_refuse_what_they_cannot_take(name, values):
             made.set(**{name: value})
 
 
+OTHER_WIDGETS = [
+    (widgets.IntRangeSlider(value=(1, 3), min=0, max=10), (2, 5), "a"),
+    (widgets.BoundedFloatText(value=1.0, min=0.0, max=10.0), 2.0, "a"),
+    (widgets.DatePicker(), datetime.date(2020, 1, 1), 3),
+    (widgets.ToggleButtons(options=["a", "b"]), "b", "c"),
+    (widgets.SelectMultiple(options=["a", "b"]), ("b",), ("c",)),
+]
+
+
+@pytest.mark.parametrize(("widget", "value", "wrong"), OTHER_WIDGETS, ids=[type(w).__name__ for w, *_ in OTHER_WIDGETS])
+def test_any_widget_with_a_value_is_a_control(widget, value, wrong):
+    seen = []
+    controls = {"slope": explore.slider("slope in m/s", 0, 9, 1, 1), "other": widget}
+    explorer = explore.explorer(lambda picture, slope, other: seen.append(other), controls, {"a": {}})
+    widget.value = value  # as from the page
+    assert seen[-1] == value and not explorer.problem
+    explorer.reset()
+    assert explorer.set(other=value).values["other"] == seen[-1] == value
+    # What a control refuses moves no other one.
+    with pytest.raises(ValueError, match=r"^other = .*; allowed: what its control takes"):
+        explorer.set(slope=5, other=wrong)
+    assert explorer.values == {"slope": 1, "other": value}
+
+
+def test_a_path_is_told_to_cross_where_it_does():
+    """It crosses a curve on which a pair is singular where d_j x d_k changes its sign, on machines of any size."""
+    robot = rk.load().replace(friction=0.0)
+    for times in (0.1, 1.0):
+        scaled = {name: times * getattr(robot, name) for name in ("base", "lengths", "centers")}
+        own = robot.replace(inertias=times**2 * robot.inertias, **scaled)
+        explorer = explore.computed_torque(own).set(law="fixed pair (1,2)", offset_1=0, offset_2=0, offset_3=0)
+        frame, outline = explorer.picture.frames["plane"], workspace_outline(own)
+        assert np.all(np.nanmin(outline, axis=0) >= frame[::2]) and np.all(np.nanmax(outline, axis=0) <= frame[1::2])
+        told = {}
+        for side in (170, 220, 230, 240, 280):
+            path = rk.triangle(own, 1e-3 * times * side, centre=own.base.mean(axis=0), dt=0.01)
+            crossed = np.ptp(np.sign(rk.distal_cross_products(own, path.q)[:, 0])) > 0
+            word = explorer.set(side=times * side).numbers.get("distance from its singular curve")
+            if word:  # else the run is lost
+                told[crossed] = told.get(crossed, True) and (word == "crossed") == crossed
+        assert told and all(told.values())
+
+
+def test_a_screen_shows_its_answer_on_demand():
+    explorer = light().screen("Why?", "Because.")
+    show, said = explorer.widget.children[1].children[0].children[1:]
+    for pressed, words, display in ((True, "Hide the answer", "block"), (False, "Show the answer", "none")):
+        show.value = pressed
+        assert show.description == words and said.layout.display == display
+
+
 def test_a_broken_draw_fails_at_once():
     def broken(picture, slope):
         raise TypeError("a mistake in the lesson")
@@ -539,6 +591,9 @@ def test_handles_move_their_controls(name):
         assert changed == set(handle["set"])
         now = explorer.picture.handles[k]
         for control in handle["set"]:
+            if handle["along"] is not None:  # all of the curve is within reach of the slider
+                low, high = explorer.canvas.scene["ranges"][control]
+                assert low <= np.min(now["set"][control]) and np.max(now["set"][control]) <= high
             widget = explorer.controls[control]
             assert explorer.values[control] == pytest.approx(before[control] + 2 * widget.step)
             # The handle stands where the controls say.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rapkm_lite import explore
-from rapkm_lite.figures.marks import decode, encode
+from rapkm_lite.figures.marks import encode
 
 HERE = Path(__file__).parent
 STAGE = HERE.parent / "rapkm_lite" / "explore" / "stage.js"
@@ -41,6 +41,16 @@ def test_node_reads_what_python_writes(name, tmp_path):
     command = [node, "--test", str(HERE / "js" / "stage.test.mjs")]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+def decode(header: dict, buffers: list[bytes], styles: dict) -> list[tuple]:
+    """The marks of a message as (kind, panel, style, numbers (k, 2)); new styles are added to `styles`."""
+    styles |= header["styles"]
+    numbers, marks, at = np.frombuffer(buffers[0], "<f4"), [], 0
+    for kind, panel, style, count, *_ in header["marks"]:
+        marks.append((kind, panel, styles.get(style), numbers[at : at + 2 * count].reshape(-1, 2)))
+        at += 2 * count
+    return marks
 
 
 @pytest.mark.parametrize("name", SCREENS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import escape
 from pathlib import Path
 
 # "name : what it is" begins an item about an argument or several; a line may hold more of them, a full stop between.
@@ -63,7 +64,9 @@ def _fold(app, doctree, docname):
         if title is None or not title.astext().startswith("Dig deeper"):
             continue
         section.remove(title)
-        heading = nodes.raw("", f'<details class="dig-deeper"><summary>{title.astext()}</summary>', format="html")
+        heading = nodes.raw(
+            "", f'<details class="dig-deeper"><summary><h3>{escape(title.astext())}</h3></summary>', format="html"
+        )
         section.insert(0, heading)
         section.append(nodes.raw("", "</details>", format="html"))
 

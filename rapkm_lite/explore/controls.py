@@ -12,6 +12,7 @@ from ..machine.arguments import exact_array, function, having, of_kind, positive
 from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
+SLIDERS = widgets.IntSlider, widgets.FloatSlider, widgets.FloatLogSlider
 _COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}
 
 
@@ -139,7 +140,7 @@ def check(name: str, widget, value) -> None:
             raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
     elif isinstance(widget, widgets.Checkbox):
         truth(name, value)
-    elif hasattr(widget, "min"):
+    elif isinstance(widget, SLIDERS):
         number = float(exact_array(name, value))
         if isinstance(widget, widgets.IntSlider) and not number.is_integer():
             raise ValueError(f"{name} = {number:g}; allowed: whole numbers")
@@ -150,6 +151,22 @@ def check(name: str, widget, value) -> None:
             raise ValueError(f"{name} = {number:g}; allowed: {low:g} to {high:g}")
 
 
+def put(controls: dict, values: dict) -> None:
+    """Set controls, all or none; ValueError for an unknown name, or a value that a control cannot take."""
+    for name, value in values.items():
+        if name not in controls:
+            raise ValueError(f"there is no control {name!r}; allowed: {', '.join(controls)}")
+        check(name, controls[name], value)
+    before = {name: controls[name].value for name in values}
+    try:
+        for name, value in values.items():
+            controls[name].value = value
+    except Exception as error:  # of a widget from elsewhere, too
+        for other, value in before.items():
+            controls[other].value = value
+        raise ValueError(f"{name} = {short(values[name])}; allowed: what its control takes: {error}") from None
+
+
 def tidied(value):
     """A number without the noise of its last digits; anything else as it is."""
     return float(f"{value:.12g}") if isinstance(value, float) else value
@@ -157,7 +174,7 @@ def tidied(value):
 
 def snap(widget, value):
     """The nearest value that a slider has a step for; a control without steps takes the value as it is."""
-    if not hasattr(widget, "min"):
+    if not isinstance(widget, SLIDERS):
         return value
     log = isinstance(widget, widgets.FloatLogSlider)
     low, high = _ends(widget)
@@ -194,7 +211,7 @@ def follow(handles: list[dict], controls: dict) -> bool:
 
 def ranges(controls: dict) -> dict:
     """The least and the largest value of each slider."""
-    return {name: _ends(widget) for name, widget in controls.items() if hasattr(widget, "min")}
+    return {name: _ends(widget) for name, widget in controls.items() if isinstance(widget, SLIDERS)}
 
 
 def _ends(widget) -> tuple[float, float]:

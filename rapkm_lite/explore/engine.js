@@ -111,13 +111,12 @@ export function rest(m, x, y, K_P, offset) {
 }
 
 /** A closed polygon, each edge quintic from rest to rest: per sample x (2), base angles and rates (N). */
-export function polygon(m, corners, { duration = 5, dt = 1e-3, rest = 0 } = {}) {
-  const steps = Math.round(duration / dt), edges = corners.length, time = (duration - 2 * rest) / edges;
+export function polygon(m, corners, { duration = 5, dt = 1e-3 } = {}) {
+  const steps = Math.round(duration / dt), edges = corners.length, time = duration / edges;
   const angles = m.N * (steps + 1), sized = { x: zeros(2 * steps + 2), angle: zeros(angles), rate: zeros(angles) };
   const path = { dt: duration / steps, samples: steps + 1, ...sized }, pose = new Pose(m);
   for (let k = 0; k <= steps; k++) {
-    const phase = Math.min(Math.max((k * path.dt - rest) / time, 0), edges);
-    const edge = Math.min(Math.floor(phase), edges - 1), s = phase - edge;
+    const phase = (k * path.dt) / time, edge = Math.min(Math.floor(phase), edges - 1), s = Math.min(phase - edge, 1);
     const way = s ** 3 * (10 - 15 * s + 6 * s * s), rate = (30 * (s * (1 - s)) ** 2) / time;
     const [x0, y0] = corners[edge], [x1, y1] = corners[(edge + 1) % edges];
     if (!pose.at(x0 + way * (x1 - x0), y0 + way * (y1 - y0))) return null;
@@ -137,8 +136,7 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
   const { arms, N, mass, sharpness, gravity: [gx, gy] } = m, { dt, samples } = path;
   const run = { x: zeros(2 * samples), angle: zeros(N * samples), torque: zeros(N * samples), energy: zeros(N) };
   const drag = gx !== 0 || gy !== 0 || arms.some((arm) => arm.friction > 0), quantum = (2 * Math.PI) / encoder;
-  const pose = new Pose(m), thought = new Pose(m), c = zeros(N), read = zeros(N), rates = zeros(N), bend = zeros(N);
-  const acc = zeros(2), M = zeros(3);
+  const pose = new Pose(m), thought = new Pose(m), [c, read, rates, bend, acc, M] = [N, N, N, N, 2, 3].map(zeros);
   /** Acceleration of the end-effector into `acc`; false where the machine would leave its workspace within h. */
   function accelerate(x, y, vx, vy, h) {
     if (!pose.at(x, y)) return false;

@@ -17,7 +17,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, check, follow, moved, moving, parts, player, ranges, snap, tidied
+from .controls import Shown, follow, moved, moving, parts, player, put, ranges, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -145,13 +145,8 @@ class Explorer:
 
         Raises ValueError for an unknown control or a value outside its range.
         """
-        for name, value in values.items():
-            if name not in self.controls:
-                raise ValueError(f"there is no control {name!r}; allowed: {', '.join(self.controls)}")
-            check(name, self.controls[name], value)
         with self._quiet():
-            for name, value in values.items():
-                self.controls[name].value = value
+            put(self.controls, values)
         self.update()
         self._send()
         return self
@@ -163,6 +158,9 @@ class Explorer:
         show = widgets.ToggleButton(description="Show the answer", layout={"width": "auto"})
         said = widgets.HTML(f"<p>{answer}</p>", layout={"display": "none"})
         show.observe(lambda change: setattr(said.layout, "display", "block" if change["new"] else "none"), "value")
+        show.observe(
+            lambda change: setattr(show, "description", f"{('Show', 'Hide')[change['new']]} the answer"), "value"
+        )
         beside = widgets.VBox([bar, show, said], layout={"flex": "0 0 300px"})
         self.widget.children = [widgets.HTML(f"<h2>{question}</h2>"), widgets.HBox([beside, canvas])]
         self.widget.add_class("rapkm-screen")
@@ -191,7 +189,7 @@ class Explorer:
                     widget.continuous_update = False
 
     def close(self) -> None:
-        """Take the widgets and their callbacks away."""
+        """Take box, picture and callbacks away; the controls may serve another explorer."""
         for widget in self.controls.values():
             widget.unobserve(self._changed, "value")
         self.canvas.close()

@@ -13,7 +13,13 @@ from ..figures.maps import mode_name
 from ..figures.style import NEUTRAL
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.actuation import control_matrix, required_wrench, singular_values, weighted_pseudoinverse
+from ..mechanics.actuation import (
+    control_matrix,
+    prestress_projector,
+    required_wrench,
+    singular_values,
+    weighted_pseudoinverse,
+)
 from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import triangle
@@ -144,7 +150,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         A = control_matrix(own, path.q)
         inverse = weighted_pseudoinverse(A)
         moving = matvec(inverse, required_wrench(own, path.q, path.qd, path.qdd))
-        pressing = -GAIN * (offset - matvec(inverse, matvec(A.mT, offset)))
+        pressing = -GAIN * matvec(prestress_projector(A), offset)
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)

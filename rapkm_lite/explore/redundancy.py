@@ -119,7 +119,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         picture.line("plane", *way.T, color=NEUTRAL, linewidth=1, zorder=2)
         dots = {"linestyle": "none", "marker": "o", "markersize": 6, "zorder": 6}
         picture.line("plane", *way[seen].T, color=ALARM, **dots)
-        picture.handle("plane", *way[turn], along=way[::3], turn=degrees[::3])
+        picture.handle("plane", *way[turn], along=way[:121:3], turn=degrees[:121:3])
         marks.traces(picture, "seen", degrees, share)
         for i in range(N):
             picture.line("seen", seen, share[seen, i], color=arm_colour(i), **dots)

@@ -133,10 +133,10 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     def setup(picture):
         marks.draw_workspace(picture, "plane", robot)
         picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
-        corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, picture.ylim("plane")[1] - 0.06])
+        corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, picture.ylim("plane")[1] - 0.06 * times])
         picture.arrow("plane", corner, [scale * unit, 0], wide, facecolor=AFTER)
         words = {"ha": "center", "va": "bottom", "fontsize": 10}
-        picture.text("plane", corner[0] + scale * unit / 2, corner[1] + 0.015, f"{unit:g} N", **words)
+        picture.text("plane", corner[0] + scale * unit / 2, corner[1] + 0.015 * times, f"{unit:g} N", **words)
 
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},

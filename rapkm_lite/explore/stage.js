@@ -1,5 +1,5 @@
 // A picture of recorded marks on canvases, and handles to take it by.  One module, nothing to build, no dependency.
-// mount(el, scene, link) shows a picture in `el`.  scene = {panels, layout, widths, size, name, about, labels};
+// mount(el, scene, link) shows a picture; scene = {panels, layout, widths, size, name, about, labels, ranges, code};
 // link = {send(message), receive(callback(message, buffers))} reaches whoever computes, a kernel or a script.
 //   to it:   {kind: "hello"} | {kind: "grab", from, seq, to: {control: value}, by: {control: steps}}
 //   from it: {kind: "fixed" | "picture" | "lost", from?, seq?, marks, styles, images, frames, handles, numbers, ...}
@@ -122,14 +122,15 @@ class Panel {
     for (const part of ["head", "ylabel", "plot", "scale", "xlabel"])
       this[part] = rich(make("div", { className: `rapkm-${part}` }, this.el), spec[part]);
     this.heading = make("b", {}, this.head);
-    this.canvas = make("canvas", { role: "img", ariaLabel: spec.title?.trim() || spec.ylabel || name }, this.plot);
+    this.canvas = make("canvas", { role: "img", ariaLabel: spec.ylabel || name }, this.plot);
     this.ctx = this.canvas.getContext("2d");
   }
 
   /** Title and legend are words of the page, which wrap by themselves; written anew only when they change. */
   entitle({ words = this.spec.title, style: { color, bold = true } = {} } = {}, legend = []) {
-    const { theme, heading } = this, told = JSON.stringify([legend, theme.dark]);
-    if (heading.words !== words) rich(heading, (heading.words = words));
+    const { theme, heading, canvas } = this, told = JSON.stringify([legend, theme.dark]);
+    if (heading.words !== words)
+      canvas.ariaLabel = rich(heading, (heading.words = words)).textContent.trim() || canvas.ariaLabel;
     Object.assign(heading.style, { color: theme.colour(color) ?? "", fontWeight: bold ? 700 : 400 });
     if (told === this.told) return;
     this.head.replaceChildren(heading, make("div"));
@@ -314,7 +315,7 @@ export function wish({ along, set }, x, y) {
 /** Steps of its controls for an arrow key, ten with shift, or to either end; null for another key. */
 export function steps({ along, set, at }, key, shift) {
   const [dx, dy] = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key] ?? [];
-  const end = { Home: -999, End: 999 }[key]; // further than any slider goes
+  const end = { Home: -1e9, End: 1e9 }[key]; // further than any slider goes
   if (dx === undefined && !end) return null;
   const count = (v) => end ?? (along || at[1] === null ? dx + dy : Math.sign(v[0]) * dx + Math.sign(v[1]) * dy);
   return Object.fromEntries(Object.entries(remade(set, (v) => (shift ? 10 : 1) * count(v))).filter(([, n]) => n));
@@ -394,8 +395,8 @@ export function mount(el, scene, link) {
     const message = { kind: "grab", from: me, seq: ++seq, ...waiting };
     waiting = { to: {}, by: {} };
     open.add(seq);
-    setTimeout(pump, PATIENCE, seq);
-    link.send(message); // a page without a kernel answers before this returns
+    if (scene.code !== false) setTimeout(pump, PATIENCE, seq); // else there is no kernel to be busy or gone
+    link.send(message);
   }
 
   function receive(message, buffers = []) {
@@ -515,8 +516,9 @@ function page(event) {
   const letter = (event.ctrlKey || event.metaKey) && /^[bd-uw]$/i.test(event.key);
   const shut = letter && event.target.closest?.(".rapkm-explorer [data-lm-suppress-shortcuts]");
   if (shut) delete shut.dataset.lmSuppressShortcuts, setTimeout(() => (shut.dataset.lmSuppressShortcuts = "true"));
-  const screens = [...document.querySelectorAll(".rapkm-screen")], way = { PageDown: 1, PageUp: -1 }[event.key];
-  if (!way || !screens.length) return;
+  const screens = [...document.querySelectorAll(".rapkm-screen")].filter((screen) => screen.getClientRects().length);
+  const way = { PageDown: 1, PageUp: -1 }[event.key], written = event.target.closest?.("textarea, .cm-content");
+  if (!way || !screens.length || written) return;
   event.preventDefault(), event.stopImmediatePropagation();
   const now = screens.findLastIndex((screen) => screen.getBoundingClientRect().top < innerHeight / 2);
   screens[now + way]?.scrollIntoView({ block: "start" });

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
-from ..figures.maps import pair_line, pair_name
+from ..figures.maps import curve_crossings, pair_line, pair_name
 from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves
 from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
@@ -17,7 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import beyond, central_triangle, curves, frictionless, length_slider, over_time, ready_made
+from .shared import beyond, central_triangle, curves, frictionless, length_slider, over_time, ready_made, size
 
 # Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
 MOST = {"torque": 1000.0, "error": 100.0}
@@ -59,9 +59,10 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     @lru_cache(maxsize=64)
     def distance(law: str, side: int) -> str:
         """How near the path comes to the points on which the pair is singular."""
-        points = np.concatenate(singular[fixed[law]])
-        gap = cdist(coarse(side).x, points).min()
-        return "crossed" if gap < 2e-3 else f"{1e3 * gap:.0f} mm"
+        if len(curve_crossings(coarse(side))[pairs.index(fixed[law])]):
+            return "crossed"
+        gap = cdist(coarse(side).x, np.concatenate(singular[fixed[law]])).min()
+        return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
@@ -100,7 +101,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             for line in lines:
                 picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
 
-    low, high = robot.base.min(axis=0) - [0, 0.06], robot.base.max(axis=0) + [0, 0.02]
+    low, high = robot.base.min(axis=0) - [0, 0.06 * size(robot)], robot.base.max(axis=0) + [0, 0.02 * size(robot)]
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
     laws = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
     feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": laws}

@@ -243,6 +243,6 @@ _RULES: dict[str, Callable[[str, Any, Known], None]] = {
 }
 _CURVES = (
     "x y t values sigma theory ratio simulated jumps can_rest spacing gap gains without with_filter antagonistic "
-    "reference readings demand points inside cube xd share part c eps leak residual bias exact error predicted "
+    "reference readings demand points inside cube share part c eps leak residual bias exact error predicted "
     "lengths counts angle"
 ).split()

@@ -122,6 +122,17 @@ def given(answer: Any, case: tuple) -> Any:
     return got
 
 
+def given_law(make: Any, robot: Any) -> Any:
+    """The law that an answer makes for a machine; ends the examination where it uses a pose that nobody measures."""
+    law = part = given(make, (robot,))
+    while part is not None:
+        if getattr(part, "pose", None) == "true":
+            words = "the law believes the true pose, which no controller knows; take the measured one"
+            raise Ended("wrong", words, "true pose")
+        part = getattr(part, "law", None)
+    return law
+
+
 def returned(got: Any) -> Any:
     """What a function of the student gave back; ends the examination where that is nothing."""
     if got is None or got is Ellipsis or got is NotImplemented:

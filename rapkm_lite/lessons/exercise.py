@@ -73,7 +73,6 @@ class Exercise:
         that is true when the mistake was made).
     judge : of a design: answer -> list of `Measured`, from runs in closed loop; cases, invariant and tolerance are
         not used.
-    unique : False where many answers are right: only shape and invariant are judged.
     raw : True where `judge` reads the answer as it stands, words and NaN too, and returns a `Result`.
     secret : True where `check` must not hand out the package's answer.
     points : what a right or close answer is worth.
@@ -91,7 +90,6 @@ class Exercise:
     mistakes: dict[str, Callable] = field(default_factory=dict)
     judge: Callable | None = None
     raw: bool = False
-    unique: bool = True
     secret: bool = False
     points: float = 5.0
     called: str = ""

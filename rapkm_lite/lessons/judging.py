@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..machine.manipulator import Manipulator
 from .answers import NOTHING, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
-from .seen import Seen, alike
+from .seen import Seen, alike, ratio_of
 
 
 def judged(exercise: Exercise, answer: Any) -> Result:
@@ -102,24 +102,31 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
         raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     seen = _seen(exercise, answer, cases)
     want = seen.want
-    worst = [_deviation(g, w) for g, w, _ in seen] if exercise.unique else [0.0] * len(cases)
+    worst = [_deviation(g, w) for g, w, _ in seen]
     allowed = [max(exercise.tolerance, 1e-9 * _size(w)) for w in want]
     right = [d <= a for d, a in zip(worst, allowed, strict=True)]
     lawful, sentence = _law(exercise, seen)
     if all(right) and lawful <= exercise.tolerance:
         law = f"; {sentence}: below {exercise.tolerance:.0e}" if exercise.invariant else ""
-        near = f"within {exercise.tolerance:.0e} {exercise.unit} of the package at " if exercise.unique else ""
+        near = f"within {exercise.tolerance:.0e} {exercise.unit} of the package at "
         return Result("ok", f"{near}{len(cases)} case{'s'[: len(cases) > 1]}{law}")
     if all(right):
         raise Ended("wrong", f"{sentence}: {lawful:.3g} (allowed {exercise.tolerance:.0e})", sentence)
     off = f"off by up to {max(worst):.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
     share = _share(worst, want, right)
-    if share <= exercise.close:
+    if share <= exercise.close and not _by_a_factor(seen):
         near = f"the method is right, {off}, that is {100 * share:.2g} %"
         return Result("close", f"{near}. To improve: {exercise.improve}")
     _explained(exercise, seen, right, off)
     law = f"; {sentence}: {lawful:.3g}" if exercise.invariant and lawful > exercise.tolerance else ""
     raise Ended("wrong", f"it is {off}{law}", "no name found")
+
+
+def _by_a_factor(seen: Seen) -> bool:
+    """Is the answer the right one times a constant, and not of a number that was rounded, such as 3.14?"""
+    k = ratio_of(seen.got, seen.want)
+    tight = Seen(seen.got, seen.want, seen.cases, seen.names, 1e-9)
+    return abs(k - 1.0) > 0.01 and len(seen.want) > 1 and tight.same([k * w for w in seen.want])
 
 
 def _share(worst: list[float], want: list[np.ndarray], right: list[bool]) -> float:
@@ -163,7 +170,7 @@ def _sign(mistake: Callable, seen: Seen) -> int:
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:
     """End the examination where the answer is that of a mistake the exercise knows by name."""
-    if exercise.unique and all(alike(w, g, max(seen.slack, 0.0)) for g, w, _ in seen):
+    if all(alike(w, g, max(seen.slack, 0.0)) for g, w, _ in seen):
         return
     signs = {sentence: _sign(mistake, seen) for sentence, mistake in exercise.mistakes.items()}
     # What explains the answer as it is goes before what explains its opposite.
@@ -219,7 +226,8 @@ def _design(exercise: Exercise, answer: Any) -> Any:
     if not callable(answer) and callable(exercise.reference):
         raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     if callable(answer):
-        return Answer(answer) if inspect.isroutine(answer) else answer
+        # A judge may ask a design again for the same place, which takes an object that can be a key.
+        return Answer(answer) if inspect.isroutine(answer) or not isinstance(answer, Hashable) else answer
     return fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
 
 

@@ -131,6 +131,12 @@ ANSWERS = {
     ],
     "10.spare_law": [
         ("right", "filter, a middle gain, more damping", tasks.spare_law),
+        (
+            "wrong",
+            "true pose",
+            lambda drawing: rk.AntagonismFilter(rk.CommandFilter(rk.PD(19.0, 0.55), pose="true")),
+            "true pose",
+        ),
         ("right", "with critical damping", law(rk.AntagonismFilter(rk.PD(21.0, 0.39)))),
         ("right", "feed-forward and filtered feedback", with_feed_forward),
         ("right", "command form", law(rk.CommandFilter(rk.PD(20.0, 0.6)))),

@@ -3,6 +3,7 @@
 Skipped where playwright or a Chromium is missing, unless the environment variable RAPKM_LITE_BROWSER is 1.
 """
 
+import re
 from itertools import pairwise
 
 import pytest
@@ -84,8 +85,9 @@ def test_dashboard_is_a_sequence_of_screens_for_a_projector(open_notebook):
     assert notebook.ask("() => lab.at(0)") == value
     # The answer comes on demand, and goes.
     answer = notebook.page.locator(".rapkm-screen").first.get_by_text("On the dark curve")
-    button = notebook.page.get_by_role("button", name="Show the answer").first
+    button = notebook.page.get_by_role("button", name=re.compile("the answer")).first
     for seen in (False, True, False):
+        assert button.inner_text() == ("Hide the answer" if seen else "Show the answer")
         answer.wait_for(state="visible" if seen else "hidden", timeout=5000)
         button.click()
     notebook.check()

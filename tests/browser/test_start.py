@@ -70,6 +70,10 @@ def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme
         "(e.getAttribute('aria-label') || e.closest('label')?.textContent.trim() || e.textContent.trim())).length"
     )
     assert seen.page.evaluate(unnamed + "") == 0
+    # A picture is called as its heading says, which changes.
+    heads = "[...document.querySelectorAll('.rapkm-panel')].map(e => [e.querySelector('canvas').ariaLabel, "
+    named = seen.page.evaluate(heads + "e.querySelector('.rapkm-head b').textContent])")
+    assert all(title in ("", name) for name, title in named) and "Torques at rest, mN m" in dict(named)
     assert seen.requests == [] and seen.errors == []
 
 
@@ -454,6 +458,29 @@ def test_home_and_end_lead_to_the_ends(browser, address):
     offset.focus()
     seen.page.keyboard.press("End")
     seen.wait("offset_1", 8)
+
+
+def test_page_down_turns_screens_that_are_seen_and_else_scrolls(browser, address):
+    """A dashboard in another tab, or a key in a text that somebody writes, is none of its business."""
+    seen = Page(browser, address)
+    page = seen.page
+    page.evaluate("""() => {
+        const add = (tag, more) => document.body.appendChild(Object.assign(document.createElement(tag), more));
+        for (const id of ["first", "second"]) add("div", { id, className: "rapkm-screen", style: "height: 100vh" });
+        add("textarea", { value: "line\\n".repeat(200), rows: 5 });
+        for (const screen of document.querySelectorAll(".rapkm-screen")) screen.style.display = "none";
+    }""")
+    text = page.locator("textarea")
+    text.click()
+    page.keyboard.press("PageDown")
+    page.wait_for_function("document.querySelector('textarea').scrollTop > 0")
+    page.evaluate("document.querySelectorAll('.rapkm-screen').forEach(e => e.style.display = 'block')")
+    before = text.evaluate("e => e.scrollTop")
+    page.keyboard.press("PageDown")
+    page.wait_for_function("before => document.querySelector('textarea').scrollTop > before", arg=before)
+    page.evaluate("document.activeElement.blur(); scrollTo(0, document.getElementById('first').offsetTop)")
+    page.keyboard.press("PageDown")
+    page.wait_for_function("Math.abs(document.getElementById('second').getBoundingClientRect().top) < 20")
 
 
 def test_the_address_after_a_pause_is_what_is_seen(browser, address):

@@ -91,7 +91,8 @@ test("arrow keys are steps of the controls that a direction moves", () => {
   const plane = { set: { x: [1e3, 0, 0], y: [0, 1e3, 0] }, at: [0, 0] };
   assert.deepEqual(steps(plane, "ArrowLeft", false), { x: -1 });
   assert.deepEqual(steps(plane, "ArrowUp", true), { y: 10 });
-  assert.deepEqual(steps(plane, "Home", false), { x: -999, y: -999 }); // further than any slider goes
+  const home = steps(plane, "Home", false);
+  assert.ok(home.x === home.y && home.x < -1e6); // further than any slider goes
   assert.equal(steps(plane, "Enter", false), null);
   assert.deepEqual(steps({ set: { offset: [-4, 2, 0] }, at: [0, 0] }, "ArrowRight", false), { offset: -1 });
   assert.deepEqual(steps({ set: { time: [1e3, 0, 0] }, at: [1, null] }, "ArrowDown", false), { time: -1 });

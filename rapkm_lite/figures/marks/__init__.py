@@ -6,7 +6,7 @@
 ['line']
 """
 
-from .encode import decode, encode, scene
+from .encode import encode, scene
 from .palette import Palette
 from .parts import (
     bars,

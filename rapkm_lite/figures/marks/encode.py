@@ -1,4 +1,4 @@
-"""Marks as a message for the canvas: a header for JSON and one buffer of 32-bit numbers, and back for the tests."""
+"""Marks as a message for the canvas: a header for JSON and buffers of 32-bit numbers."""
 
 from __future__ import annotations
 
@@ -78,13 +78,3 @@ def _handle(handle: dict) -> dict:
     if handle["grip"] is not None:
         entry["grip"] = np.asarray(handle["grip"], dtype=float).tolist()
     return entry
-
-
-def decode(header: dict, buffers: list[bytes], styles: dict) -> list[tuple]:
-    """The marks of a message as (kind, panel, style, numbers (k, 2)); new styles are added to `styles`."""
-    styles |= header["styles"]
-    numbers, marks, at = np.frombuffer(buffers[0], "<f4"), [], 0
-    for kind, panel, style, count, *_ in header["marks"]:
-        marks.append((kind, panel, styles.get(style), numbers[at : at + 2 * count].reshape(-1, 2)))
-        at += 2 * count
-    return marks

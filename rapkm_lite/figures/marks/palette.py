@@ -91,7 +91,7 @@ def canvas_style(kind: str, items: tuple) -> dict:
     if kind == "line":
         colour = to_hex(style.get("color", "#222222"))
         out |= {"color": colour, "width": 0.0 if dash is None else style.get("linewidth", 1.7), "dash": dash or ()}
-        out |= {"cap": style.get("solid_capstyle", "butt"), "marker": style.get("marker"), "size": 6.0}
+        out |= {"cap": style.get("solid_capstyle", "butt"), "marker": style.get("marker")}
         face = style.get("markerfacecolor", colour)
         out |= {"face": to_hex(face), "edge": style.get("markeredgewidth", 1.0), "size": style.get("markersize", 6.0)}
     elif kind in ("bar", "polygon"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 
 import numpy as np
 
@@ -173,9 +172,6 @@ def unexplained_gain(gains):
 def refusal(answer) -> Result:
     """The verdict on what `offset_c` tells: one number, eta.offset; no single offset."""
     if isinstance(answer, str):
-        said = set(re.findall(r"[a-z']+", answer.lower()))
-        if said & {"not", "cannot", "can't", "unknown", "impossible", "nan"} and not re.search(r"\d", answer):
-            return Result("ok", "one place tells one number, eta.offset; the three offsets stay open, as you say")
         raise Ended("wrong", "say it with numbers: three offsets, np.nan for each one that the log cannot tell")
     got = numbers(given(answer, ()))
     (n,), (error,), _ = rests("offset_c")

@@ -13,7 +13,7 @@ from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import hold, triangle
 from ...simulation.faults import DeadDrive, TorqueLimit
 from ...simulation.runs import SimulationError, simulate
-from ..answers import given
+from ..answers import given_law
 from ..checker import Case, Measured
 
 TOO_LONG, COUNTS, WEAK = 5e-3, 2000, 0.15
@@ -108,7 +108,7 @@ def survives(make) -> list[Measured]:
 
     def run(path, *broken):
         faults = [TorqueLimit(WEAK), *broken]
-        return simulate(built, given(make, (drawing,)), path, encoder=COUNTS, model=drawing, faults=faults)
+        return simulate(built, given_law(make, drawing), path, encoder=COUNTS, model=drawing, faults=faults)
 
     healthy, still = run(path), run(hold(drawing, [0.03, 0.02], 1.0, 2e-3))
     found = [
