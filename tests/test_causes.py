@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import fsolve
 
 import rapkm_lite as rk
+from rapkm_lite.engine import COMPILED
 from rapkm_lite.mechanics.actuation import distal_cross_products, drive_pairs
 from rapkm_lite.simulation.explain import _difference
 from rapkm_lite.simulation.growth import growth, magnified, swinging
@@ -21,6 +22,17 @@ REDUNDANT, FILTER = rk.RedundantCTC(900.0, 60.0), rk.AntagonismFilter(PD)
 TRIANGLE = rk.triangle(ROBOT, duration=1.5)
 CIRCLE = rk.circle(ROBOT, 0.05, 0.5)
 HOLD = rk.hold(ROBOT, [0.0, 0.0], 0.5)
+
+
+@pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")
+def test_the_cause_of_a_lost_run_is_found_by_the_kernel_that_lost_it():
+    from rapkm_lite.engine import loop
+
+    rk.simulate(ROBOT, PD, TRIANGLE)
+    known = len(loop.closed_loops.signatures)
+    with pytest.raises(rk.SimulationError):
+        rk.simulate(ROBOT, PD, TRIANGLE, offset=[2.0, -1.0, 1.5])
+    assert len(loop.closed_loops.signatures) == known
 
 
 def mine(t, q_a, qd_a, desired):

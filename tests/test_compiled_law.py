@@ -57,6 +57,10 @@ def test_set_points_that_open_the_loops_are_refused_as_in_python(model):
                 run(ROBOT, one, wide, model=model)
     pair = [rk.simulate(ROBOT, one, narrow, OFFSET, model=model).c for one in (law, InPython(law))]
     assert_allclose(*pair, rtol=0, atol=1e-10)
+    # Of arms whose tips lie apart it is one and the same that says where the end-effector is.
+    there = rk.compiled(lambda t, q_a, qd_a, d, at: np.array([at.x[0], at.x[1], at.xd[0]]), at="desired")
+    pair = [rk.simulate(ROBOT, one, narrow, model=model).c[0] for one in (there, InPython(there))]
+    assert_allclose(*pair, rtol=0, atol=1e-14)
     # A law that asks for nothing follows any set-points.
     assert_array_equal(rk.simulate(ROBOT, pid, wide).t, wide.t)
 
@@ -308,6 +312,22 @@ def test_a_decorated_law_travels():
     assert study == rk.sweep(ROBOT, [pid, rk.PD(7.05, 0.225)], PATH, OFFSET)
     with pytest.raises((AttributeError, pickle.PicklingError)):
         pickle.dumps(rk.compiled(lambda t, q_a, qd_a, d: -q_a))
+
+
+@pytest.mark.parametrize("inverse", ["A_T_pinv", "A_tilde_T_pinv"])
+def test_an_input_singularity_is_refused_as_in_python(inverse):
+    """In mode (+, +, -) all distal links point along one line half-way between the first two drives."""
+    robot = ROBOT.replace(mode=[1, 1, -1])
+    path = rk.hold(robot, robot.base[:2].mean(axis=0), 0.1)
+    assert rk.degree_of_actuation(robot, path.q[0]) == 1
+    if inverse == "A_T_pinv":
+        law = rk.compiled(lambda t, q_a, qd_a, d, at: 0.01 * at.A_T_pinv[:, 1], at="desired")
+    else:
+        law = rk.compiled(lambda t, q_a, qd_a, d, at: 0.01 * at.A_tilde_T_pinv[:, 1], at="desired")
+    for faults in ([], [rk.TorqueLimit(0.1)]):
+        for one in (law, InPython(law)):
+            with pytest.raises(ValueError, match="has lost rank"):
+                rk.simulate(robot, one, path, faults=faults)
 
 
 @pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")

@@ -205,6 +205,19 @@ def test_pose_of_contradicting_angles_is_the_least_squares_one():
     assert_allclose(R @ (q_a - q[:3]), 0, atol=1e-12)
 
 
+def test_pose_near_a_singularity_is_as_exact_as_its_angles():
+    """With sigma the rounding of the angles alone moves x by 1e-16 / sigma, more than the tolerance of regular poses."""
+    robot = rk.Manipulator(base=[[-0.2, 0.0], [0.2, 0.0]], lengths=0.2, masses=0.134, mode=[-1, 1])
+    rng = np.random.default_rng(0)
+    x = rng.uniform([-0.15, -0.19], [0.15, -0.1], (2000, 2))
+    q = rk.inverse_kinematics(robot, x := x[rk.reachable(robot, x)])
+    sigma = rk.singular_values(rk.control_matrix(robot, q))[:, -1]
+    near = (sigma > 1e-3) & (sigma < 0.3)
+    assert near.sum() > 500
+    for angles, place in zip(q[near, :2], x[near] + 1e-4 * rng.normal(size=(near.sum(), 2)), strict=True):
+        assert_allclose(rk.estimate_pose(robot, angles, place)[:2], angles, rtol=0, atol=1e-12)
+
+
 def test_pose_fails_loudly():
     with pytest.raises(rk.ConvergenceError, match=r"at the rim of the workspace, the residuals are \[.*\] rad"):
         rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [0.0, 0.0])

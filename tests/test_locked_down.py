@@ -1,6 +1,7 @@
 """Machines that allow little: no cache, no home, no threads, a Numba that does not import, or is not wanted."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -94,6 +95,21 @@ def test_a_damaged_cache(tmp_path):
     for path in files:
         path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     assert result(PLANT, NUMBA_CACHE_DIR=str(tmp_path)) == first
+
+
+def test_kernels_of_earlier_sources_go_when_a_new_one_is_saved(tmp_path):
+    pytest.importorskip("numba")
+    first = result(PLANT, NUMBA_CACHE_DIR=str(tmp_path))
+    [folder] = {path.parent for path in tmp_path.rglob("*.nb?")}
+    own, others = sorted(folder.iterdir()), []
+    for path in own:
+        name = re.sub(r"_[0-9a-f]{12}-", "_0123456789ab-", path.name)
+        others.append(path.rename(folder / name))
+    strange = folder / "nothing_of_ours.txt"
+    strange.touch()
+    assert all("_0123456789ab-" in path.name for path in others)
+    assert result(PLANT, NUMBA_CACHE_DIR=str(tmp_path)) == first
+    assert sorted(folder.iterdir()) == sorted([*own, strange])
 
 
 def test_without_home(plain):

@@ -23,6 +23,32 @@ def paths():
 every_path = pytest.mark.parametrize("path", paths().values(), ids=paths().keys())
 
 
+def test_angles_that_somebody_computed_are_no_set_points_apart():
+    """q, F xd and F xdd + Fdot xd by public functions differ from the path's own by rounding."""
+    path = rk.circle(TESTBED, 0.08, 1.0)
+    q = rk.inverse_kinematics(TESTBED, path.x)
+    F = rk.orthogonal_complement(TESTBED, q)
+    qd = np.einsum("kij,kj->ki", F, path.xd)
+    F_dot = rk.orthogonal_complement_dot(TESTBED, q, qd)
+    qdd = np.einsum("kij,kj->ki", F, path.xdd) + np.einsum("kij,kj->ki", F_dot, path.xd)
+    mine = rk.Trajectory(3, path.x, path.xd, path.xdd, q, qd, qdd, t=path.t, robot=TESTBED)
+    five_bar = TESTBED.with_arms((0, 1))
+    assert_allclose(mine.for_robot(five_bar).q, path.for_robot(five_bar).q, atol=1e-14)
+    late = path.with_set_points(path.q_a + [1e-6, 0.0, 0.0])
+    with pytest.raises(ValueError, match="as many as the set-points"):
+        late.for_robot(five_bar)
+
+
+def test_samples_of_a_long_path_are_not_kept():
+    """Of seconds each sample is made once, for every run; of minutes they would fill the memory."""
+    short, long = rk.hold(TESTBED, [0.0, 0.0], 1.0), rk.hold(TESTBED, [0.0, 0.0], 20.0)
+    assert short[7] is short[7] and long[7] is not long[7] and long[7] == long[7]
+
+
+def test_half_a_turn_ends_on_the_other_side():
+    assert_allclose(rk.circle(TESTBED, 0.05, turns=0.5).x[-1], [-0.05, 0.0], atol=1e-15)
+
+
 @every_path
 def test_rates_are_the_derivatives_of_what_they_belong_to(path):
     # Central differences of order eight; away from the corners, where the third derivative jumps.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
 from ..machine.manipulator import Manipulator, manipulator
@@ -91,21 +90,24 @@ class Sample:
         return at(self.model, inverse_kinematics(self.model, x)), np.asarray(xd, dtype=float)
 
     def _measured(self):
-        model, keeper = self.model, self._keeper
-        guess = self.desired.x if keeper.x is None else keeper.x
-        keeper.x = None if keeper.nearest is None else keeper.nearest(self.q_a, guess)
-        if keeper.x is None:
+        model, keeper, found = self.model, self._keeper, None
+        x, x1, x2 = keeper.places or (self.desired.x,) * 3
+        if keeper.nearest is not None:
+            found = keeper.nearest(self.q_a, 3.0 * (x - x1) + x2 if keeper.smooth else x)
+        keeper.places = ()
+        if found is None:
             try:
-                keeper.x = forward_kinematics(model, estimate_pose(model, self.q_a, guess))
+                found = forward_kinematics(model, estimate_pose(model, self.q_a, x))
             except ConvergenceError as error:
                 raise NoPose(str(error)) from error
-        here = at(model, inverse_kinematics(model, keeper.x))
+        keeper.places = np.asarray(found), x, x1
+        here = at(model, inverse_kinematics(model, found))
         A = here.A
         return here, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
 
 
 class Controller:
-    """A law at work: it keeps the law's memory and the last estimate `x` of the end-effector position.
+    """A law at work: it keeps the law's memory and the last estimates of the end-effector position, `x` the last one.
 
     `simulate` uses one per run.  Use your own in a loop of your own, called once per sample as
     ``controller(t, q_a, qd_a, desired, truth=(x, xd))`` with measured base angles and rates (N,); the true end-effector
@@ -114,7 +116,8 @@ class Controller:
     Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
 
     nearest : a faster way than `estimate_pose` from angles and guess to the end-effector position, or None; it may
-        answer None.
+        answer None.  smooth : its guess lies on a parabola through the last three estimates, as in the engine; else it
+        is the last one.
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()
@@ -125,9 +128,15 @@ class Controller:
 
     def __init__(self, law, model: Manipulator, dt: float = 1e-3):
         self.law, self.model, self.dt = law, manipulator(model, "model"), positive_number("dt", dt)
-        self.x: ArrayLike | None = None
+        self.places: tuple[np.ndarray, ...] = ()
         self.nearest: Callable[..., tuple[float, float] | None] | None = None
+        self.smooth = False
         self.memory = begin(law, model, self.dt)
+
+    @property
+    def x(self) -> np.ndarray | None:
+        """The last estimate of the end-effector position (2,) in m, None where there is none."""
+        return self.places[0] if self.places else None
 
     @property
     def pair(self) -> tuple[int, int] | None:

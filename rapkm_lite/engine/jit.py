@@ -86,8 +86,16 @@ def _forgiving(dispatcher):
 
         return tried
 
+    def swept(*arguments):
+        """Save a kernel; those of earlier sources go, 24 MB of each, which nobody would ever read again."""
+        for old in Path(cache.cache_path).glob(f"*_{'[0-9a-f]' * 12}-*.nb[ci]"):
+            if _sources() not in old.name:
+                old.unlink(missing_ok=True)
+        save(*arguments)
+
     cache = dispatcher._cache
-    cache.load_overload, cache.save_overload = quiet(cache.load_overload), quiet(cache.save_overload)
+    save = cache.save_overload
+    cache.load_overload, cache.save_overload = quiet(cache.load_overload), quiet(swept)
     return dispatcher
 
 

@@ -27,7 +27,11 @@ def solve2(m11, m12, m22, fx, fy):
 
 @leaf
 def solve_regular(m11, m12, m22, fx, fy):
-    """The same with A^T A; not a number at an input singularity, where nothing but rounding would be left."""
+    """The same with A^T A; not a number at an input singularity, where nothing but rounding would be left.
+
+    That is where singular values have a ratio below 3e-8, for A^T A squares it; `mechanics.cores`, which works on A
+    itself, refuses below 1e-12.
+    """
     det, trace = m11 * m22 - m12 * m12, m11 + m22
     scale = 1.0 / (det if det > 1e-15 * (trace * trace) else math.nan)
     return (m22 * fx - m12 * fy) * scale, (m11 * fy - m12 * fx) * scale

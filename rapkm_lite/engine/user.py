@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from .arms import placed
 from .jit import leaf, outlined, view
-from .leaves import solve2, tanh
+from .leaves import solve_regular, tanh
 from .rows import *
 from .tables import *
 
@@ -131,7 +131,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         m = MODEL * W + i
         l1sq, l2sq = w[m + L1SQ * W], w[m + L2SQ * W]
         ax, ay, dx, dy, den, base, link = links(law, table, o, w, W, i)
-        if i == 0:
+        if i == 1:  # every arm is cut from it
             x[0, 0], x[0, 1] = w[m + BX * W] + ax + dx, w[m + BY * W] + ay + dy
             x[1, 0], x[1, 1] = -(base * ay + link * dy), base * ax + link * dx
         ad, tip = ax * dx + ay * dy, w[m + TIP * W]
@@ -184,7 +184,7 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     for i in range(N):
         m11, m12, m22 = m11 + A[i, 0] * A[i, 0], m12 + A[i, 0] * A[i, 1], m22 + A[i, 1] * A[i, 1]
     for i in range(N):
-        u, v = solve2(m11, m12, m22, A[i, 0], A[i, 1])
+        u, v = solve_regular(m11, m12, m22, A[i, 0], A[i, 1])
         A_T_pinv[i, 0], A_T_pinv[i, 1] = u, v
         for j in range(n):
             pinv[i, j] = u * F[j, 0] + v * F[j, 1]

@@ -228,12 +228,12 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     return bool(np.any(np.all(np.abs(c @ still.T) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
 
 
-def _readable(A: np.ndarray, near: np.ndarray, zero: np.ndarray, reach: int = 4) -> np.ndarray:
-    """Counts (k, N) within `reach` of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
+def _readable(A: np.ndarray, near: np.ndarray, zero: np.ndarray) -> np.ndarray:
+    """Counts (k, N) within 4 of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
 
     Strips of the plane share a point if every three of them do (Helly).
     """
-    steps = np.arange(-reach, reach + 1)
+    steps = np.arange(-4, 5)
     counts = np.zeros((1, 0))
     for k in range(len(A)):
         column = np.tile(near[k] + steps, len(counts))[:, None]

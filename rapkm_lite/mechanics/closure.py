@@ -129,7 +129,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         hessian = _pose_hessian(robot, q, A, residual)
         step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
         size = np.abs(step).max(axis=-1, keepdims=True)
-        if size.max(initial=0.0) < limit:
+        # Near an input singularity the rounding of the angles alone moves x further.
+        if np.all((size < limit) | (np.abs(matvec(A, step)).max(axis=-1, keepdims=True) < 4e-15)):
             return on_the_turn_of(q_a, q)
         # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
         step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))

@@ -10,6 +10,7 @@ import numpy as np
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
+from . import sampling
 from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_edges, slow_turns
 
 
@@ -99,14 +100,14 @@ class Trajectory(Desired):
 
     @cached_property
     def _samples(self) -> dict[int, Desired]:
-        """Samples that were asked for: a sampled loop asks for each of them, as often as it runs."""
+        """Samples that were asked for: a loop asks for each, as often as it runs; minutes are not kept."""
         return {}
 
     def _sample(self, k) -> Desired:
         k, sample = range(len(self))[k], object.__new__(Desired)
         row = {name: getattr(self, name)[k] for name in (*_MOTION, "q_a", "qd_a", "qdd_a")}
         sample.__dict__.update(row, n_arms=self.n_arms)
-        return self._samples.setdefault(k, sample)
+        return self._samples.setdefault(k, sample) if len(self) <= sampling.PART else sample
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles).
@@ -129,7 +130,9 @@ class Trajectory(Desired):
         """How far q, qd and qdd are from those of x, xd and xdd; None where they are those."""
         own = columns(self.robot, self.t, self._motion, {"machine": self.robot})[3:]
         apart = {name: getattr(self, name) - column for name, column in zip(_MOTION[3:], own, strict=True)}
-        return apart if any(np.any(v) for v in apart.values()) else None
+        # Angles that somebody computed in another way differ by rounding.
+        near = (np.abs(v).max() <= 1e-9 * (1.0 + np.abs(getattr(self, k)).max()) for k, v in apart.items())
+        return None if all(near) else apart
 
     def with_set_points(self, q_a, qd_a=None) -> Trajectory:
         """The same path with other set-points for the drives, which need not close the loops (fig. 3).
@@ -241,9 +244,11 @@ def triangle(
 
 
 def circle(
-    robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3, centre=(0.0, 0.0), turns: int = 1
+    robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3, centre=(0, 0), turns: float = 1
 ) -> Trajectory:
     """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s.
+
+    turns : how often around, above 0; 0.5 is half of it.
 
     >>> import rapkm_lite as rk
     >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]

@@ -97,7 +97,7 @@ def too_stiff(setup: Setup) -> str:
 def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
     """What may have been the cause, the surest first."""
     begun = sorted((fault for fault in setup.broken if _begin(fault) <= setup.trajectory.t[k]), key=_begin)
-    setup = _with(setup, begun)  # what comes later is not to blame, and acts in no repetition
+    setup = _with(setup, begun) if setup.broken else setup  # what comes later is not to blame, nor in any repetition
     if not ours:
         yield from _seen(setup, begun, c)
         return
@@ -239,7 +239,7 @@ def _words(fault: Fault) -> str:
 
 
 def _with(setup: Setup, faults: list[Fault]) -> Setup:
-    """The run with other faults; the table stays one, so that nothing is compiled anew."""
+    """The run with other faults, or none; it keeps a table of them, so that nothing is compiled anew."""
     table = blank_table(setup.trajectory.t, setup.robot.n_arms)
     for fault in faults:
         copy.deepcopy(fault).mark(table, setup.trajectory.t)

@@ -41,7 +41,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
     controller = Controller(law, model, trajectory.dt)
-    controller.nearest = plant.nearest
+    controller.nearest, controller.smooth = plant.nearest, sensors.count is None
     x, xd, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
     times, dt = trajectory.t.tolist(), trajectory.dt
     state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())

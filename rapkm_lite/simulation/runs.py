@@ -205,8 +205,8 @@ def simulate(
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s it errs by less than 1 nm at dt = 2 ms, by
     0.2 micrometres at 10 ms.
     Stiff friction costs time: a hold in which a drive is nearly at rest takes dt f_c / v0 over the inertia that the
-    drive moves in Runge-Kutta steps, one for the friction of the testbed, 3000 (5 ms) for 1 N m and v0 = 0.1 mrad/s;
-    beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
+    drive moves in Runge-Kutta steps, one for the friction of the testbed, 2400 (0.4 ms) in its middle for 1 N m and
+    v0 = 0.1 mrad/s; beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python raises
     at the first sample comes through.  Whatever stops the run later raises SimulationError with the run up to there: a
     machine that leaves the workspace, a lost pose, a singularity of the law's coordinates, an error in the law.  A

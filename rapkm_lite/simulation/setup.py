@@ -38,9 +38,10 @@ class Setup(NamedTuple):
         if law.at != "desired" or path._apart is None:
             return True
         try:
-            return bool(cores.closed(self.model.tree, cores.link_vectors(self.model.tree, path.q)).size)
+            cores.closed(self.model.tree, cores.link_vectors(self.model.tree, path.q))
         except ValueError:
             return False
+        return True
 
     def begin(self, samples: int) -> Setup:
         """The first samples of the run, two at least."""
