@@ -206,7 +206,7 @@ def test_pose_of_contradicting_angles_is_the_least_squares_one():
 
 
 def test_pose_near_a_singularity_is_as_exact_as_its_angles():
-    """With sigma the rounding of the angles alone moves x by 1e-16 / sigma, more than the tolerance of regular poses."""
+    """The rounding of the angles alone moves x by 1e-16 over sigma, more than the tolerance of regular poses."""
     robot = rk.Manipulator(base=[[-0.2, 0.0], [0.2, 0.0]], lengths=0.2, masses=0.134, mode=[-1, 1])
     rng = np.random.default_rng(0)
     x = rng.uniform([-0.15, -0.19], [0.15, -0.1], (2000, 2))
