@@ -214,8 +214,8 @@ def test_pose_near_a_singularity_is_as_exact_as_its_angles():
     sigma = rk.singular_values(rk.control_matrix(robot, q))[:, -1]
     near = (sigma > 1e-3) & (sigma < 0.3)
     assert near.sum() > 500
-    for angles, place in zip(q[near, :2], x[near] + 1e-4 * rng.normal(size=(near.sum(), 2)), strict=True):
-        assert_allclose(rk.estimate_pose(robot, angles, place)[:2], angles, rtol=0, atol=1e-12)
+    found = rk.estimate_pose(robot, q[near, :2], x[near] + 1e-4 * rng.normal(size=(near.sum(), 2)))
+    assert_allclose(found[:, :2], q[near, :2], rtol=0, atol=1e-12)
 
 
 def test_pose_fails_loudly():
