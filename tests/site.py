@@ -39,6 +39,7 @@ LOOK = r"""() => {
     }
   }
   if (all('[role="heading"]:not([aria-level])').length) wrong.push('heading without a level');
+  if (all('h1').length !== 1) wrong.push(`${all('h1').length} titles`);
   for (const box of all('article :is(div, pre, table, mjx-container)')) {
     const moves = /auto|scroll/.test(getComputedStyle(box).overflowX) && box.scrollWidth > box.clientWidth + 1;
     // The keyboard comes to the box, or to something in it.

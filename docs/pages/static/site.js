@@ -3,6 +3,8 @@ function names() {
   for (const heading of document.querySelectorAll('[role="heading"]')) heading.setAttribute("aria-level", "2");
   document.querySelector(".sidebar-drawer")?.setAttribute("aria-label", "All pages");
   document.querySelector(".toc-drawer")?.setAttribute("aria-label", "On this page");
+  const found = document.getElementById("search-results");
+  found?.before(Object.assign(document.createElement("h1"), { textContent: "Search" }));
 }
 
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
