@@ -521,6 +521,9 @@ def test_no_number_lies_over_a_bar(name, shown):
     bars = "() => [...painted.values()].reduce((n, { bars }) => n + bars.length, 0)"
     assert notebook.ask(bars) >= 6
     assert notebook.ask("() => stage.covered()") == []
+    # Nor does the sentence for readers of the screen make room for a bar to scroll.
+    boxes = "() => [...document.querySelectorAll('.rapkm-explorer')].map(e => e.scrollHeight - e.clientHeight)"
+    assert max(notebook.ask(boxes)) <= 0
 
 
 def test_the_sentence_of_a_problem_leaves_the_way_back_in_view(shown):
