@@ -11,7 +11,7 @@ const AFLOAT = 2; // questions under way at the same time: three are no faster a
 const ENTER = { key: "Enter", keyCode: 13, bubbles: true };
 
 /** True minus signs before numbers, not in words with a hyphen. */
-export const minus = (words) => String(words).replace(/(^|[\s([/])-(?=\d)/g, "$1−");
+export const minus = (words) => String(words).replace(/(^|[\s([/])-(?=\.?\d)/g, "$1−");
 
 /** "σ_min" and "10^−3" as pieces {text, shift}: shift -1 is a subscript, 1 a superscript. */
 export function pieces(words) {

@@ -36,6 +36,7 @@ test("a logarithmic axis has decades, and limits without meaning have no ticks",
 });
 
 test("subscripts, powers and minus signs are found, hyphens are left", () => {
+  assert.equal(minus("-.01 was rounded to 0.0, a half-.5"), "−.01 was rounded to 0.0, a half-.5");
   assert.deepEqual(pieces("K_P 1 in N"), [{ text: "K", shift: 0 }, { text: "P", shift: -1 }, { text: " 1 in N", shift: 0 }]);
   assert.deepEqual(pieces("10^−3"), [{ text: "10", shift: 0 }, { text: "−3", shift: 1 }]);
   assert.deepEqual(pieces("σ_min").map((p) => p.text), ["σ", "min"]);
