@@ -195,11 +195,11 @@ def rough_newton(drives, arms, table, o, w, j, L, x, y):
             px, py = 0.5 * px, 0.5 * py
             x, y = x0 + px, y0 + py
             continue
-        curved = h11 > 0.0 and h11 * h22 - h12 * h12 > 1e-3 * (m11 * m22 - m12 * m12)
-        sx, sy = solve2(h11, h12, h22, fx, fy) if curved else solve2(m11, m12, m22, fx, fy)
-        # Near an input singularity the rounding of the angles alone moves x further than by the tolerance.
-        turn = m11 * sx * sx + 2.0 * m12 * sx * sy + m22 * sy * sy
-        if max(abs(sx), abs(sy)) < tolerance or turn < 1.6e-29:
+        if h11 > 0.0 and h11 * h22 - h12 * h12 > 1e-3 * (m11 * m22 - m12 * m12):
+            m11, m12, m22 = h11, h12, h22
+        sx, sy = solve2(m11, m12, m22, fx, fy)
+        # Near an input singularity the rounding of angles that fit moves x further.
+        if max(abs(sx), abs(sy)) < tolerance * (1e3 if square < 1.6e-29 else 1.0):
             return x, y, True
         part = min(1.0, most / max(abs(sx), abs(sy)))
         x0, y0, px, py, least = x, y, part * sx, part * sy, square

@@ -12,7 +12,6 @@ from ..machine.arguments import exact_array, function, having, of_kind, positive
 from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
-SLIDERS = widgets.IntSlider, widgets.FloatSlider, widgets.FloatLogSlider
 _COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}
 
 
@@ -132,6 +131,11 @@ class Shown(widgets.VBox):
         return "Explorer"
 
 
+def is_slider(widget) -> bool:
+    """One of those with a range and steps of numbers; a widget from elsewhere may have ends, too."""
+    return isinstance(widget, widgets.IntSlider | widgets.FloatSlider | widgets.FloatLogSlider)
+
+
 def check(name: str, widget, value) -> None:
     """Raise ValueError for a value that the control cannot take."""
     if isinstance(widget, widgets.Dropdown):
@@ -140,7 +144,7 @@ def check(name: str, widget, value) -> None:
             raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
     elif isinstance(widget, widgets.Checkbox):
         truth(name, value)
-    elif isinstance(widget, SLIDERS):
+    elif is_slider(widget):
         number = float(exact_array(name, value))
         if isinstance(widget, widgets.IntSlider) and not number.is_integer():
             raise ValueError(f"{name} = {number:g}; allowed: whole numbers")
@@ -174,7 +178,7 @@ def tidied(value):
 
 def snap(widget, value):
     """The nearest value that a slider has a step for; a control without steps takes the value as it is."""
-    if not isinstance(widget, SLIDERS):
+    if not is_slider(widget):
         return value
     log = isinstance(widget, widgets.FloatLogSlider)
     low, high = _ends(widget)
@@ -211,7 +215,7 @@ def follow(handles: list[dict], controls: dict) -> bool:
 
 def ranges(controls: dict) -> dict:
     """The least and the largest value of each slider."""
-    return {name: _ends(widget) for name, widget in controls.items() if isinstance(widget, SLIDERS)}
+    return {name: _ends(widget) for name, widget in controls.items() if is_slider(widget)}
 
 
 def _ends(widget) -> tuple[float, float]:

@@ -129,8 +129,9 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         hessian = _pose_hessian(robot, q, A, residual)
         step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
         size = np.abs(step).max(axis=-1, keepdims=True)
-        # Near an input singularity the rounding of the angles alone moves x further.
-        if np.all((size < limit) | (np.abs(matvec(A, step)).max(axis=-1, keepdims=True) < 4e-15)):
+        # Near an input singularity the rounding of angles that fit moves x further.
+        fits = np.abs(residual).max(axis=-1) < 4e-15 * (1.0 + np.abs(q_a).max(axis=-1))
+        if np.all(size[..., 0] < np.where(fits, 1e3, 1.0) * limit):
             return on_the_turn_of(q_a, q)
         # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
         step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))
