@@ -185,9 +185,9 @@ def snap(widget, value):
     value = min(max(value, low), high)
     at = math.log(value, widget.base) if log else value
     at = widget.min + widget.step * round((at - widget.min) / widget.step)
-    if isinstance(widget, widgets.IntSlider):
-        return int(at)
-    return tidied(widget.base**at if log else min(max(at, low), high))
+    # The last step may lead beyond the end.
+    near = min(max(widget.base**at if log else at, low), high)
+    return int(near) if isinstance(widget, widgets.IntSlider) else tidied(near)
 
 
 def moved(widget, steps: int):

@@ -70,9 +70,9 @@ EXERCISES = {
         hints=(
             "The largest disc inside a polygon about zero touches the nearest edge. In which directions do the edges "
             "of the hexagon run?",
-            "Each edge is parallel to one row of A, so its distance from zero is h(u) for the unit vector u across "
+            "Each edge is parallel to one row of A, so its distance from zero is b(u) for the unit vector u across "
             "that row. There are as many directions to try as there are drives.",
-            "For each row: u = (-row_y, row_x) / |row|, h = torque * np.abs(A @ u).sum(); return the smallest h.",
+            "For each row: u = (-row_y, row_x) / |row|, b = torque * np.abs(A @ u).sum(); return the smallest b.",
         ),
         unit="N",
         cases=tasks.control_matrices,

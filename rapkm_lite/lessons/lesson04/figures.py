@@ -134,7 +134,7 @@ def plot_antagonism(run, ax=None, title: str = ""):
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
     """Norm of the drive torques over time, one line per run; `runs` maps a label to a run.
 
-    antagonism : show only the part that moves nothing.  log : logarithmic axis, cut off at 1e-9 N m.
+    antagonism : show only the part that moves nothing.  log : logarithmic axis, which ends at 1e-9 N m.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
@@ -142,9 +142,11 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
     ax = axes_or_new(ax, figsize=(9.8, 3.3))
     for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
-        ax.plot(run.t, np.maximum(size, 1e-9) if log else 1e3 * size, label=label, **line)
+        ax.plot(run.t, np.maximum(size, 1e-30) if log else 1e3 * size, label=label, **line)
     words = f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}"
     ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear")
+    if log:
+        ax.set_ylim(1e-9, max(1e-8, ax.get_ylim()[1]))
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return ax
 
