@@ -97,7 +97,7 @@ def test_numbers_of_a_log_hold_no_underscore(tmp_path, number):
         rk.read_log(file)
 
 
-@pytest.mark.parametrize("N", [2, 3, 5])
+@pytest.mark.parametrize("N", [1, 2, 3, 5])
 def test_a_log_written_is_the_log_read_to_the_last_bit(tmp_path, N):
     random = np.random.default_rng(N)
     columns = random.normal(0.0, 1.0, (3, 40, N)) * 10.0 ** random.integers(-12, 12, (3, 40, N))
@@ -113,6 +113,8 @@ def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target)
         rk.write_log(rk.mystery_run("gain"), target)
     with pytest.raises(ValueError, match=r"log = .*; allowed: a Log"):
         rk.write_log([1.0], "own.csv")
+    with pytest.raises(ValueError, match=r"line 5, column 1: after 0\.2 s comes 0\.9 s.*; allowed: a log without gaps"):
+        rk.write_log(rk.Log("gap", [0.0, 0.1, 0.2, 0.9], *np.zeros((3, 4, 3))), "own.csv")
     assert not list(tmp_path.iterdir())
 
 

@@ -1,5 +1,7 @@
 """Self-calibration: made-up truths found again, logs with hidden offsets, ranks by counting, refusals, bad logs."""
 
+import copy
+import pickle
 import re
 from itertools import permutations
 
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, TESTBED, random_points
+from scipy.optimize import curve_fit
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.mystery import hidden
@@ -384,6 +387,24 @@ def test_a_noisy_log_of_few_places_is_refused_with_what_it_says(unknowns):
         rk.calibrate(TESTBED, coarse)
 
 
+@pytest.mark.parametrize("seed", range(24))
+def test_offsets_of_a_sixth_of_a_radian_and_more_are_found_from_spread_places(seed):
+    """Readings without noise at sixty places, which determine all: what is not explained far away is no noise."""
+    rng = np.random.default_rng(seed)
+    offset, x = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.06, 0.06, (60, 2))
+    q_a = rk.inverse_kinematics(TESTBED, x)[:, :3] + offset
+    assert_allclose(rk.calibrate(TESTBED, q_a).offset, offset, rtol=0, atol=1e-11)
+
+
+def test_a_refusal_comes_whole_from_another_process():
+    with pytest.raises(rk.CalibrationError) as caught:
+        rk.calibrate(TESTBED, rk.mystery_run("offset_c"))
+    for refusal in (pickle.loads(pickle.dumps(caught.value)), copy.deepcopy(caught.value)):
+        assert str(refusal) == str(caught.value) and (refusal.rank, refusal.needed) == (1, 3)
+        assert_allclose(refusal.known, caught.value.known, rtol=0, atol=0)
+        assert_allclose(refusal.value, caught.value.value, rtol=0, atol=0)
+
+
 def test_interval_of_one_spare_reading_is_that_of_cauchy():
     """Student's t with one degree of freedom has the quantile tan(pi level / 2); the spread is that of one reading."""
     found = rk.calibrate(TESTBED, readings(TESTBED, 4) + 1e-5 * np.random.default_rng(1).normal(size=(4, 3)))
@@ -455,7 +476,7 @@ def test_torques_are_mute_that_contradict_a_tenth_as_much_as_angles_far_above_th
     n = np.linalg.svd(rk.at(FRICTIONLESS, q).A)[0][:, :, -1]
     # What the angles contradict each other by is off, and that is sigma times their noise.
     error = np.full((2, 3), 7.05 * off / sigma)
-    stand = Rests(q[:, :3], q[:, :3] + off * n, -K_P * felt * off * n, error, np.full(2, 10))
+    stand = Rests(q[:, :3], q[:, :3] + off * n, -K_P * felt * off * n, noise_of(error, 10), np.full(2, 10))
     angles, spread = angles_of_torques(FRICTIONLESS, stand, None, K_P, notes)
     assert_allclose(angles, q[:, :3] + felt * off * n, rtol=0, atol=1e-15)
     assert spread == pytest.approx(off / sigma, rel=1e-12)
@@ -605,23 +626,54 @@ def test_nothing_left_over_shows_no_noise():
     assert np.all(np.diff(rk.calibrate(robot, q, noise=1e-4).interval(), axis=0) > 0)
 
 
-def test_a_gain_of_rests_has_the_error_of_a_weighted_mean():
-    """One rest: K_P = -c/e with the error sigma/|e|; several: the mean with the weights (e/sigma)^2, whose sum is
-    the inverse square of its error."""
-    e = np.array([[4e-3, -2e-3], [2e-3, 5e-3], [-1e-3, 3e-3]])
-    sigma = np.array([[1e-5, 3e-5], [2e-5, 1e-5], [4e-5, 2e-5]])
-    c, still = np.array([[-0.03, 0.015], [-0.013, -0.04], [0.006, -0.02]]), np.zeros((3, 2))
-    for k in (1, 3):
-        gain = fitted_gain(Rests(still[:k], e[:k], c[:k], sigma[:k], np.full(k, 10)))
-        weight = (e[:k] / sigma[:k]) ** 2
-        assert gain is not None
-        assert_allclose(gain.K_P, np.average(-c[:k] / e[:k], axis=0, weights=weight), rtol=1e-12)
-        assert_allclose(gain.error, weight.sum(axis=0) ** -0.5, rtol=1e-12)
+def noise_of(error, records):
+    """Covariance of torque and angle of a record, for torques whose means have these standard errors."""
+    noise = np.zeros((*error.shape, 2, 2))
+    noise[..., 0, 0] = error**2 * records
+    return noise
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-3])
+def test_a_gain_of_rests_is_the_slope_of_the_line_through_them(apart):
+    """By SciPy's fit: with the noise of the records where the rests lie on a line, else with what is left of them."""
+    records, e = np.array([10, 40, 20]), np.array([[4e-3, -2e-3], [2e-3, 5e-3], [-1e-3, 3e-3]])
+    sigma = np.array([[1e-4, 3e-4], [2e-4, 1e-4], [4e-4, 2e-4]])
+    c, still = -7.0 * e + apart * np.array([[1.0, -0.5], [-0.5, 1.0], [0.2, 0.3]]), np.zeros((3, 2))
+    noise = np.zeros((3, 2, 2, 2))
+    noise[..., 0, 0] = sigma**2
+    gain = fitted_gain(Rests(still, e, c, noise, records))
+    assert gain is not None
+    for i in range(2):
+        known = np.sqrt(np.mean(sigma[:, i] ** 2) / records)
+        fit = curve_fit(lambda e, K: -K * e, e[:, i], c[:, i], sigma=known, absolute_sigma=apart == 0.0)
+        assert_allclose(gain.K_P[i], fit[0][0], rtol=1e-7)
+        assert_allclose(gain.error[i], np.sqrt(fit[1][0, 0]), rtol=1e-6)
+    one = fitted_gain(Rests(still[:1], e[:1], c[:1], noise[:1], records[:1]))
+    assert one is not None
+    assert_allclose(one.K_P, -c[0] / e[0], rtol=1e-12)
+    assert_allclose(one.error, sigma[0] / np.sqrt(10) / np.abs(e[0]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("counts", "friction"), [(2000, True), (8000, True), (2000, False)])
+def test_drives_that_creep_between_counts_are_not_said_to_have_another_gain(counts, friction):
+    """Torques of a creeping drive hold K_D times a rate that no count shows, steadily; one of 9 N m/rad is found."""
+    robot = TESTBED if friction else FRICTIONLESS
+    turn = 0.4 * np.pi * np.repeat(np.arange(5), 2)
+    path = rk.polygon(robot, 0.09 * np.stack([np.cos(turn), np.sin(turn)], axis=-1), duration=10.0)
+    for seed in range(4):
+        offset = np.random.default_rng(seed).uniform(-4e-3, 4e-3, 3)
+        for second in (7.05, 9.0):
+            K_P = np.array([7.05, second, 7.05])
+            log = rk.simulate(robot, rk.PD(K_P, 0.225), path, offset, counts).log()
+            found = rk.calibrate(robot, log, use="torques", K_P=7.05)
+            assert_allclose(found.K_P, K_P, rtol=0.05)
+            said = [sentence for sentence in found.note.split("; ") if "the rests show" in sentence]
+            assert len(said) == (second == 9.0) and all("drive 2" in sentence for sentence in said)
 
 
 def test_a_drive_without_an_error_shows_no_gain():
     e, one = np.array([[1e-3, 0.0], [2e-3, 0.0]]), np.ones((2, 2))
-    assert fitted_gain(Rests(0 * e, e, one, one, np.full(2, 10))) is None
+    assert fitted_gain(Rests(0 * e, e, one, noise_of(one, 10), np.full(2, 10))) is None
 
 
 def test_rests_are_the_later_halves_of_stretches_of_equal_desired_angles():
@@ -638,6 +690,8 @@ def test_rests_are_the_later_halves_of_stretches_of_equal_desired_angles():
         assert_allclose(stand.c[k], c[half].mean(axis=0), rtol=1e-12)
         spread = np.sqrt(((c[half] - c[half].mean(axis=0)) ** 2).sum(axis=0) / (stand.records[k] - 1))
         assert_allclose(stand.c_error[k], spread / np.sqrt(stand.records[k]), rtol=1e-12)
+        for i in range(2):
+            assert_allclose(stand.noise[k, i], np.cov(c[half, i], q_a[half, i]), rtol=1e-12)
     assert rests([rk.Log("three", t[:18], q_a[:18], desired[:18], c[:18])]) is None
 
 
@@ -649,8 +703,9 @@ def test_torques_lie_aside_from_five_errors_and_a_ten_thousandth_of_the_gain_on(
     unit, K_P = 1e-3, np.array([10.0])
     still, error = np.zeros((4, 1)), np.full((4, 1), sigma * unit * np.sqrt(4))
     shifted = -K_P * e + aside * unit
-    assert len(one_sided(Rests(still, e, shifted, error, np.full(4, 10)), K_P)) == said
-    assert one_sided(Rests(still, 0 * e + 1e-3, shifted, error, np.full(4, 10)), K_P) == []
+    noise = noise_of(error, 10)
+    assert len(one_sided(Rests(still, e, shifted, noise, np.full(4, 10)), K_P)) == said
+    assert one_sided(Rests(still, 0 * e + 1e-3, shifted, noise, np.full(4, 10)), K_P) == []
 
 
 def test_a_gain_is_another_one_from_five_errors_and_two_hundredths_on():

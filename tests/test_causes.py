@@ -357,6 +357,30 @@ def test_torques_that_swing_are_an_unstable_gain_from_one_and_a_half_times_in_si
     assert cause in said and ("unstable gain" in said) == (times > 1.5)
 
 
+class Same(rk.CTC):
+    """A law of a user's, whose runs are not repeated: what is not seen in them is not known."""
+
+
+@pytest.mark.parametrize("pair", [(0, 1), None])
+def test_a_healthy_loop_that_flies_apart_after_a_fault_is_not_called_unstable(pair):
+    path = rk.triangle(ROBOT) if pair else CIRCLE
+    start = 0.5 if pair else 0.2
+    assert len(rk.simulate(ROBOT, Same(400.0, 40.0, pair), path)) == len(path)
+    named = 0
+    for broken in (rk.DeadDrive(0, start), rk.EncoderDropout(1, start, start + 0.3), rk.OffsetJump(2, start, 0.3)):
+        try:
+            rk.simulate(ROBOT, Same(400.0, 40.0, pair), path, faults=[broken])
+        except rk.SimulationError as error:
+            named += 1
+            assert f"({broken!r} acts from" in error.reason and "unstable" not in error.reason
+    assert named >= (3 if pair else 0)
+
+
+def test_a_loop_that_swung_before_a_fault_is_called_unstable():
+    for broken in (rk.DeadDrive(0, 0.02), rk.OffsetJump(1, 0.02, 1e-4), rk.TorqueLimit(1e6)):
+        assert "unstable gain" in lost(law=stiff, path=HOLD, offset=OFFSET, faults=[broken])
+
+
 def test_fewer_than_two_torques_do_not_swing():
     assert swinging(np.zeros((0, 3))) == swinging(np.ones((1, 3))) == 0.0
 

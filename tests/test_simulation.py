@@ -9,7 +9,8 @@ import rapkm_lite as rk
 from rapkm_lite.simulation.energy import root_mean_square_torque
 from rapkm_lite.simulation.setup import friction_steps
 
-ROBOT = rk.load().replace(friction=0.0)
+TESTBED = rk.load()
+ROBOT = TESTBED.replace(friction=0.0)
 LONGER = ROBOT.replace(lengths=0.28)
 PD = rk.PD(7.05, 0.225)
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
@@ -291,3 +292,26 @@ def test_a_pose_far_from_all_readings_is_the_same_in_both_loops(drive):
             ends.append(error.partial)
     assert len(ends[0]) == len(ends[1])
     np.testing.assert_allclose(ends[0].c, ends[1].c, atol=1e-6)
+
+
+class Same(rk.CTC):
+    """A law without a word of its own, which runs in the loop for laws in Python."""
+
+
+@pytest.mark.parametrize(
+    ("path", "fault"),
+    [
+        (rk.circle(TESTBED, 0.1, 1.0), rk.OffsetJump(0, 0.5, 1.0)),
+        (rk.triangle(TESTBED), rk.EncoderDropout(1, 0.5, 4.0)),
+        (rk.triangle(TESTBED), rk.EncoderDropout(0, 0.5, 4.0)),
+    ],
+)
+def test_a_search_for_a_pose_takes_as_long_in_both_loops(path, fault):
+    """Readings far from any pose, where Newton's steps are many."""
+    ends = []
+    for law in (rk.CTC(400.0, 40.0, None), Same(400.0, 40.0, None)):
+        try:
+            ends.append(len(rk.simulate(TESTBED, law, path, faults=[fault])))
+        except rk.SimulationError as error:
+            ends.append(error.time)
+    assert ends[0] == pytest.approx(ends[1], abs=2e-3)

@@ -130,7 +130,11 @@ def test_samples_and_other_machines():
     assert_allclose(sample.q_a, path.q_a[17])
     assert_allclose(sample.qd_a, path.qd[17, :3])
     assert_allclose(sample.qdd_a, path.qdd[17, :3])
-    assert path.for_robot(TESTBED.replace(friction=0.1)) is path
+    rusty = TESTBED.replace(friction=0.1)
+    same = path.for_robot(rusty)
+    assert path.for_robot(TESTBED) is path and same.robot == rusty and same.q is path.q
+    # A run keeps the path that it was given.
+    assert rk.simulate(rusty, rk.PD(7.05, 0.225), path).trajectory is path
     other = path.for_robot(MACHINES["asymmetric"])
     assert_allclose(other.x, path.x)
     assert_allclose(rk.forward_kinematics(MACHINES["asymmetric"], other.q), path.x, atol=1e-14)

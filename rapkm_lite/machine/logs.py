@@ -96,7 +96,7 @@ def read_log(source: str | Path) -> Log:
 def write_log(log: Log, target: str | Path) -> None:
     """Write a log as the CSV file that `read_log` reads: header, then a line for each record, all digits.
 
-    Raises ValueError for what is no log, and for a path that cannot be written.
+    Raises ValueError for what is no log, for a log with gaps in its times, and for a path that cannot be written.
 
     >>> import rapkm_lite as rk, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -106,6 +106,7 @@ def write_log(log: Log, target: str | Path) -> None:
     """
     of_kind("log", log, Log, "a Log, such as run.log() returns")
     of_kind("target", target, str | Path, "the path of a CSV file")
+    _check_times(Path(target), log.t)
     try:
         with Path(target).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -137,7 +138,7 @@ def _names(path: Path, header: list[str]) -> list[str]:
     N, rest = divmod(len(header) - 1, 3)
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    wanted = columns(max(N, 2))
+    wanted = columns(max(N, 1))
     header = [name.strip() for name in header]
     if rest or header != wanted:
         wrong = next((k for k, pair in enumerate(zip(header, wanted, strict=False)) if len(set(pair)) > 1), len(header))

@@ -125,7 +125,8 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 def singular_values(A) -> np.ndarray:
     """Singular values (..., delta) of A (..., m, delta), largest first, for any mechanism.
 
-    Two columns have a closed form, which keeps the full relative accuracy of the product.
+    Two columns have a closed form: their product is the root of the sum of the squared minors, which near an input
+    singularity errs by less than a general decomposition does.
 
     >>> import rapkm_lite as rk
     >>> rk.singular_values([[3.0, 0.0], [0.0, 4.0], [0.0, 0.0]])

@@ -44,6 +44,9 @@ class CalibrationError(ValueError):
         super().__init__(sentence)
         self.rank, self.needed, self.known, self.value = rank, needed, known, value
 
+    def __reduce__(self):
+        return type(self), (str(self), self.rank, self.needed, self.known, self.value)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Value):
@@ -52,7 +55,8 @@ class Calibration(Value):
     names : of the unknowns, in the order of the covariance.  estimate : (p,) rad and m.
     offset : (N,) rad, measured minus true base angle.  lengths : (N, 2) m.  base : (N, 2) m.
     covariance : (p, p) of the estimate for independent noise of the readings, by first order.
-    noise : rad, standard deviation of one reading that the covariance uses.
+    noise : rad, standard deviation of one reading that the covariance uses; of counts, of the readings that differ, so
+        that long rests that jitter make it larger (their means, with `noise` given, say more).
     freedom : how many readings were left over to estimate the noise from; infinite where it was given.
     rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
     unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.
@@ -170,13 +174,19 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         # A sample on the wrong assembly holds the unknowns where it fits there: those in doubt wait for the others.
         with suppress(ValueError):
             p = _minimum(robot, angles[sure], basis, p, p, x[sure], blur, enough=1e-3)[0]
-    try:
-        p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur)
-    except CalibrationError as refusal:
+    refusal: CalibrationError | None = None
+    for courage in (0, 1, 2):
         try:
-            p, machine, x, left, sigma, Vt = _minimum(robot, angles, basis, nominal[:count], p, x, blur, bold=True)
-        except ValueError as error:
-            raise error if isinstance(error, CalibrationError) else refusal from None
+            found = _minimum(robot, angles, basis, nominal[:count], p, x, blur, courage=courage)
+            break
+        except CalibrationError as error:
+            refusal = error if courage < 2 else refusal
+        except ValueError:
+            if refusal is None:
+                raise
+    else:
+        raise refusal from None
+    p, machine, x, left, sigma, Vt = found
     spare, total = len(left) - len(sigma), float(left @ left) * len(angles)
     spread = math.sqrt(total / spare) if spare else 0.0
     used = max(spread, step) if noise is None else noise
@@ -206,13 +216,13 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     )
 
 
-def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, bold=False):
+def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
     """Unknowns of least closure, Gauss and Newton from p and the places x (k, 2) m on.
 
     It ends where a step (in `basis`) is small enough or a rounding.
     Returns them, their machine, and of the last step the places (k, 2) m, the closure, and the singular values and
-    right vectors of its derivative.  blur : rad, what is known of the noise.  bold : go on where rank is missing, along
-    what is determined there: far from the minimum what is not explained is no noise.
+    right vectors of its derivative.  blur : rad, what is known of the noise.  courage : 1 goes on where rank is missing,
+    along what is determined there, 2 along all, in short steps: far from the minimum what is not explained is no noise.
     Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
     """
     N, machine, size = robot.n_arms, changed(robot, p), math.inf
@@ -224,13 +234,16 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, bold=False):
         explained, gap = U.T @ left, math.sqrt(left @ left)
         # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
         noise = max(blur, math.sqrt(max(gap**2 - explained @ explained, 0.0)))
-        rank = int(np.sum(sigma > max(1e-8, 10 * noise) * sigma[0]))
+        rank = int(np.sum(sigma > max(1e-8, 10 * (blur if courage == 2 and gap > 0.02 else noise)) * sigma[0]))
         step = explained[:rank] / sigma[:rank]
         move = -Vt[:rank].T @ step
-        settled = np.abs(move).max(initial=0.0) < 1e-3
-        if bold and settled and gap > 0.02:  # another minimum
+        far = np.abs(move).max(initial=0.0)
+        if courage == 2:
+            move *= min(1.0, 0.1 / max(far, 1e-300))
+        settled = far < 1e-3
+        if courage and settled and gap > 0.02:  # another minimum
             break
-        if rank < basis.shape[1] and (settled or not bold):
+        if rank < basis.shape[1] and (settled or not courage):
             spread = noise / math.sqrt(len(angles)) / sigma[:rank]
             raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
         p, size = p + basis @ move, np.abs(move).max(initial=0.0)

@@ -101,7 +101,7 @@ def on_the_turn_of(q_a: np.ndarray, q: np.ndarray) -> np.ndarray:
     return q + 2 * np.pi * np.rint(np.concatenate([q_a - q[..., :N], 0.0 * q[..., N:]], axis=-1) / (2 * np.pi))
 
 
-def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 50) -> np.ndarray:
+def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
     """The configuration whose base angles are nearest to the measured ones, (..., 2N) in rad.
 
     N measured angles over-determine the two coordinates of the pose, and calibration offsets make them contradict each

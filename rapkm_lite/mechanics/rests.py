@@ -17,21 +17,40 @@ SHORTEST = 10
 
 
 class Rests(NamedTuple):
-    """Means over each rest: desired and measured angles, torques, each (k, N), and the standard error of the torques.
+    """Means over each rest: desired and measured angles, torques, each (k, N).
 
-    records : how many records each mean has, (k,).
+    noise : (k, N, 2, 2) covariance of torque and angle of a record.  records : how many each mean has, (k,).
     """
 
     desired: np.ndarray
     q_a: np.ndarray
     c: np.ndarray
-    c_error: np.ndarray
+    noise: np.ndarray
     records: np.ndarray
 
     @property
-    def weight(self) -> np.ndarray:
-        """One over the standard error, which is 1e-12 of the largest torque at least."""
-        return 1.0 / np.maximum(self.c_error, 1e-12 * (np.abs(self.c).max() or 1.0))
+    def c_error(self) -> np.ndarray:
+        """Standard errors of the torques (k, N)."""
+        return np.sqrt(self.noise[..., 0, 0] / self.records[:, None])
+
+    def fit(self, i: int, *columns) -> tuple[np.ndarray, np.ndarray] | None:
+        """Coefficients b, and their covariance, of the torque -b[0] e + b[1] column + ... of drive i at error e.
+
+        Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more.
+        None where the columns, each (k,), do not determine them.
+        """
+        design = np.stack([self.desired[:, i] - self.q_a[:, i], *columns], axis=-1)
+        weighted = design.T * self.records
+        information = weighted @ design
+        size = np.sqrt(np.diagonal(information))
+        if not size.all() or np.linalg.cond(information / np.outer(size, size)) > 1e10:
+            return None
+        b = np.linalg.solve(information, weighted @ self.c[:, i])
+        left, spare = self.c[:, i] - design @ b, len(design) - len(b)
+        both = np.array([1.0, b[0]])
+        noise = np.mean(both @ self.noise[:, i] @ both)
+        scatter = self.records @ left**2 / spare if spare else 0.0
+        return b, np.linalg.inv(information) * max(noise, scatter)
 
 
 class Gain(NamedTuple):
@@ -58,9 +77,11 @@ def rests(logs: list[Log]) -> Rests | None:
             half = slice(start + (stop - start) // 2, stop)
             count = stop - half.start
             if count >= SHORTEST:
-                c = log.c[half]
-                error = c.std(axis=0, ddof=1) / np.sqrt(count)
-                found.append((log.q_a_desired[half.start], log.q_a[half].mean(axis=0), c.mean(axis=0), error, count))
+                both = np.stack([log.c[half], log.q_a[half]], axis=-1)
+                c, q_a = np.moveaxis(both.mean(axis=0), -1, 0)
+                off = both - both.mean(axis=0)
+                noise = np.einsum("kia,kib->iab", off, off) / (count - 1)
+                found.append((log.q_a_desired[half.start], q_a, c, noise, count))
     return Rests(*map(np.array, zip(*found, strict=True))) if found else None
 
 
@@ -70,15 +91,13 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
     Friction between motor and torque sensor does that where all rests are approached from one side: the sensor reads
     c -+ f_c, and the offset comes out wrong by f_c / K_P.
     """
-    e, said = stand.q_a - stand.desired, []
-    for i in range(e.shape[1]):
-        weight = stand.weight[:, i]
-        design = np.stack([e[:, i], np.ones(len(e))], axis=-1) * weight[:, None]
-        information = design.T @ design
-        if np.linalg.cond(information / np.sqrt(np.outer(*2 * [np.diagonal(information)]))) > 1e10:
+    said = []
+    for i in range(stand.c.shape[1]):
+        line = stand.fit(i, np.ones(len(stand.c)))
+        if line is None:
             continue
-        aside = np.linalg.solve(information, design.T @ (weight * stand.c[:, i]))[1]
-        if abs(aside) > 5 * np.sqrt(np.linalg.inv(information)[1, 1]) and abs(aside) > 1e-4 * K_P[i]:
+        aside, error = line[0][1], np.sqrt(line[1][1, 1])
+        if abs(aside) > 5 * error and abs(aside) > 1e-4 * K_P[i]:
             said.append(
                 f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m aside of -K_P times the error, as with "
                 f"friction before a sensor: that shifts its offset by {-1e3 * aside / K_P[i]:+.2g} mrad; approach each "
@@ -89,12 +108,9 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
 
 def fitted_gain(stand: Rests) -> Gain | None:
     """K_P of c = -K_P (q_a - q_desired) over the rests, drive by drive; None where a drive shows no error."""
-    e = stand.q_a - stand.desired
-    weight = stand.weight**2
-    information = (weight * e * e).sum(axis=0)
-    if np.any(information == 0.0):
-        return None
-    return Gain(-(weight * e * stand.c).sum(axis=0) / information, 1.0 / np.sqrt(information))
+    lines = [stand.fit(i) for i in range(stand.c.shape[1])]
+    found = [(line[0][0], np.sqrt(line[1][0, 0])) for line in lines if line is not None]
+    return Gain(*np.array(found).T) if len(found) == len(lines) else None
 
 
 def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]) -> tuple[np.ndarray, float]:

@@ -116,7 +116,7 @@ class Trajectory(Desired):
         Raises ValueError when the path leaves its workspace, and for set-points of another number of drives.
         """
         if manipulator(robot).same_kinematics(self.robot):
-            return self
+            return self if robot == self.robot else self._changed(robot=robot)
         if self._apart is not None and robot.n_arms != self.n_arms:
             raise ValueError(f"robot has {robot.n_arms} arms; allowed: {self.n_arms}, as many as the set-points")
         made = _follow(robot, self.t, self._motion, {"machine": robot})
@@ -166,7 +166,8 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace, the times are not equidistant from zero (to 1e-6 of a step),
-    or xd and xdd are not the derivatives of x and xd; a few jumps are allowed, and xdd = 0 for laws without a model.
+    or xd and xdd are no derivatives of x and xd.  Steps may be off by a tenth of the largest one, those of xd by half
+    (recorded ones are rough), a few by more; xdd = 0 is for laws without a model.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)

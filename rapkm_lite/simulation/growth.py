@@ -71,6 +71,17 @@ def swinging(c: np.ndarray) -> float:
     return float(np.abs(drive[half:]).max() / first) if changes >= max(1, len(last) // 4) and first > 0.0 else 0.0
 
 
+def swung(c: np.ndarray, dt: float) -> str:
+    """The sentence on torques (k, N) that swung so, half as large again and more; empty where they did not.
+
+    >>> swung((-2.0) ** np.arange(12)[:, None], 1e-3)
+    'unstable gain: in the end the torques swung to and fro within 12 samples of 0.001 s and grew 64-fold'
+    """
+    grown = swinging(c)
+    end = f"in the end the torques swung to and fro within 12 samples of {dt:g} s and grew {grown:.3g}-fold"
+    return f"unstable gain: {end}" if grown > 1.5 else ""
+
+
 def inner_law(law):
     """The law within all filters, or the law itself."""
     return inner_law(law.law) if hasattr(law, "law") else law

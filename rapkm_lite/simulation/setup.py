@@ -106,7 +106,8 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
     if model.n_arms != robot.n_arms:
         raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
     try:
-        trajectory = trajectory.for_robot(model)
+        # A path that fits is kept: loops in Python find its samples made.
+        trajectory = trajectory if model.same_kinematics(trajectory.robot) else trajectory.for_robot(model)
     except ValueError as error:
         raise ValueError(f"model cannot follow the trajectory: {error}") from None
     _reach(robot, *trajectory.x[0].tolist())
