@@ -221,7 +221,7 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
 
     It ends where a step (in `basis`) is small enough or a rounding.
     Returns them, their machine, and of the last step the places (k, 2) m, the closure, and the singular values and
-    right vectors of its derivative.  blur : rad, what is known of the noise.  courage : 1 goes on where rank is missing,
+    right vectors of its derivative.  blur : rad, what is known of the noise.  courage : 1 goes on where rank misses,
     along what is determined there, 2 along all, in short steps: far from the minimum what is not explained is no noise.
     Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
     """

@@ -165,9 +165,8 @@ class Trajectory(Desired):
 def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
-    Raises ValueError when the path leaves the workspace, the times are not equidistant from zero (to 1e-6 of a step),
-    or xd and xdd are no derivatives of x and xd.  Steps may be off by a tenth of the largest one, those of xd by half
-    (recorded ones are rough), a few by more; xdd = 0 is for laws without a model.
+    Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero (to 1e-6 of a
+    step), and for xd or xdd that err by a tenth or half of the largest step, but at a few jumps, and xdd = 0 everywhere.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
