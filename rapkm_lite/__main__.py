@@ -32,16 +32,20 @@ def _lessons(options) -> None:
 
 
 def _grade(options) -> None:
+    from .lessons.checker import exercises
     from .lessons.grading.grader import grade
-    from .lessons.grading.submission import unnamed
+    from .lessons.grading.submission import surpassed, unnamed
     from .lessons.grading.tables import bar, by_exercise, by_student, check_place, write_csv
 
     if options.csv:
         check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
     print(by_exercise(grades), by_student(grades), sep="\n\n")
-    if left := unnamed(Path(options.submissions)):
-        print(f"\nnot graded, since their names have no number of a lesson, like 04_title.ipynb: {', '.join(left)}")
+    folder, known = Path(options.submissions), {name[:2] for name in exercises()}
+    if others := surpassed(folder, known, {grade.file for grade in grades}):
+        print(f"\nnot counted, since another notebook of this student has more points or is newer: {', '.join(others)}")
+    if left := unnamed(folder, known):
+        print(f"\nnot graded, since their names have no number of a lesson with exercises, like 04_title.ipynb: {', '.join(left)}")
     if options.csv:
         write_csv(Path(options.csv), grades)
 

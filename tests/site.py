@@ -137,6 +137,27 @@ def search(context, base: str) -> list[str]:
     return [f"{base.split(':')[0]} search: {what}" for what in wrong]
 
 
+def drawers(context, base: str) -> list[str]:
+    """The lists at the sides of a narrow screen, by keys alone: open, the first link, closed and out of the way."""
+    page, wrong = opened(context, base)
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
+    for icon, drawer in ((".nav-overlay-icon", ".sidebar-drawer"), (".toc-header-icon", ".toc-drawer")):
+        inside = f"document.querySelector('{drawer}').contains(document.activeElement)"
+        hidden = f"getComputedStyle(document.querySelector('{drawer}')).visibility === 'hidden'"
+        page.wait_for_function(hidden)
+        page.focus(icon)
+        page.keyboard.press("Enter")
+        try:
+            page.wait_for_function(inside, timeout=5000)
+            page.keyboard.press("Escape")
+            page.wait_for_function(hidden, timeout=5000)
+        except Exception:
+            wrong.append(f"{drawer} is not opened and closed by keys")
+    page.close()
+    return [f"{base.split(':')[0]} drawers: {what}" for what in wrong]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("site", type=Path)
@@ -159,6 +180,7 @@ def main() -> int:
             context.set_default_timeout(90_000)
             wrong += [what for name in names for what in look(context, base, name, None)]
             wrong += search(browser.new_context(viewport={"width": 1280, "height": 800}), base)
+            wrong += drawers(context, base)
             context.close()
         for width, dark in VIEWS if options.shots else ():
             context = browser.new_context(

@@ -181,6 +181,52 @@ def test_notebooks_without_the_number_of_a_lesson_are_named(tmp_path, capsys):
     assert capsys.readouterr().out.endswith(f"like 04_title.ipynb: {Path('gus', 'homework.ipynb')}\n")
 
 
+def test_every_notebook_is_graded_or_named(tmp_path, capsys):
+    """Several of one student, numbers besides that of the lesson, another lesson's, capital letters."""
+    blank = checked(["...", "...", "..."])
+    write(tmp_path / "ivy" / "04_antagonism_filter_energy-Copy1.ipynb", blank)
+    write(tmp_path / "ivy" / "04_final.ipynb", checked(RIGHT))
+    write(tmp_path / "joe" / "04_antagonism_filter_energy_v10_final.ipynb", checked(RIGHT))
+    write(tmp_path / "kay" / "2026_11_26_lesson_04_.IPYNB", checked(RIGHT))
+    write(tmp_path / "cleo" / "14_antagonism.ipynb", checked(RIGHT))
+    file = tmp_path / "grades.csv"
+    assert main(["grade", str(tmp_path), "--csv", str(file)]) == 0
+    said = capsys.readouterr().out
+    with file.open(newline="", encoding="utf-8") as lines:
+        rows = [row for row in csv.DictReader(lines) if row["exercise"] in NAMES]
+    assert [row["student"] for row in rows] == [*3 * ["ivy"], *3 * ["joe"], *3 * ["kay"]]
+    assert {row["verdict"] for row in rows} == {"ok"} and rows[0]["file"].endswith("04_final.ipynb")
+    assert re.search(r"not counted, .*04_antagonism_filter_energy-Copy1\.ipynb\n", said)
+    assert re.search(r"not graded, .*14_antagonism\.ipynb\n", said) and said.count(".ipynb") == 3
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "assert (len(np.ones(3))\n        != 3) is False\n",
+        "assert (7\n        % 2) == 1\n",
+        "np.linalg.lstsq?\n",
+        "?np.linalg.lstsq\n",
+        "files = !ls\n",
+        "%%time\n",
+        "%time 1 + 1\n!ls\n",
+    ],
+)
+def test_what_a_notebook_runs_is_read(tmp_path, words):
+    body = words + TORQUES if words.startswith("%%") else TORQUES + words
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", checked([body, *RIGHT[1:]]))
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
+def test_what_a_check_says_of_no_answer_stays(tmp_path):
+    half = TORQUES.replace("return ", "")
+    own = "from rapkm_lite.lessons.lesson04.exercises import filtered_torques\n"
+    for student, body in (("ada", half), ("ben", own)):
+        write(tmp_path / student / "04_antagonism_filter_energy.ipynb", checked([body, *RIGHT[1:]]))
+    said = {one.student: one.sentence for one in grade(tmp_path) if one.exercise == NAMES[0]}
+    assert "return" in said["ada"] and "the package's own answer" in said["ben"]
+
+
 def test_folders_without_submissions_are_refused(tmp_path, capsys):
     with pytest.raises(ValueError, match="allowed: a folder that exists"):
         found(tmp_path / "nowhere", {"04"})

@@ -166,7 +166,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero (to 1e-6 of a
-    step), and for xd or xdd that err by a tenth or half of the largest step, but at a few jumps and with xdd = 0 always.
+    step), and for xd or xdd that err by a tenth or half of the largest step, but at a few jumps or with xdd = 0 always.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)

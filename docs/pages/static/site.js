@@ -7,6 +7,30 @@ function names() {
   found?.before(Object.assign(document.createElement("h1"), { textContent: "Search" }));
 }
 
+// On a narrow screen the lists at the sides are drawers: their icons are buttons, and Escape closes them.
+function drawers() {
+  for (const icon of document.querySelectorAll(".nav-overlay-icon, .toc-overlay-icon")) {
+    const box = document.getElementById(icon.htmlFor);
+    const drawer = document.querySelector(box.id === "__toc" ? ".toc-drawer" : ".sidebar-drawer");
+    const say = () => icon.setAttribute("aria-expanded", box.checked);
+    Object.assign(icon, { tabIndex: 0, role: "button", ariaLabel: drawer.ariaLabel });
+    box.addEventListener("change", say);
+    say();
+    icon.addEventListener("keydown", (event) => {
+      if (!["Enter", " "].includes(event.key)) return;
+      event.preventDefault();
+      icon.click();
+      const first = () => [...drawer.querySelectorAll("a, input")].find((one) => one.offsetParent);
+      setTimeout(() => box.checked && first()?.focus(), 50);
+    });
+    addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !box.checked) return;
+      box.click();
+      icon.focus();
+    });
+  }
+}
+
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
 function reach() {
   for (const box of document.querySelectorAll("article :is(pre, table, .table-wrapper, .wide-picture, .formula)"))
@@ -15,6 +39,7 @@ function reach() {
 }
 
 addEventListener("DOMContentLoaded", names);
+addEventListener("DOMContentLoaded", drawers);
 for (const event of ["load", "resize"]) addEventListener(event, reach);
 // What was folded has its width once it is open.
 addEventListener("toggle", reach, true);

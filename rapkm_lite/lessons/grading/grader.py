@@ -34,6 +34,7 @@ class Grade:
     of: float
     sentence: str
     mistake: str
+    file: str = ""
 
 
 def grade(
@@ -41,6 +42,7 @@ def grade(
 ) -> list[Grade]:
     """Grades of all submissions under a folder, sorted by student and exercise.
 
+    Of several notebooks of a student for one lesson the one with most points counts, of equal ones the newest.
     seconds : limit of each statement and each check; a whole notebook gets ten times as much.
     jobs : submissions graded at a time; None: as many as there are processors.
     progress : called with (done, all, submission) after each one.
@@ -52,14 +54,17 @@ def grade(
     if jobs < 1:
         raise ValueError(f"jobs = {jobs!r}; allowed: 1 or more")
     submissions = found(folder, {name[:2] for name in exercises()})
-    grades: list[Grade] = []
+    best: dict[tuple[str, str], tuple] = {}
     with ThreadPoolExecutor(jobs) as pool:
         running = {pool.submit(grade_one, submission, seconds): submission for submission in submissions}
         for done, future in enumerate(as_completed(running), 1):
-            grades += future.result()
+            one, grades = running[future], future.result()
+            rank = sum(g.points for g in grades), one.path.stat().st_mtime, str(one.path)
+            kept = best.get((one.student, one.lesson))
+            best[one.student, one.lesson] = max(kept, (rank, grades)) if kept else (rank, grades)
             if progress:
-                progress(done, len(submissions), running[future])
-    return sorted(grades, key=lambda g: (g.student, g.exercise))
+                progress(done, len(submissions), one)
+    return sorted((g for _, grades in best.values() for g in grades), key=lambda g: (g.student, g.exercise))
 
 
 def grade_one(submission: Submission, seconds: float) -> list[Grade]:
@@ -74,7 +79,8 @@ def grade_one(submission: Submission, seconds: float) -> list[Grade]:
         if name.startswith(f"{submission.lesson}."):
             word, sentence, mistake = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
             points = exercise.points if word in ("ok", "close") else 0.0
-            grades.append(Grade(submission.student, name, word, points, exercise.points, sentence, mistake))
+            words, place = (sentence, mistake), str(submission.path)
+            grades.append(Grade(submission.student, name, word, points, exercise.points, *words, place))
     return grades
 
 

@@ -8,6 +8,8 @@ import json
 import os
 import re
 import symtable
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,33 +47,55 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
     """All submissions under a folder: STUDENT/.../04_title.ipynb, or loose notebooks, whose names are the student's.
 
     known : numbers of the lessons that have exercises; for notebooks without such a number in their name see `unnamed`.
+    Of several such numbers in a name, as in 04_title_v10_final.ipynb, that counts whose exercises the notebook names.
     Raises ValueError when the folder does not exist or holds none.
     """
     if not os.path.isdir(folder):  # also where the name is longer than a name can be
         raise ValueError(f"submissions = {short(str(folder))}; allowed: a folder that exists")
-    submissions = []
-    for path, parts in _notebooks(folder):
-        if numbers := [n for n in _NUMBER.findall(path.name) if n in known]:
-            student = parts[0] if len(parts) > 1 else path.stem
-            submissions.append(Submission(student, path, numbers[-1]))
+    submissions = [*_handed_in(folder, known)]
     if not submissions:
         raise ValueError(f"submissions = {str(folder)!r}; allowed: a folder with notebooks named like 04_title.ipynb")
     return submissions
 
 
-def unnamed(folder: Path) -> list[str]:
-    """The notebooks under a folder whose names tell no lesson, so that nobody grades them."""
-    return [str(Path(*parts)) for path, parts in _notebooks(folder) if not _NUMBER.search(path.name)]
+def _handed_in(folder: Path, known: set[str]) -> Iterator[Submission]:
+    for path, parts in _notebooks(folder):
+        if numbers := [n for n in dict.fromkeys(_NUMBER.findall(path.name)) if n in known]:
+            yield Submission(parts[0] if len(parts) > 1 else path.stem, path, _told(path, numbers))
+
+
+def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
+    """The submissions under a folder that are not among those that counted, by their paths."""
+    return [str(one.path) for one in _handed_in(folder, known) if str(one.path) not in counted]
+
+
+def _told(path: Path, numbers: list[str]) -> str:
+    """Of some numbers of lessons, in the order of a name, the one whose exercises a notebook names most often."""
+    try:
+        text = path.read_text(encoding="utf-8") if len(numbers) > 1 else ""
+    except (OSError, ValueError):
+        text = ""
+    return max(numbers, key=lambda number: len(re.findall(rf"\b{number}\.[a-z]\w+", text)))
+
+
+def unnamed(folder: Path, known: set[str]) -> list[str]:
+    """The notebooks under a folder that nobody grades, since their names tell no lesson with exercises.
+
+    Lesson 00, which has none, is left out.
+    """
+    names = [(str(Path(*parts)), {*_NUMBER.findall(path.name)}) for path, parts in _notebooks(folder)]
+    return [name for name, numbers in names if not numbers & {*known, "00"}]
 
 
 def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
     """All notebooks with the parts of their place, but those of hidden folders, as checkpoints are."""
-    places = [(path, path.relative_to(folder).parts) for path in sorted(folder.rglob("*.ipynb"))]
+    files = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() == ".ipynb")
+    places = [(path, path.relative_to(folder).parts) for path in files]
     return [(path, parts) for path, parts in places if not any(part.startswith(".") for part in parts)]
 
 
 def sources(path: Path) -> list[str]:
-    """Source of every cell, empty for those without code; lines for the notebook itself (%, !) are taken out.
+    """Source of every cell, empty for those without code; what is for the notebook itself (%, !, ?) as plain calls.
 
     Raises ValueError when the file is no notebook.
     """
@@ -80,7 +104,20 @@ def sources(path: Path) -> list[str]:
         texts = ["".join(cell["source"]) if cell["cell_type"] == "code" else "" for cell in cells]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path.name} is no notebook that can be read ({type(error).__name__})") from None
-    return [re.sub(r"^(\s*)[%!].*$", r"\1pass", text, flags=re.M) for text in texts]
+    return [_plain(text) for text in texts]
+
+
+def _plain(text: str) -> str:
+    """The source of a cell in plain Python, line for line."""
+    text = re.sub(r"\A(\s*)%%.*$", r"\1pass", text, flags=re.M)
+    try:
+        ast.parse(text)
+    except (SyntaxError, ValueError):
+        with suppress(ImportError, SyntaxError):
+            from IPython.core.inputtransformer2 import TransformerManager
+
+            return TransformerManager().transform_cell(text)
+    return text
 
 
 def statements(texts: list[str]) -> tuple[list[Statement], dict[int, str]]:

@@ -12,7 +12,7 @@ from ...machine.arguments import short
 from .grader import Grade
 from .submission import Submission
 
-COLUMNS = ("student", "exercise", "verdict", "points", "of", "sentence", "mistake")
+COLUMNS = ("student", "exercise", "verdict", "points", "of", "sentence", "mistake", "file")
 
 
 def check_place(path: Path) -> None:

@@ -65,6 +65,7 @@ class Bench:
     def run(self, chosen: list[Statement], texts: list[str]) -> None:
         """Run statements in a fresh module; after an error the rest of its cell is left out, as in a notebook."""
         space: dict[str, Any] = {"__name__": "__main__", "display": lambda *shown, **named: None}
+        space["get_ipython"] = NoNotebook
         for cell, text in enumerate(texts):
             linecache.cache[f"<cell {cell}>"] = (len(text), None, text.splitlines(keepends=True), f"<cell {cell}>")
         names = {called(name, exercise): name for name, exercise in self.exercises.items()}
@@ -90,7 +91,10 @@ class Bench:
         """Judge the answers whose check was deleted or replaced, and tell all results."""
         for name in self.exercises:
             if name not in self.results or self.results[name].word == "todo":
-                self.results[name] = self.without_check(name, texts)
+                found = self.without_check(name, texts)
+                # What a check said of an answer that is none says more than "not yet".
+                if found.word != "todo" or name not in self.results:
+                    self.results[name] = found
             self.tell(result=[name, *self.results[name]])
         self.tell(done=True)
 
@@ -109,6 +113,13 @@ class Bench:
         tried = [self.judged(name, value) for cell, value in self.bound[name] if cell not in cells][:5]
         order = ["ok", "close", "wrong", "todo"]
         return min(tried, key=lambda result: order.index(result.word), default=Result("todo", "not yet"))
+
+
+class NoNotebook:
+    """Stands in for the notebook itself: commands for it (%, !, ?) do nothing."""
+
+    def __getattr__(self, name):
+        return lambda *arguments, **named: None
 
 
 def quiet() -> contextlib.ExitStack:
