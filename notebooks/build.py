@@ -85,7 +85,10 @@ if __name__ == "__main__":
     elif sys.argv[1:2] == ["nbgrader"]:
         if len(sys.argv) < 3:
             sys.exit("nbgrader needs a folder: python notebooks/build.py nbgrader FOLDER 04")
-        nbgrader.export(Path(sys.argv[2]), sys.argv[3:])
+        try:
+            print(*nbgrader.export(Path(sys.argv[2]), sys.argv[3:]), sep="\n")
+        except ValueError as error:
+            sys.exit(str(error))
     elif sys.argv[1:] == ["mystery"]:
         mystery.write()
     else:

@@ -20,18 +20,24 @@ sys.path.insert(0, str(HERE))
 
 
 def main(number: str, target: str = "") -> int:
-    """Write the slides of the lesson with this number; 2 when there is no such lesson."""
+    """Write the slides of the lesson with this number; 2 when that cannot be done."""
     found = sorted(HERE.glob(f"{number}_*.ipynb"))
     if len(found) != 1:
         allowed = ", ".join(path.stem[:2] for path in sorted(HERE.glob("[0-9][0-9]_*.ipynb")))
         print(f"lesson = {number!r}; allowed: {allowed}", file=sys.stderr)
         return 2
-    # Imported here: a wrong number is told without `latex2mathml`.
-    from workshop.deck import page, slides
-
+    try:
+        from workshop.deck import page, slides
+    except ModuleNotFoundError as error:
+        print(f"{error.name} is missing; allowed after: python -m pip install {error.name}", file=sys.stderr)
+        return 2
     notebook = nbformat.read(found[0], as_version=4)
     path = Path(target or f"slides_{number}.html")
-    path.write_text(page(notebook), encoding="utf-8")
+    try:
+        path.write_text(page(notebook), encoding="utf-8")
+    except OSError as error:
+        print(f"target = {target!r} ({error.strerror}); allowed: a file in a folder that exists", file=sys.stderr)
+        return 2
     print(f"{path}: {len(slides(notebook))} slides, {path.stat().st_size / 1e6:.1f} MB")
     return 0
 

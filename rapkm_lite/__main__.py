@@ -45,7 +45,9 @@ def _grade(options) -> None:
     if others := surpassed(folder, known, {grade.file for grade in grades}):
         print(f"\nnot counted, since another notebook of this student has more points or is newer: {', '.join(others)}")
     if left := unnamed(folder, known):
-        print(f"\nnot graded, since their names have no number of a lesson with exercises, like 04_title.ipynb: {', '.join(left)}")
+        print(
+            f"\nnot graded, since their names have no number of a lesson with exercises, like 04_title.ipynb: {', '.join(left)}"
+        )
     if options.csv:
         write_csv(Path(options.csv), grades)
 

@@ -301,6 +301,46 @@ def test_formula_sheet_is_one_page_without_overflow(tmp_path):
     assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)], "text over text"
 
 
+@pytest.mark.parametrize("target", ["--help", "nowhere/sheet.pdf"])
+def test_pages_for_teachers_are_written_or_refused_by_a_sentence(tmp_path, target):
+    scripts = [(TEACHING / "formula_sheet.py", target), (ROOT / "notebooks" / "slides.py", "04", "nowhere/slides.html")]
+    for script in scripts:
+        done = subprocess.run([sys.executable, *map(str, script)], capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 2 and "Traceback" not in done.stderr and ("allowed" in done.stderr)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_sheet_is_a_pdf_whatever_its_name(tmp_path):
+    subprocess.run([sys.executable, TEACHING / "formula_sheet.py", "sheet"], check=True, cwd=tmp_path)
+    assert (tmp_path / "sheet").read_bytes().startswith(b"%PDF")
+
+
+TELLING = re.compile(r"(?i)\b(they|it|yes|no|not|none|nothing|all|almost|only|more|less|one|two|both|neither)\b")
+
+
+def test_the_title_of_a_folded_answer_does_not_tell_it():
+    """Titles right behind a question, as in "Why so little?"; the words of a verdict are told by its text alone."""
+    told = []
+    for notebook in teaching.lessons().values():
+        words = "\n\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+        for block in re.findall(r"^\*\*(?:Predict|Before you).*?</summary>", words, re.M | re.S):
+            title = re.sub("<[^>]*>", "", block.partition("<summary>")[2])
+            told += [title] if TELLING.search(title) and "yours works" not in title else []
+    assert told == []
+
+
+def test_what_a_question_is_about_is_said_with_it():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    cell = (
+        "## One (3 min)\n\nFirst.\n\nAll links are longer.\n\n**Predict.** Which presses harder, this or that?"
+    )
+    (slide,) = [s for s in deck.slides(lesson_with(nbformat.v4.new_markdown_cell(cell))) if s.kind == "question"]
+    assert "All links are longer" in slide.page() and "First." not in slide.page()
+    assert "all links are 1 % longer" in teaching.predictions_page()
+
+
 def lesson_with(*cells):
     return nbformat.v4.new_notebook(cells=list(cells))
 

@@ -76,7 +76,7 @@ ROWS = [
         "APD",
         "(28)*, (29)",
         r"$c=(\tilde A^T)^+(\tilde G\ddot q^d+\tilde C\dot q^d+\tilde Q-K_Pe-K_D\dot e),"
-        r"\quad K=\mathrm{diag}(0,\ldots,0,K_1,\ldots,K_m)$",
+        r"\quad K=\mathrm{diag}(K_1,\ldots,K_m,0,\ldots,0)$",
     ),
     (
         "Lyapunov function",
@@ -113,12 +113,19 @@ def sheet() -> Figure:
     return fig
 
 
-def main(target: str = "formula_sheet.pdf") -> None:
-    """Write the page."""
+def main(target: str = "formula_sheet.pdf") -> int:
+    """Write the page; 2 where it cannot be written."""
     path = Path(target)
-    sheet().savefig(path, metadata={"Title": "Formula sheet", "CreationDate": None})
+    try:
+        if target.startswith("-"):
+            raise OSError(None, "an option")
+        sheet().savefig(path, format="pdf", metadata={"Title": "Formula sheet", "CreationDate": None})
+    except OSError as error:
+        print(f"target = {target!r} ({error.strerror}); allowed: a file in a folder that exists", file=sys.stderr)
+        return 2
     print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+    return 0
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    sys.exit(main(*sys.argv[1:2]))

@@ -115,13 +115,14 @@ class _Deck:
         self.fresh = False  # nothing but the heading stands on the slide of the section so far
         self.task = False  # the rest of the cell belongs to an exercise
         self.asked: Slide | None = None  # the question that an answer belongs to
+        self.left_out = ""  # the paragraph just before, if it is on no slide
 
     def add(self, kind: str, heading: str, *parts: str) -> None:
         # The next slide has the heading, too.
         if self.slides and self.slides[-1].kind == "section" and not self.slides[-1].parts:
             self.slides.pop()
         self.slides.append(Slide(kind, heading, [part for part in parts if part]))
-        self.fresh, self.task = False, kind == "exercise"
+        self.fresh, self.task, self.left_out = False, kind == "exercise", ""
         if kind not in ("picture", "answer"):
             self.asked = self.slides[-1] if kind == "question" else None
 
@@ -152,10 +153,13 @@ class _Deck:
         elif _EXERCISE.match(block):
             self.add("exercise", self.section, rendered(re.sub(r"^#+ (.*)\n?", r"**\1**\n\n", block)))
         elif _QUESTION.match(block):
-            self.add("question", self.section, rendered(block))
+            # What is asked about may have been said just before.
+            self.add("question", self.section, rendered(f"{self.left_out}\n\n{block}"))
         elif self.slides and (self.fresh or self.task or self._belongs(block)):
             self.slides[-1].parts.append(rendered(block))
-            self.fresh = False
+            self.fresh, self.left_out = False, ""
+        else:
+            self.left_out = block
 
     def _belongs(self, block: str) -> bool:
         """Formulas, lists and tables stay on the slides of title and sections."""

@@ -119,8 +119,12 @@ def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
 def export(folder: Path, wanted: list[str]) -> list[Path]:
     """Write FOLDER/source/04_title/04_title.ipynb for the lessons whose names begin so, and nbgrader's settings.
 
-    Returns the notebooks.
+    Returns the notebooks.  Raises ValueError for a word with which no name begins.
     """
+    names = [path.name for path in sorted(SOLUTIONS.glob("*.ipynb"))]
+    for word in wanted:
+        if not any(name.startswith(word) for name in names):
+            raise ValueError(f"lesson = {word!r}; allowed: {', '.join(name[:2] for name in names)}")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
     made = []

@@ -9,6 +9,7 @@ from pathlib import Path
 import nbformat
 
 from .layout import NOTEBOOKS
+from .storing import COVER, HIDDEN
 
 TEACHING = NOTEBOOKS.parent / "docs" / "teaching"
 _HEADING = re.compile(r"^(##+) +(.*?)(?: *\((\d+) min\))? *$", re.M)
@@ -119,12 +120,26 @@ def mistakes_page() -> str:
     ]
     for name, exercise in sorted(exercises().items()):
         points = f"{exercise.points:g} points"
-        text += [f"## {name}\n", f"Kind: {kinds.get(name, 'derive')}, {points}.\n"]
+        text += [f"## {name}\n", f"Kind: {kinds.get(name, 'design' if exercise.judge else 'derive')}, {points}.\n"]
         text += [f"- {sentence}" for sentence in exercise.mistakes] or [
             "Its check compares with limits, or with the log."
         ]
         text.append("")
     return "\n".join(text)
+
+
+def _said_before(blocks: list[str], question: str) -> list[str]:
+    """The paragraph that a question follows in its cell, which may hold what it asks about."""
+    before = blocks[blocks.index(question) - 1] if blocks.index(question) else ""
+    plain = before and not re.match(r"#|>|[-*|] |\d+\. |<|\$\$|\*\*", before)
+    return [before, ""] if plain else []
+
+
+def _printed(cells) -> str:
+    """What the next cell with a hidden output prints."""
+    outputs = [o for c in cells if HIDDEN in c.metadata.get("tags", []) for o in c.outputs]
+    text = next((o.text for o in outputs if o.output_type == "stream" and o.text != COVER), "")
+    return f"```\n{text.removeprefix(COVER).strip()}\n```" if text else "The cell that follows draws the answer."
 
 
 def predictions_page() -> str:
@@ -142,10 +157,10 @@ def predictions_page() -> str:
             # Each question has the next answer behind it; questions in a row share theirs.
             found = [_DETAILS.search("\n".join(behind), cell.source.find(block)) for block in asked]
             for j, (block, one) in enumerate(zip(asked, found, strict=True)):
-                text.append(block)
+                text += [*_said_before(blocks, block), block]
                 if j + 1 < len(asked) and one and found[j + 1] and one.start() == found[j + 1].start():
                     continue
-                answer = one[1].strip() if one else "The cell that follows prints or draws the answer."
+                answer = one[1].strip() if one else _printed(cells[k : k + 5])
                 text += ["", "> " + answer.replace("\n", "\n> "), ""]
     return re.sub(r"\]\((?![a-z]+:|#)", "](../../notebooks/", "\n".join(text))
 
