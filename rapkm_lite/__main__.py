@@ -45,9 +45,8 @@ def _grade(options) -> None:
     if others := surpassed(folder, known, {grade.file for grade in grades}):
         print(f"\nnot counted, since another notebook of this student has more points or is newer: {', '.join(others)}")
     if left := unnamed(folder, known):
-        print(
-            f"\nnot graded, since their names have no number of a lesson with exercises, like 04_title.ipynb: {', '.join(left)}"
-        )
+        words = "not graded, since their names have no number of a lesson with exercises, like 04_title.ipynb"
+        print(f"\n{words}: {', '.join(left)}")
     if options.csv:
         write_csv(Path(options.csv), grades)
 

@@ -333,9 +333,7 @@ def test_what_a_question_is_about_is_said_with_it():
     pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
     from workshop import deck
 
-    cell = (
-        "## One (3 min)\n\nFirst.\n\nAll links are longer.\n\n**Predict.** Which presses harder, this or that?"
-    )
+    cell = "## One (3 min)\n\nFirst.\n\nAll links are longer.\n\n**Predict.** Which presses harder, this or that?"
     (slide,) = [s for s in deck.slides(lesson_with(nbformat.v4.new_markdown_cell(cell))) if s.kind == "question"]
     assert "All links are longer" in slide.page() and "First." not in slide.page()
     assert "all links are 1 % longer" in teaching.predictions_page()
