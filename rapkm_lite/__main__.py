@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from subprocess import list2cmdline
 
 
 def _summary(options) -> None:
@@ -28,27 +31,38 @@ def _lessons(options) -> None:
         raise ValueError(f"folder = {options.folder!r}; allowed: the name of a folder, . for the present one")
     files = copy_lessons(options.folder)
     print(f"{len(files)} files in {options.folder}; open the first lesson with")
-    print(f"    python -m jupyter lab {shlex.quote(str(files[0]))}")
+    first = str(files[0])
+    print(f"    python -m jupyter lab {list2cmdline([first]) if os.name == 'nt' else shlex.quote(first)}")
 
 
 def _grade(options) -> None:
-    from .lessons.checker import exercises
     from .lessons.grading.grader import grade
-    from .lessons.grading.submission import surpassed, unnamed
-    from .lessons.grading.tables import bar, by_exercise, by_student, check_place, write_csv
+    from .lessons.grading.tables import bar, check_place, write_csv
 
     if options.csv:
         check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
+    try:
+        if options.csv:
+            write_csv(Path(options.csv), grades)
+    finally:
+        _tell_grades(Path(options.submissions), grades)
+
+
+def _tell_grades(folder: Path, grades) -> None:
+    from .lessons.checker import exercises
+    from .lessons.grading.submission import surpassed, unnamed
+    from .lessons.grading.tables import by_exercise, by_student
+
+    if isinstance(sys.stdout, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
+        sys.stdout.reconfigure(errors="backslashreplace")
     print(by_exercise(grades), by_student(grades), sep="\n\n")
-    folder, known = Path(options.submissions), {name[:2] for name in exercises()}
+    known = {name[:2] for name in exercises()}
     if others := surpassed(folder, known, {grade.file for grade in grades}):
         print(f"\nnot counted, since another notebook of this student has more points or is newer: {', '.join(others)}")
     if left := unnamed(folder, known):
         words = "not graded, since their names have no number of a lesson with exercises, like 04_title.ipynb"
         print(f"\n{words}: {', '.join(left)}")
-    if options.csv:
-        write_csv(Path(options.csv), grades)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

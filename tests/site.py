@@ -140,9 +140,10 @@ def search(context, base: str) -> list[str]:
 def drawers(context, base: str) -> list[str]:
     """The lists at the sides of a narrow screen, by keys alone: open, the first link, closed and out of the way."""
     page, wrong = opened(context, base)
-    page.set_viewport_size({"width": 390, "height": 800})
     page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
-    for icon, drawer in ((".nav-overlay-icon", ".sidebar-drawer"), (".toc-header-icon", ".toc-drawer")):
+    both = [(390, ".nav-overlay-icon", ".sidebar-drawer"), (390, ".toc-header-icon", ".toc-drawer")]
+    for width, icon, drawer in [*both, (1100, ".toc-content-icon", ".toc-drawer")]:
+        page.set_viewport_size({"width": width, "height": 800})
         inside = f"document.querySelector('{drawer}').contains(document.activeElement)"
         hidden = f"getComputedStyle(document.querySelector('{drawer}')).visibility === 'hidden'"
         page.wait_for_function(hidden)
@@ -152,6 +153,7 @@ def drawers(context, base: str) -> list[str]:
             page.wait_for_function(inside, timeout=5000)
             page.keyboard.press("Escape")
             page.wait_for_function(hidden, timeout=5000)
+            page.wait_for_function(f"document.activeElement.matches('{icon}')", timeout=5000)
         except Exception:
             wrong.append(f"{drawer} is not opened and closed by keys")
     page.close()

@@ -13,7 +13,7 @@ from ..lessons.lesson08.tasks import counted, ring
 from ..lessons.lesson09.figures import shortest_reach
 from ..lessons.lesson09.tasks import one_sign, smallest
 from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import control_matrix, prestress_projector
+from ..mechanics.actuation import control_matrix, prestress_projector, singular_values
 from ..mechanics.calibration import CalibrationError, calibrate
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
@@ -68,6 +68,11 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
         } | stopped(point, x, y)
 
     times = size(robot)
+    # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.
+    A = control_matrix(robot, inverse_kinematics(robot, marks.clamped(robot, robot.base.mean(axis=0))))
+    least = singular_values(A)[1] * 0.085 > 0.05 / times
+    reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max() if least else 0.0
+    first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},
@@ -76,7 +81,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     }
     controls = place_sliders(robot, 0, 0, -150, 150, 5) | {
         "f_x": slider("force f_x in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.0),
-        "f_y": slider("force f_y in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.75 / times),
+        "f_y": slider("force f_y in N", -1.5 / times, 1.5 / times, 0.05 / times, first),
         "limit": slider("limit in mN m", 20, 200, 5, 85),
         "rule": choice("rule", RULES.keys(), "within the limits"),
     }

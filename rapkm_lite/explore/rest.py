@@ -13,7 +13,7 @@ from ..figures.style import ALARM, NEUTRAL, arm_colour, arm_line
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
-from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.kinematics import cross, inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
 from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
@@ -125,8 +125,10 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             seen.append(spots[np.argmin(far[:, i + 1] - 20 * room)])
             look = {"color": arm_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
             picture.text("opinions", *seen[-1], f"{i + 1}", **look)
-        corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
-        if N == 3 and max(np.ptp(corners, axis=0)) < 3 * half:
+        corners = []
+        if N == 3 and np.abs(cross(normal, np.roll(normal, 1, axis=0))).min() > 1e-9:
+            corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
+        if corners and max(np.ptp(corners, axis=0)) < 3 * half:
             picture.polygon("opinions", corners, facecolor="#DCE6F0", zorder=0.5)
         picture.line("opinions", 0, 0, color=NEUTRAL, marker="+", markersize=13, markeredgewidth=2, zorder=5)
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}

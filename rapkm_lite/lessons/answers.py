@@ -159,6 +159,8 @@ def numbers(got: Any) -> np.ndarray:
             parts = f": {len(got)} arrays, of shapes {', '.join(str(part.shape) for part in got)}, where one is wanted"
         sentence = f"the answer is not numeric but of type {kind}{parts or ', or too large'}"
         raise Ended("wrong", sentence, "not numeric") from None
+    if array.size > 10**7:
+        raise Ended("wrong", f"the answer holds {array.size} numbers; a few are wanted", "another shape")
     if array.dtype.kind == "c":
         real = " (.real of it, since all imaginary parts are zero, as after np.linalg.eig)" * (not array.imag.any())
         raise Ended("wrong", f"the answer is complex; a real one is wanted{real}", "complex")
@@ -179,4 +181,6 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
     if not np.all(np.isfinite(got)):
         raise Ended("wrong", "the answer holds NaN or infinity", "NaN or infinity")
+    if np.abs(got).max(initial=0.0) > 1e100:
+        raise Ended("wrong", f"the answer holds numbers as large as {np.abs(got).max():.3g}", "too large")
     return got

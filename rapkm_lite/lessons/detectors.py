@@ -56,6 +56,8 @@ def sign(seen: Seen) -> str:
 
 def _some_signs(seen: Seen) -> str:
     """Words for the rows, columns or entries that have the opposite sign."""
+    if seen.want[0].ndim == 0:
+        return "the size is right, but in some cases the sign is opposite"
     scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
     flipped = {
         tuple(int(i) for i in place) for g, w, _ in seen for place in np.argwhere(np.abs(g - w) > seen.slack * scale)

@@ -185,6 +185,7 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
             if refusal is None:
                 raise
     else:
+        assert refusal is not None
         raise refusal from None
     p, machine, x, left, sigma, Vt = found
     spare, total = len(left) - len(sigma), float(left @ left) * len(angles)

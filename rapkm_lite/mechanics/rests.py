@@ -108,9 +108,18 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
 
 def fitted_gain(stand: Rests) -> Gain | None:
     """K_P of c = -K_P (q_a - q_desired) over the rests, drive by drive; None where a drive shows no error."""
-    lines = [stand.fit(i) for i in range(stand.c.shape[1])]
-    found = [(line[0][0], np.sqrt(line[1][0, 0])) for line in lines if line is not None]
-    return Gain(*np.array(found).T) if len(found) == len(lines) else None
+    if np.any(np.abs(stand.q_a - stand.desired).max(axis=0) < 1e-6):
+        return None
+    found = []
+    for i in range(stand.c.shape[1]):
+        line, aside = stand.fit(i), stand.fit(i, np.ones(len(stand.c)))
+        # Torques that all lie aside are no part of the gain.
+        if aside is not None and abs(aside[0][1]) > 5 * np.sqrt(aside[1][1, 1]):
+            line = aside
+        if line is None:
+            return None
+        found.append((line[0][0], np.sqrt(line[1][0, 0])))
+    return Gain(*np.array(found).T)
 
 
 def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]) -> tuple[np.ndarray, float]:
@@ -130,10 +139,16 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
                 "filter; allowed: the gain of the drives, or use = 'angles'"
             )
+        if len(wrong := np.flatnonzero(K_P <= 0.0)):
+            raise ValueError(
+                f"K_P = None, and the rests show K_P[{wrong[0]}] = {K_P[wrong[0]]:.6g}; allowed: > 0, so torques of "
+                "drives that act, with the sign that drives their angles"
+            )
     K_P = bounded("K_P", K_P, 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
+    spread = spread if spread > 1e-12 else 0.0  # the rounding of means
     felt, seen = (np.abs(closure(at(robot, poses(robot, a)), a, 0)[0]).max() for a in (angles, stand.q_a))
     if felt < 0.1 * seen and seen > 5 * spread:
         notes.append(

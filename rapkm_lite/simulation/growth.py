@@ -67,7 +67,7 @@ def swinging(c: np.ndarray) -> float:
     if half == 0:
         return 0.0
     drive = last[:, np.abs(last).max(axis=0).argmax()]
-    changes, first = np.count_nonzero(drive[1:] * drive[:-1] < 0.0), np.abs(drive[:half]).max()
+    changes, first = np.count_nonzero(np.sign(drive[1:]) * np.sign(drive[:-1]) < 0.0), np.abs(drive[:half]).max()
     return float(np.abs(drive[half:]).max() / first) if changes >= max(1, len(last) // 4) and first > 0.0 else 0.0
 
 
@@ -78,7 +78,8 @@ def swung(c: np.ndarray, dt: float) -> str:
     'unstable gain: in the end the torques swung to and fro within 12 samples of 0.001 s and grew 64-fold'
     """
     grown = swinging(c)
-    end = f"in the end the torques swung to and fro within 12 samples of {dt:g} s and grew {grown:.3g}-fold"
+    within = f"within {min(len(c), 12)} samples of {dt:g} s"
+    end = f"in the end the torques swung to and fro {within} and grew {grown:.3g}-fold"
     return f"unstable gain: {end}" if grown > 1.5 else ""
 
 

@@ -24,7 +24,7 @@ function drawers() {
       setTimeout(() => box.checked && first()?.focus(), 50);
     });
     addEventListener("keydown", (event) => {
-      if (event.key !== "Escape" || !box.checked) return;
+      if (event.key !== "Escape" || !box.checked || !icon.getClientRects().length) return;
       box.click();
       icon.focus();
     });

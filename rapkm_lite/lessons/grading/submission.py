@@ -89,9 +89,13 @@ def unnamed(folder: Path, known: set[str]) -> list[str]:
 
 def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
     """All notebooks with the parts of their place, but those of hidden folders, as checkpoints are."""
-    files = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() == ".ipynb")
-    places = [(path, path.relative_to(folder).parts) for path in files]
-    return [(path, parts) for path, parts in places if not any(part.startswith(".") for part in parts)]
+    places = []
+    for place, folders, files in os.walk(folder, followlinks=True):
+        # A link to a folder that it lies in has no end.
+        around = {os.path.realpath(one) for one in Path(place).parents}
+        folders[:] = [one for one in folders if one[0] != "." and os.path.realpath(Path(place, one)) not in around]
+        places += [Path(place, one) for one in files if one[0] != "." and one.lower().endswith(".ipynb")]
+    return [(path, path.relative_to(folder).parts) for path in sorted(places)]
 
 
 def sources(path: Path) -> list[str]:
@@ -113,6 +117,7 @@ def _plain(text: str) -> str:
     try:
         ast.parse(text)
     except (SyntaxError, ValueError):
+        text = re.sub(r"^(\s*)%time\s+(?=\S)", r"\1", text, flags=re.M)
         with suppress(ImportError, SyntaxError):
             from IPython.core.inputtransformer2 import TransformerManager
 
@@ -160,20 +165,12 @@ def _changes(node: ast.stmt) -> set[str]:
         elif isinstance(part, ast.Attribute | ast.Subscript) and isinstance(part.ctx, ast.Store):
             names.add(_base(part))
         elif isinstance(part, ast.Expr) and isinstance(part.value, ast.Call):
-            names.add(_base(part.value))
+            # As np.copyto(a, b) changes a, a call for its effect may change what it is given; print(a) does not.
+            given = part.value.args if _base(part.value) not in _BUILT_IN - {"setattr", "delattr"} else []
+            names |= {_base(one) for one in (part.value, *given)}
         elif isinstance(part, ast.FunctionDef | ast.ClassDef):
             names.add(part.name)
     return names - _BUILT_IN  # print(...) does not change print
-
-
-def bound(path: Path) -> set[str]:
-    """Names that a notebook binds or changes at the top level of its cells; none when it cannot be read."""
-    try:
-        read, _ = statements(sources(path))
-    except ValueError:
-        return set()
-    imported = {name for s in read for name in _imported([s])}
-    return imported.union(*(_changes(s.node) for s in read))
 
 
 def _uses(node: ast.stmt) -> set[str]:

@@ -33,7 +33,7 @@ def write_csv(path: Path, grades: list[Grade]) -> None:
     Raises ValueError where the file cannot be written.
     """
     try:
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
             rows = csv.writer(file)
             rows.writerow(COLUMNS)
             for grade in grades:

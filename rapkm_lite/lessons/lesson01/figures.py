@@ -139,7 +139,7 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
         seam = np.where((np.abs(rims[0] - rims[1]) < 0.1).all(axis=-1, keepdims=True), rims[0], np.nan)
         ax.plot(*seam[:, :3].T, color=ALARM, lw=2.5, label="common rim", zorder=8)
     if trajectory is not None:
-        ax.plot(*np.rad2deg(trajectory.q[:, :3]).T, color="black", lw=1.6, label="triangle path", zorder=8)
+        ax.plot(*np.rad2deg(trajectory.q[:, :3]).T, color="black", lw=1.6, label="path", zorder=8)
     if q is not None:
         point = np.rad2deg(q[:3])
         ax.plot(*point[:, None], "o", color=ALARM, ms=6, zorder=9)

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle
 
+from ...figures._shared import scaled_frame
 from ...figures.film import film
 from ...figures.machine import arm_points, plot_machine, plot_path, plot_workspace
 from ...figures.maps import (
@@ -72,10 +73,10 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     for other, at in zip(drive_pairs(robot), curve_crossings(trajectory), strict=True):
         look = {"mfc": "white", "mec": pair_line(robot, other)["color"], "mew": 1.8, "ms": 7, "ls": "", "zorder": 5}
         axes[1].plot(*trajectory.x[at].T, "o", **look)
-    axes[0].set(xlim=(-0.32, 0.32), ylim=(-0.25, 0.36))
+    axes[0].set(**scaled_frame(robot, -0.32, 0.32, -0.25, 0.36))
     axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
     axes[1].set_title("all three pairs and the path")
-    axes[1].set(xlim=(-0.24, 0.24), ylim=(-0.2, 0.26))
+    axes[1].set(**scaled_frame(robot, -0.24, 0.24, -0.2, 0.26))
     axes[1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return axes
 
@@ -218,7 +219,8 @@ def plot_pair_measures(trajectory, ax=None):
     for pair, sigma in zip(drive_pairs(robot), pair_measures(robot, trajectory.q).T, strict=True):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
-    ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]), ylim=(1e-2, 10))
+    ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]))
+    ax.set_ylim(2e-3 / robot.lengths.max(), 2.0 / robot.lengths.max())  # A goes with one over the lengths
     ax.set_ylabel(r"$\sigma_\mathrm{min}(A)$, $\sigma_\mathrm{min}(A_{jk})$ in rad/m")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
     return ax

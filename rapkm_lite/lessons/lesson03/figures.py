@@ -14,7 +14,7 @@ from ...figures.runs import plot_torques
 from ...figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
-from ...mechanics.kinematics import inverse_kinematics
+from ...mechanics.kinematics import cross, inverse_kinematics
 
 
 def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
@@ -32,7 +32,9 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     torque = 1e3 * steady_state_torque(A, K_P, offset)
     size = np.linalg.norm(A, axis=1)
     normal, level = A / size[:, None], -1e3 * offset / size
-    corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(len(A)) for k in range(j)]
+    # Lines that are nearly parallel meet far away, or nowhere.
+    pairs = [(j, k) for j in range(len(A)) for k in range(j) if abs(cross(normal[j], normal[k])) > 0.3]
+    corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j, k in pairs]
     corners = np.array([*corners, [0.0, 0.0], rest])
     centre, half = (corners.min(axis=0) + corners.max(axis=0)) / 2, 0.72 * np.ptp(corners, axis=0).max() + 1e-3
     for i in range(len(A)):

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import with_looks
 from ...figures.film import film
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
@@ -91,7 +92,8 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
     >>> ax = plot_joint_moves(robot, [-0.05, 0.0], [0.05, 0.0], far, [2e-3, 7e-3], 5e-3)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.3), width_ratios=(1.35, 1))[1] if axes is None else axes
-    ends, spacing, gap = inverse_kinematics(robot, np.stack([start, stop])), np.asarray(spacing), np.asarray(gap)
+    spacing, gap = np.asarray(spacing), np.asarray(gap)
+    ends = np.unwrap(inverse_kinematics(robot, np.stack([start, stop])), axis=0)
     part = np.linspace(0, 1, 61)[:, None]
     q = ends[0] + part * (ends[1] - ends[0])
     line = np.add(start, part * np.subtract(stop, start))
@@ -140,11 +142,12 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
     >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(9.8, 3.3))
-    for (label, run), line in zip(runs.items(), _RUN_LINES, strict=False):
+    for (label, run), line in with_looks("runs", runs, _RUN_LINES):
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
         ax.plot(run.t, np.maximum(size, 1e-30) if log else 1e3 * size, label=label, **line)
     words = f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}"
-    ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, run.t[-1]), yscale="log" if log else "linear")
+    end = max(run.t[-1] for run in runs.values())
+    ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, end), yscale="log" if log else "linear")
     if log:
         ax.set_ylim(1e-9, max(1e-8, ax.get_ylim()[1]))
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
@@ -160,7 +163,7 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     >>> ax = plot_torque_plane({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(5.4, 3.4))
-    for (label, run), colour, marker in zip(runs.items(), (BEFORE, AFTER), "o.", strict=False):
+    for (label, run), (colour, marker) in with_looks("runs", runs, ((BEFORE, "o"), (AFTER, "."))):
         along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
         ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import feedback_norm
+from ...figures._shared import scaled_frame, with_looks
 from ...figures.film import film
 from ...figures.machine import plot_machine, plot_path, plot_workspace
 from ...figures.maps import curve_crossings, grid_points, on_grid, pair_line, pair_name, plot_map, plot_pair_curves
@@ -27,9 +28,9 @@ def _law_line(label: str) -> dict:
     return next((line for name, line in _LAW_LINES.items() if name in label), {})
 
 
-def _frame(ax):
-    """Fill the axes with the workspace of the testbed's size."""
-    ax.set(xlim=(-0.21, 0.21), ylim=(-0.19, 0.25))
+def _frame(robot, ax):
+    """Fill the axes with the workspace, but for its tip."""
+    ax.set(**scaled_frame(robot, -0.21, 0.21, -0.19, 0.25))
     return ax
 
 
@@ -51,10 +52,11 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
         plot_machine(robot, q, ax, arms=[i for i in range(robot.n_arms) if i not in pair], alpha=0.18, labels=False)
         plot_machine(robot, q, ax, arms=pair, labels=False)
         d = arm_vectors(robot, q)[1][pair[0]]
-        blind = 0.13 * np.array([-d[1], d[0]]) / np.hypot(*d)
+        blind = 0.65 * robot.lengths.max() * np.array([-d[1], d[0]]) / np.hypot(*d)
         for tip in (x + blind, x - blind):
             ax.annotate("", tip, x, arrowprops={"arrowstyle": "->", "color": ALARM, "lw": 1.8}, zorder=7)
-        ax.set(xlim=(-0.33, 0.33), ylim=(-0.29, 0.36), title=f"pair {pair_name(pair)}, {trajectory.t[k]:.2f} s")
+        ax.set(**scaled_frame(robot, -0.33, 0.33, -0.29, 0.36))
+        ax.set_title(f"pair {pair_name(pair)}, {trajectory.t[k]:.2f} s")
         ax.label_outer()
     return axes
 
@@ -69,7 +71,7 @@ def plot_feedback_map(robot, pair, ax=None, n: int = 220):
     level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
     ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
     plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
-    return _frame(ax)
+    return _frame(robot, ax)
 
 
 def plot_feedback_along(trajectory, ax=None):
@@ -100,7 +102,7 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     plot_errors(run, axes[1])
     at = [] if pair is None else curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
     for ax in axes:
-        for t in run.t[at]:
+        for t in run.trajectory.t[at][run.trajectory.t[at] <= run.t[-1]]:
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
     # One legend for both panels, above the data.
     axes[0].get_legend().remove()
@@ -126,7 +128,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
             ax.plot(*run.x.T, label=label, zorder=4, **_law_line(label))
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
-        _frame(ax)
+        _frame(longest.robot, ax)
     axes[1].set(xlim=zoom[:2], ylim=zoom[2:], aspect="auto", title="enlarged, axes unequal")
     axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
@@ -213,7 +215,7 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
         sigma = singular_values(block.mT)[:, 1]
         plot_map(x, y, on_grid(inside, sigma), ax, vmin=0.0, vmax=0.6, bar=False)
         plot_pair_curves(robot, ax, on_map=True, linewidth=1.0)
-        _frame(ax).label_outer()
+        _frame(robot, ax).label_outer()
     axes[0].figure.colorbar(axes[0].collections[0], ax=axes, label=r"$\sigma_\mathrm{min}(\tilde{A}_1)$", shrink=0.85)
     return axes
 
@@ -224,7 +226,7 @@ def plot_lyapunov(t, functions: dict, rate, axes=None):
     >>> ax = plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1] if axes is None else axes
-    for (label, V), line in zip(functions.items(), ({"color": BEFORE}, {"color": AFTER, "ls": "--"}), strict=False):
+    for (label, V), line in with_looks("functions", functions, ({"color": BEFORE}, {"color": AFTER, "ls": "--"})):
         axes[0].semilogy(t, V, label=label, **line)
         axes[1].plot(t[1:], -np.diff(np.log(V)) / np.diff(t), label=label, **line)
     axes[1].axhline(rate, color=ALARM, ls=":", label=f"{rate:g} 1/s")

@@ -11,7 +11,7 @@ from ...mechanics.actuation import inverse_dynamics
 from ...mechanics.trajectory import triangle
 from ...simulation.faults import EncoderDropout
 from ...simulation.runs import SimulationError, simulate
-from ..answers import returned
+from ..answers import given_law
 from ..checker import Exercise, Measured
 
 OFFSET = (4e-3, -2e-3, 5e-3)
@@ -37,7 +37,7 @@ def _runs(make) -> list[Measured]:
     """The largest distance from the path for each dead encoder; the machine has friction, the law's model none."""
     path, found = triangle(_model(), side=0.12, duration=2.5, dt=2e-3), []
     for drive in range(3):
-        law = returned(make(_model()))  # a new one for each run: it may remember which drive died
+        law = given_law(make, _model())  # a new one for each run: it may remember which drive died
         dead = EncoderDropout(drive, START, 10.0)
         try:
             run = simulate(load(), law, path, OFFSET, model=_model(), faults=[dead])

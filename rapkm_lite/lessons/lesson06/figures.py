@@ -5,6 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import scaled_frame, with_looks
 from ...figures.machine import plot_machine, plot_workspace
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
 
@@ -64,7 +65,7 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     if path is not None:
         ax.plot(*path.x.T, color=ALARM, lw=2.0, zorder=4)
     ax.grid(False)
-    ax.set(xlim=(-0.27, 0.27), ylim=(-0.2, 0.29))
+    ax.set(**scaled_frame(robot, -0.27, 0.27, -0.2, 0.29))
     return ax
 
 
@@ -74,7 +75,7 @@ def plot_bands(samples: dict, ax=None):
     >>> ax = plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
     """
     ax = axes_or_new(ax, figsize=(6.6, 3.5))
-    for (label, values), colour in zip(samples.items(), (BEFORE, AFTER), strict=False):
+    for (label, values), colour in with_looks("samples", samples, (BEFORE, AFTER)):
         values = np.sort(values)
         ax.step(values, 100 * np.arange(1, len(values) + 1) / len(values), color=colour, lw=2.2, label=label)
         ax.plot(values.mean(), 100 * np.mean(values <= values.mean()), "D", color=ALARM, ms=7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import with_looks
 from ...figures.maps import pair_line, pair_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.actuation import drive_pairs
@@ -77,7 +78,7 @@ def plot_demand(part, demand, points: dict, ax=None):
     ax = axes_or_new(ax, figsize=(8.0, 3.2))
     ax.plot(part, demand, color=AFTER)
     top = np.max(demand)
-    for row, ((label, shares), colour) in enumerate(zip(points.items(), (BEFORE, ALARM), strict=False)):
+    for row, ((label, shares), colour) in enumerate(with_looks("points", points, (BEFORE, ALARM))):
         level = -(row + 1) * 0.13 * top
         ax.plot(shares, np.full(len(shares), level), "o", ms=6, color=colour, label=label)
     ax.axhline(0, color="#BBBBBB", lw=0.8)

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import with_looks
 from ...figures.machine import plane_axes, plot_workspace
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.antagonism import null_vector
@@ -27,16 +28,18 @@ def plot_places(robot, groups, axes=None):
     axes = plt.subplots(1, 2, figsize=(9.2, 4.0))[1] if axes is None else axes
     plot_workspace(robot, axes[0])
     plane_axes(robot, axes[0])
-    for (name, places), look in zip(groups.items(), _LOOKS, strict=False):
+    least = -0.2
+    for (name, places), look in with_looks("groups", groups, _LOOKS):
         q = inverse_kinematics(robot, places)
         n = null_vector(robot, q)
+        least = min(least, n[:, :2].min() - 0.1)
         points = {"linestyle": "none", "ms": 6, "mfc": "none", "mew": 1.6} | look
         axes[0].plot(*np.transpose(places), zorder=4, **points)
         axes[1].plot(n[:, 0], n[:, 1], label=name, **points)
     turn = np.linspace(0, 2 * np.pi, 200)
     axes[1].plot(np.cos(turn), np.sin(turn), color="#BBBBBB", lw=1, zorder=1)
     axes[1].set(xlabel="component of drive 1", ylabel="component of drive 2", aspect="equal")
-    axes[1].set(xlim=(-0.2, 1.1), ylim=(-0.2, 1.1))
+    axes[1].set(xlim=(least, 1.1), ylim=(least, 1.1))
     axes[1].set_title("null vectors")
     axes[0].set_title("places")
     axes[1].legend(loc="lower left", fontsize=9)
@@ -94,7 +97,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
     >>> ax = plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
     """
     ax = axes_or_new(ax)
-    ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest)
+    ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest, dtype=bool)
     ax.axvspan(ratio.min() / 1.15, 1.0, color="#DDE3EA", lw=0)
     ax.axvline(1.0, color=NEUTRAL, lw=1.0)
     dots: dict[str, Any] = {"mfc": "none", "mec": AFTER, "mew": 1.4, "ms": 7}

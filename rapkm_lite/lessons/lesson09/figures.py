@@ -32,7 +32,7 @@ def plot_clipping(free, clipped, limit, axes=None):
     axes[0].margins(y=0.2)
     axes[0].legend(ncols=free.robot.n_arms, loc="upper center")
     for run, label, colour in ((clipped, "clipped", BEFORE), (free, "without limits", AFTER)):
-        error = np.linalg.norm(run.x - run.trajectory.x, axis=-1)
+        error = np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         axes[1].plot(run.t, 1e3 * error, color=colour, label=label)
     axes[1].set(xlabel="time in s", ylabel="error in mm", title="what becomes of the path")
     axes[1].legend(loc="upper right")

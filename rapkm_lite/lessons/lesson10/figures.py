@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import BoundaryNorm
 
+from ...figures._shared import with_looks
 from ...figures.machine import plane_axes
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
@@ -95,7 +96,7 @@ def plot_saturation(limit, shifts, ax=None):
     >>> ax = plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
     """
     ax = axes_or_new(ax, figsize=(6.6, 3.4))
-    for (label, shift), colour, mark in zip(shifts.items(), (ALARM, AFTER, BEFORE), "os^", strict=False):
+    for (label, shift), (colour, mark) in with_looks("shifts", shifts, ((ALARM, "o"), (AFTER, "s"), (BEFORE, "^"))):
         ax.semilogy(1e3 * np.asarray(limit), 1e3 * np.asarray(shift), color=colour, marker=mark, ms=4.5, label=label)
     ax.set(xlabel="torque limit of each drive in mN m", ylabel="largest shift by the limit in mm")
     ax.legend(loc="upper right")
@@ -112,7 +113,7 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.4))
     looks = (("#CCCCCC", "-"), (ALARM, "-"), (AFTER, (0, (5, 1.2))), (ALARM, (0, (1.5, 1.2))), (NEUTRAL, "-"))
-    for k, ((label, run), (colour, dash)) in enumerate(zip(runs.items(), looks, strict=False)):
+    for k, ((label, run), (colour, dash)) in enumerate(with_looks("runs", runs, looks)):
         off = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         ax.semilogy(run.t, np.maximum(off, least), color=colour, ls=dash, lw=1.5 if k else 5.0, label=label)
     ax.set(xlabel="time in s", ylabel="distance from the path in mm", xlim=(0, None))

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import effective_gain
+from ...figures._shared import with_looks
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.dynamics import orthogonal_complement
 
@@ -26,7 +27,7 @@ def plot_loop_frequencies(t, frequencies, nominal, ax=None):
     >>> ax = plot_loop_frequencies(np.linspace(0, 1, 5), {"PD": np.full((5, 2), [4.0, 6.0])}, 5.0)
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.6))
-    for (label, both), look in zip(frequencies.items(), _LOOKS, strict=False):
+    for (label, both), look in with_looks("frequencies", frequencies, _LOOKS):
         low, high = np.sort(both, axis=-1).T
         ax.fill_between(t, low, high, color=look["color"], alpha=0.1, lw=0)
         ax.plot(t, low, color=look["color"], ls=look["ls"], label=label)
@@ -41,7 +42,7 @@ def plot_law_bands(names, columns, axes=None):
     """Medians and the middle 80 % of many runs, one row for each law.
 
     names : of the laws.  columns : dict of axis label -> list of samples, one array for each law; the axes are
-    logarithmic where the samples spread over more than a factor of ten.  Returns the axes.
+    logarithmic where the samples are positive and spread over more than a factor of ten.  Returns the axes.
 
     >>> ax = plot_law_bands(["PD"], {"energy in J": [[4.0, 5.0]], "error in mm": [[0.5, 1.0]]})
     """
@@ -53,9 +54,9 @@ def plot_law_bands(names, columns, axes=None):
         ax.hlines(rows, low, high, color=AFTER, lw=5, alpha=0.4)
         ax.plot(middle, rows, "o", color=AFTER, ms=6)
         ax.set(xlabel=label, yticks=rows, yticklabels=names, ylim=(rows[-1] - 0.6, 0.6))
-        if high.max() > 10 * low.min():
+        if high.max() > 10 * low.min() > 0:
             ax.set_xscale("log")
-        else:
+        elif low.min() >= 0:
             ax.set_xlim(0, 1.08 * high.max())
     return axes
 
@@ -94,15 +95,15 @@ def plot_effective_gain(trajectory, K, ax=None):
 
 
 def plot_step_response(t, measured: dict, predicted: dict, ax=None):
-    """Simulated lines and predicted points (every 25th sample) of a deviation in mm, by label.
+    """Simulated lines and predicted points (every 25th sample) of a deviation (k,) in m, by label.
 
-    >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1.0, 0.4, 0.1]}, {"theory": [1.0, 0.4, 0.1]})
+    >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1e-3, 4e-4, 1e-4]}, {"theory": [1e-3, 4e-4, 1e-4]})
     """
     ax = axes_or_new(ax)
     marks = (("o", AFTER), ("s", AFTER), ("x", ALARM))
-    for (label, y), line in zip(measured.items(), ("-", "--", ":"), strict=False):
+    for (label, y), line in with_looks("measured", measured, ("-", "--", ":")):
         ax.plot(t, 1e3 * np.asarray(y), line, color=AFTER, label=f"simulated, {label}")
-    for (label, y), (marker, colour) in zip(predicted.items(), marks, strict=False):
+    for (label, y), (marker, colour) in with_looks("predicted", predicted, marks):
         look = {"color": colour, "mfc": "white", "ms": 5}
         ax.plot(t[::25], 1e3 * np.asarray(y[::25]), marker, label=f"predicted, {label}", **look)
     ax.axhline(0.0, color=NEUTRAL, lw=0.8)

@@ -13,7 +13,7 @@ from ...mechanics.dynamics import minimal_dynamics
 from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import triangle
 from ...simulation.runs import simulate
-from ..answers import Ended, given
+from ..answers import Ended, given_law
 from ..checker import Case, Measured
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
@@ -98,7 +98,7 @@ def duties() -> tuple:
 
 def chosen(answer) -> Any:
     """The law that the student's function chooses for the testbed."""
-    law = given(answer, (duties()[0],))
+    law = given_law(answer, duties()[0])
     if not callable(law) and not hasattr(law, "step"):
         raise Ended("wrong", f"a law is wanted, not {type(law).__name__}: return one of the laws of rk, or a function")
     return law

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import with_looks
 from ...figures.marks.stored import mathtext
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 from . import four_rrr
@@ -68,7 +69,7 @@ def plot_length_choice(lengths, conditions: dict, special, ax=None):
     >>> ax = plot_length_choice([0.1, 1.0], {"centre": [1.0, 7.0]}, ("platform", 0.14))
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
-    for (label, condition), look in zip(conditions.items(), ("-", "--", ":"), strict=False):
+    for (label, condition), look in with_looks("conditions", conditions, ("-", "--", ":")):
         ax.loglog(lengths, condition, look, color=AFTER, label=label)
     words, length = special
     ax.axvline(length, color=ALARM, ls=":", label=words)
