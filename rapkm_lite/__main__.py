@@ -39,6 +39,9 @@ def _grade(options) -> None:
     from .lessons.grading.grader import grade
     from .lessons.grading.tables import bar, check_place, write_csv
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
+            stream.reconfigure(errors="backslashreplace")
     if options.csv:
         check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
@@ -54,8 +57,6 @@ def _tell_grades(folder: Path, grades) -> None:
     from .lessons.grading.submission import surpassed, unnamed
     from .lessons.grading.tables import by_exercise, by_student
 
-    if isinstance(sys.stdout, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
-        sys.stdout.reconfigure(errors="backslashreplace")
     print(by_exercise(grades), by_student(grades), sep="\n\n")
     known = {name[:2] for name in exercises()}
     if others := surpassed(folder, known, {grade.file for grade in grades}):

@@ -490,6 +490,38 @@ def test_a_dead_drive_shows_no_gain_with_which_its_torques_could_be_read():
         rk.calibrate(FRICTIONLESS, dead, use="torques")
 
 
+def test_friction_before_a_sensor_is_no_part_of_the_gain():
+    """All torques aside by the same: the line has the gain as its slope, and the note says what the offsets show."""
+    off, on = (rk.calibrate(FRICTIONLESS, log_behind_friction([side]), use="torques") for side in (0.0, 1.0))
+    assert_allclose(on.K_P, off.K_P, rtol=1e-4)
+    said = [float(number) for number in re.findall(r"its offset by ([+-][\d.]+) mrad", on.note)]
+    assert_allclose(said, 1e3 * (on.offset - off.offset), rtol=0.02)
+
+
+def test_a_machine_without_offsets_shows_no_gain():
+    """Its drives stand where they should, but for rounding, or for what is left of the motion."""
+    holds = [rk.hold(FRICTIONLESS, x, 1.0) for x in ([0.1, 0.0], [-0.05, 0.08], [-0.08, -0.06], [0.03, 0.02])]
+    path = rk.polygon(FRICTIONLESS, 0.1 * np.array([[1, 0], [1, 0], [-0.5, 0.8], [-0.5, 0.8]]), duration=6.0)
+    for paths in (holds, [path]):
+        logs = [rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), one).log() for one in paths]
+        found = rk.calibrate(FRICTIONLESS, logs)
+        assert found.K_P is None and np.abs(found.offset).max() < 1e-6
+        with pytest.raises(ValueError, match="K_P = None, and no rest shows it"):
+            rk.calibrate(FRICTIONLESS, logs, use="torques")
+
+
+def test_torques_of_the_opposite_sign_are_said_to_be_so():
+    log = log_behind_friction([0.0])
+    turned = rk.Log("turned", log.t, log.q_a, log.q_a_desired, -log.c)
+    with pytest.raises(ValueError, match=r"the rests show K_P\[0\] = -7\.05\d*; allowed: > 0, so torques"):
+        rk.calibrate(FRICTIONLESS, turned, use="torques")
+
+
+def test_rests_without_noise_have_no_steps():
+    found = rk.calibrate(FRICTIONLESS, log_behind_friction([0.0]), use="torques")
+    assert "the steps of the readings" not in found.note
+
+
 def test_small_torques_say_what_large_ones_say():
     """Offsets and errors of angles have no unit of torque, whose errors weigh the rests against each other."""
     log = log_behind_friction([1.0])

@@ -10,7 +10,7 @@ import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED
 from rapkm_lite.mechanics.actuation import distal_cross_products, drive_pairs
 from rapkm_lite.simulation.explain import _difference
-from rapkm_lite.simulation.growth import growth, magnified, swinging
+from rapkm_lite.simulation.growth import growth, magnified, swinging, swung
 from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
@@ -379,6 +379,12 @@ def test_a_healthy_loop_that_flies_apart_after_a_fault_is_not_called_unstable(pa
 def test_a_loop_that_swung_before_a_fault_is_called_unstable():
     for broken in (rk.DeadDrive(0, 0.02), rk.OffsetJump(1, 0.02, 1e-4), rk.TorqueLimit(1e6)):
         assert "unstable gain" in lost(law=stiff, path=HOLD, offset=OFFSET, faults=[broken])
+
+
+def test_a_run_of_few_samples_swings_within_these():
+    assert "within 2 samples of 0.001 s and grew 2-fold" in swung((-2.0) ** np.arange(2)[:, None], 1e-3)
+    with np.errstate(all="raise"):
+        assert swinging(1e150 * (-1e100) ** np.arange(2)[:, None]) == pytest.approx(1e100)
 
 
 def test_fewer_than_two_torques_do_not_swing():

@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import rapkm_lite as rk
 from rapkm_lite.checks import Case, Exercise, Measured, check, draw_own, examine, exercises, hint
 from rapkm_lite.lessons import checker
 from rapkm_lite.lessons.judging import judged
@@ -19,6 +20,66 @@ def cases(rng):
 
 def plane(v):
     return np.array([[2.0, 1.0], [0.5, 3.0]]) * v
+
+
+def damped(power):
+    """The filtered command by a projection that is damped, so right to the less digits the larger the damping."""
+
+    def command(A, K_P, q, q_d):
+        B = K_P[:, None] * A
+        return q - B @ np.linalg.solve(B.T @ B + 10.0**power * np.eye(2), B.T @ (q - q_d))
+
+    return command
+
+
+def test_a_more_accurate_answer_has_no_worse_a_verdict():
+    """Where the deviation passes and the law, which has other units, does not yet, an answer is close."""
+    order = ["ok", "close", "wrong"]
+    words = [order.index(judged(exercises()["04.filtered_command"], damped(power)).word) for power in range(-12, 2)]
+    assert words[0] == 0 and words == sorted(words) and set(words[:8]) == {0, 1}
+
+
+@pytest.mark.parametrize("name", ["05.dead_encoder", "11.one_law"])
+def test_a_law_that_knows_the_true_pose_is_no_answer(name):
+    found = judged(exercises()[name], lambda robot: rk.AntagonismFilter(rk.CTC(400.0, 40.0, None, pose="true")))
+    assert found.word == "wrong" and "the true pose" in found.sentence
+
+
+@pytest.mark.parametrize("name", ["02.guaranteed_force", "06.expected_cost", "10.force_left", "11.gain_for_bandwidth"])
+def test_a_number_with_the_wrong_sign_in_some_cases_is_told_so(name):
+    right, asked = exercises()[name].reference, []
+
+    def answer(*case):
+        asked.append(case)
+        return right(*case) * (-1) ** len(asked)
+
+    assert "in some cases the sign is opposite" in judged(exercises()[name], answer).sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "answer"),
+    [
+        ("02.input_singularity", lambda mode: np.array([1e99, 0.0])),
+        ("02.input_singularity", lambda mode: np.array([1e199, 0.0])),
+        ("05.feedback_map", lambda *case: 1e200 * np.ones((3, 2))),
+        ("03.offsets", np.broadcast_to(0.0, (10**7, 10**7))),
+    ],
+)
+def test_answers_of_no_machine_are_wrong_and_stop_nothing(name, answer):
+    assert judged(exercises()[name], answer).word == "wrong"
+
+
+def test_an_object_is_judged_as_it_is_now():
+    class Solver:
+        chosen = np.zeros(2)
+
+        def __call__(self, robot, offset):
+            return self.chosen if self.chosen is not None else exercises()["06.placement"].reference(robot, offset)
+
+    solver = Solver()
+    assert judged(exercises()["06.placement"], solver).word == "wrong"
+    solver.chosen = None
+    assert judged(exercises()["06.placement"], solver).word == "ok"
 
 
 VECTOR = Exercise(scaled, ("a", "b", "c"), "N m", cases, close=0.02, improve="more steps")

@@ -307,3 +307,67 @@ def test_lists_are_arrays_and_curves_may_have_gaps():
     plotting.plot_demand([0.0, 0.5, 1.0], [0.1, 0.0, 0.1], {"equal": [0.5]})
     plotting.plot_gain_curve([1.0, 7.0, 9.0], [2.0, np.nan, 4.0], [2.0, 2.1, 2.2], [0.2, 3.0, 4.0])
     plotting.plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
+
+
+def test_a_rest_is_told_by_flags_of_any_kind():
+    for flags in ([True, False, True], [1, 0, 1], np.array([1.0, 0.0, 1.0])):
+        rest, none = plotting.plot_chatter([0.5, 2.0, 0.7], [0.0, 40.0, 1.0], flags).lines[1:3]
+        assert rest.get_xdata().tolist() == [0.5, 0.7] and none.get_xdata().tolist() == [2.0]
+
+
+@pytest.mark.parametrize("x", [[0.0, 0.0], [0.01, 0.02]])
+def test_lines_that_are_nearly_parallel_frame_no_picture(x):
+    four = rk.load("four_arms")
+    q = rk.inverse_kinematics(four, x)
+    ax = plotting.plot_disagreement(four, q, [4e-3, -2e-3, 5e-3, 0.0], 7.05)
+    assert np.ptp(ax.get_xlim()) < 10.0
+
+
+def test_pictures_of_lost_runs_show_all_that_there_is(world):
+    whole, path = world["run"], world["path"]
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(world["robot"], rk.CTC(400.0, 40.0), path, OFFSET)
+    lost = caught.value.partial
+    for runs in ({"PD": whole, "lost": lost}, {"lost": lost, "PD": whole}):
+        assert plotting.plot_torque_norms(runs).get_xlim() == (0.0, path.t[-1])
+    assert plotting.plot_torques_and_errors(lost, pair=(0, 1))[0].lines
+    error = plotting.plot_clipping(whole, lost, 0.1)[1].lines[0].get_ydata()
+    np.testing.assert_allclose(error, 1e3 * lost.path_error)
+
+
+def test_a_move_takes_the_short_way_round(world):
+    """At the left of the workspace a base angle passes half a turn."""
+    start, stop = [-0.15, 0.0], [-0.15, 0.06]
+    line = plotting.plot_joint_moves(world["robot"], start, stop, [0.015, 0.03], [2e-3, 7e-3], 5e-3)[0].lines[1]
+    np.testing.assert_allclose([line.get_xdata()[-1], line.get_ydata()[-1]], [-150.0, 60.0], atol=1e-6)
+
+
+def test_bands_of_samples_that_are_not_positive_have_a_linear_axis():
+    samples = {"a": [[0.0, 0, 0], [1.0, 2, 3]], "b": [[-1.0, -2, -3], [1, 2, 3]], "c": [[1.0, 1, 1], [20.0, 30, 40]]}
+    axes = plotting.plot_law_bands(["one", "two"], samples)
+    assert [ax.get_xscale() for ax in axes] == ["linear", "linear", "log"]
+    assert all(ax.get_xlim()[0] <= min(ax.lines[0].get_xdata()) for ax in axes)
+
+
+@pytest.mark.parametrize("times", [0.1, 3.0])
+def test_a_machine_of_another_size_is_in_the_same_frame(world, times):
+    robot = world["robot"]
+    other = robot.replace(base=times * robot.base, lengths=times * robot.lengths, masses=0.1)
+    for plot in (
+        lambda r: plotting.plot_feedback_map(r, (0, 1), n=21),
+        lambda r: plotting.plot_partition_rules(r, n=21)[0],
+    ):
+        np.testing.assert_allclose(plot(other).get_xlim(), times * np.array(plot(robot).get_xlim()))
+    ax = plotting.plot_pair_measures(rk.triangle(other, 0.12 * times))
+    assert ax.get_ylim()[0] < ax.lines[-1].get_ydata().min() < ax.lines[-1].get_ydata().max() < ax.get_ylim()[1]
+
+
+def test_places_at_the_rim_are_seen(world):
+    ax = plotting.plot_places(world["robot"], {"low": [[0.0, -0.12]], "left": [[-0.15, 0.05]]})[1]
+    for line in ax.lines[:2]:
+        assert ax.get_xlim()[0] < line.get_xdata().min() and ax.get_ylim()[0] < line.get_ydata().min()
+
+
+def test_what_cannot_be_told_apart_is_refused():
+    with pytest.raises(ValueError, match="samples has 3 entries; allowed: up to 2"):
+        plotting.plot_bands({"a": [3.0, 5.0], "b": [1.0, 2.0], "c": [7.0, 8.0]})

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 from pathlib import Path
 
@@ -216,6 +217,43 @@ def test_what_a_notebook_runs_is_read(tmp_path, words):
     body = words + TORQUES if words.startswith("%%") else TORQUES + words
     write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", checked([body, *RIGHT[1:]]))
     assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "one = np.zeros(1)\nnp.copyto(one, 1.0)\n",
+        "one = np.zeros(1)\n\ndef put(where, what):\n    where[0] = what\n\nput(one, 1.0)\n",
+        "other = np.zeros(1)\none = other\nother[0] = 1.0\n",
+        "def begin():\n    global one\n    one = [1.0]\n\nbegin()\n",
+        "class Box:\n    pass\n\nbox = Box()\nsetattr(box, 'one', 1.0)\none = [box.one]\n",
+        "def make():\n    return [1.0]\n\n%time one = make()\n",
+    ],
+)
+def test_all_that_an_answer_needs_is_run(tmp_path, before):
+    """Changed by a function, under another name, as a global: where an answer fails, everything is run."""
+    body = TORQUES.replace("return A", "return one[0] * A")
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [SETUP, before, *checked([body, *RIGHT[1:]])[1:]])
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and such names need another file system")
+def test_one_odd_submission_does_not_cost_the_others(tmp_path, capsys):
+    """A link to nothing, a folder that is a link or holds itself, a name and a message that are no text."""
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", checked(RIGHT))
+    crash = "def filtered_torques(A, c):\n    raise ValueError('bad \\udcff')\n"
+    write(tmp_path / os.fsdecode(b"M\xfcller") / "04_antagonism_filter_energy.ipynb", checked([crash, *RIGHT[1:]]))
+    (tmp_path / "ben").mkdir()
+    (tmp_path / "ben" / "04_x.ipynb").symlink_to("/nowhere/04_x.ipynb")
+    write(tmp_path.parent / f"{tmp_path.name}_real" / "04_y.ipynb", checked(RIGHT))
+    (tmp_path / "cleo").symlink_to(tmp_path.parent / f"{tmp_path.name}_real")
+    (tmp_path / "ada" / "again").symlink_to(tmp_path)
+    file = tmp_path / "grades.csv"
+    assert main(["grade", str(tmp_path), "--csv", str(file)]) == 0
+    with file.open(newline="", encoding="utf-8") as lines:
+        points = [float(row["points"]) for row in csv.DictReader(lines) if row["exercise"] in NAMES]
+    assert len(points) == 12 and sum(p > 0 for p in points) == 3 + 2 + 0 + 3
+    assert "cleo" in capsys.readouterr().out
 
 
 def test_what_a_check_says_of_no_answer_stays(tmp_path):
