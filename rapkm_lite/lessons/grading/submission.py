@@ -151,6 +151,12 @@ def _imported(all_of_them: list[Statement]) -> set[str]:
     return {alias.asname or alias.name.partition(".")[0] for alias in aliases}
 
 
+def _touched(call: ast.Call) -> set[str]:
+    """Names that a call for its effect may change: np.copyto(a, b) changes a, and print(a) does not."""
+    given = call.args if _base(call) not in _BUILT_IN - {"setattr", "delattr"} else []
+    return {_base(one) for one in (call, *given)}
+
+
 def _changes(node: ast.stmt) -> set[str]:
     """Names that a statement binds or may change."""
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
@@ -165,9 +171,7 @@ def _changes(node: ast.stmt) -> set[str]:
         elif isinstance(part, ast.Attribute | ast.Subscript) and isinstance(part.ctx, ast.Store):
             names.add(_base(part))
         elif isinstance(part, ast.Expr) and isinstance(part.value, ast.Call):
-            # As np.copyto(a, b) changes a, a call for its effect may change what it is given; print(a) does not.
-            given = part.value.args if _base(part.value) not in _BUILT_IN - {"setattr", "delattr"} else []
-            names |= {_base(one) for one in (part.value, *given)}
+            names |= _touched(part.value)
         elif isinstance(part, ast.FunctionDef | ast.ClassDef):
             names.add(part.name)
     return names - _BUILT_IN  # print(...) does not change print
