@@ -174,20 +174,7 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         # A sample on the wrong assembly holds the unknowns where it fits there: those in doubt wait for the others.
         with suppress(ValueError):
             p = _minimum(robot, angles[sure], basis, p, p, x[sure], blur, enough=1e-3)[0]
-    refusal: CalibrationError | None = None
-    for courage in (0, 1, 2):
-        try:
-            found = _minimum(robot, angles, basis, nominal[:count], p, x, blur, courage=courage)
-            break
-        except CalibrationError as error:
-            refusal = error if courage < 2 else refusal
-        except ValueError:
-            if refusal is None:
-                raise
-    else:
-        assert refusal is not None
-        raise refusal from None
-    p, machine, x, left, sigma, Vt = found
+    p, machine, x, left, sigma, Vt = _searched(robot, angles, basis, nominal[:count], p, x, blur)
     spare, total = len(left) - len(sigma), float(left @ left) * len(angles)
     spread = math.sqrt(total / spare) if spare else 0.0
     used = max(spread, step) if noise is None else noise
@@ -215,6 +202,22 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
         corrected=machine,
         note="; ".join(notes),
     )
+
+
+def _searched(*given):
+    """As `_minimum`, with more courage where it is refused; the refusal is that of the more cautious searches."""
+    try:
+        return _minimum(*given)
+    except CalibrationError as error:
+        refusal = error
+    for courage in (1, 2):
+        try:
+            return _minimum(*given, courage=courage)
+        except CalibrationError as error:
+            refusal = error if courage == 1 else refusal
+        except ValueError:
+            continue
+    raise refusal
 
 
 def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
