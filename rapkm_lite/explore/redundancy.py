@@ -70,8 +70,8 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     times = size(robot)
     # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.
     A = control_matrix(robot, inverse_kinematics(robot, marks.clamped(robot, robot.base.mean(axis=0))))
-    least = singular_values(A)[1] * 0.085 > 0.05 / times
-    reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max() if least else 0.0
+    able = singular_values(A)[1] * 0.085 > 0.05 / times
+    reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max() if able else 0.0
     first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {

@@ -17,9 +17,9 @@ def scaled_frame(robot, left: float, right: float, low: float, high: float) -> d
     >>> scaled_frame(testbed.replace(base=3 * testbed.base, lengths=0.6), -0.21, 0.21, -0.19, 0.25)["xlim"]
     (-0.63, 0.63)
     """
-    edges = [np.reshape(sampling_box(machine), (2, 2)) for machine in (load(), robot)]
-    (from_, size), (to, other) = ((box.mean(axis=1), np.ptp(box, axis=1).max()) for box in edges)
-    corners = to + (np.array([[left, low], [right, high]]) - from_) * other / size
+    testbed, own = (np.reshape(sampling_box(machine), (2, 2)) for machine in (load(), robot))
+    times = np.ptp(own, axis=1).max() / np.ptp(testbed, axis=1).max()
+    corners = own.mean(axis=1) + times * (np.array([[left, low], [right, high]]) - testbed.mean(axis=1))
     x, y = corners.round(12).T.tolist()
     return {"xlim": tuple(x), "ylim": tuple(y)}
 
