@@ -82,6 +82,11 @@ def test_an_object_is_judged_as_it_is_now():
     assert judged(exercises()["06.placement"], solver).word == "ok"
 
 
+@pytest.mark.parametrize("name", ["04.lean_law", "09.quiet_gears", "11.one_law"])
+def test_a_class_is_no_design(name):
+    assert "the answer is the class PD" in judged(exercises()[name], rk.PD).sentence
+
+
 VECTOR = Exercise(scaled, ("a", "b", "c"), "N m", cases, close=0.02, improve="more steps")
 MATRIX = Exercise(plane, ("a", "b", "c"), "m", lambda rng: [(v,) for v in rng.uniform(1, 2, 4)])
 FRAME = Exercise(lambda v: 2.0 * v[::-1], ("a", "b", "c"), "m", lambda rng: [(v,) for v in rng.normal(size=(5, 2))])

@@ -693,6 +693,16 @@ def test_a_second_view_is_told_everything_again():
     assert fixed["kind"] == "fixed" and picture["images"] and picture["styles"]
 
 
+@pytest.mark.parametrize("times", [0.3, 3.0, 6.0])
+def test_forces_begin_with_one_that_the_drives_can_make(times):
+    testbed = rk.load()
+    robot = testbed.replace(base=times * testbed.base, lengths=times * testbed.lengths, friction=0.0)
+    explorer = explore.allocation(robot)
+    assert explorer.problem == "" and explorer.values["f_y"] > 0.0
+    beyond = rk.Manipulator(base=[[-0.15, 0.0], [0.15, 0.0], [0.0, 0.0]], lengths=[0.25, 0.3], masses=[0.1, 0.2])
+    assert explore.allocation(beyond).values["f_y"] == 0.0
+
+
 def test_controls_snap_to_their_steps():
     slider = explore.slider("offset 1 in mrad", -20.0, 20.0, 0.5, 5.0)
     assert snap(slider, 3.14) == 3.0 and snap(slider, 99.0) == 20.0 and moved(slider, -3) == 3.5

@@ -369,5 +369,5 @@ def test_places_at_the_rim_are_seen(world):
 
 
 def test_what_cannot_be_told_apart_is_refused():
-    with pytest.raises(ValueError, match="samples has 3 entries; allowed: up to 2"):
+    with pytest.raises(ValueError, match="samples has 3 entries; allowed: 1 to 2"):
         plotting.plot_bands({"a": [3.0, 5.0], "b": [1.0, 2.0], "c": [7.0, 8.0]})

@@ -158,6 +158,13 @@ def test_only_what_the_answers_need_is_run():
     assert {"1.0", "2.0", "3.0"} <= chosen and not {"1.1", "1.2"} & chosen
 
 
+def test_pictures_are_not_drawn():
+    texts = ["robot = rk.load()\n", "plotting.plot_machine(robot, q)\nexplore.machine(robot)\ndisplay(robot)\n", *RIGHT]
+    texts.append("np.copyto(robot.x, 1.0)\nanswer = robot\n")
+    chosen = [s.key for s in needed(statements(texts)[0], {"answer"})]
+    assert not {"1.0", "1.1", "1.2"} & {*chosen} and {"0.0", "5.0", "5.1"} <= {*chosen}
+
+
 def test_names_of_a_function_are_its_own():
     texts = [
         "scale = 2\nrows = 1 / 0\nprint(rows)\nx = 3\n",

@@ -337,6 +337,9 @@ def test_what_a_question_is_about_is_said_with_it():
     (slide,) = [s for s in deck.slides(lesson_with(nbformat.v4.new_markdown_cell(cell))) if s.kind == "question"]
     assert "All links are longer" in slide.page() and "First." not in slide.page()
     assert "all links are 1 % longer" in teaching.predictions_page()
+    quoted = cell.replace("All links", "> All links")
+    (slide,) = [s for s in deck.slides(lesson_with(nbformat.v4.new_markdown_cell(quoted))) if s.kind == "question"]
+    assert "longer" not in slide.page()
 
 
 def lesson_with(*cells):

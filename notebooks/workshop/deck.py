@@ -159,7 +159,7 @@ class _Deck:
             self.slides[-1].parts.append(rendered(block))
             self.fresh, self.left_out = False, ""
         else:
-            self.left_out = block
+            self.left_out = "" if block.startswith(">") else block
 
     def _belongs(self, block: str) -> bool:
         """Formulas, lists and tables stay on the slides of title and sections."""
@@ -167,6 +167,7 @@ class _Deck:
         return kind in ("title", "section") and bool(re.match(r"\$\$|[-*\d|]|.*\n\$\$", block)) and len(block) < 900
 
     def code(self, cell: nbformat.NotebookNode) -> None:
+        self.left_out = ""
         if HIDDEN in cell.metadata.get("tags", []):
             if self.asked and (part := closed(cell)):
                 self.answer(part)

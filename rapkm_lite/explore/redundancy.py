@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache, partial
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..lessons.lesson08.tasks import counted, ring
 from ..lessons.lesson09.figures import shortest_reach
 from ..lessons.lesson09.tasks import one_sign, smallest
 from ..machine.manipulator import Manipulator
-from ..mechanics.actuation import control_matrix, prestress_projector, singular_values
+from ..mechanics.actuation import control_matrix, prestress_projector
 from ..mechanics.calibration import CalibrationError, calibrate
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
@@ -69,10 +70,11 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
 
     times = size(robot)
     # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.
-    A = control_matrix(robot, inverse_kinematics(robot, marks.clamped(robot, robot.base.mean(axis=0))))
-    able = singular_values(A)[1] * 0.085 > 0.05 / times
-    reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max() if able else 0.0
-    first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
+    first = 0.0
+    with suppress(ValueError):  # where the middle is out of reach, or the drives let go
+        A = control_matrix(robot, inverse_kinematics(robot, robot.base.mean(axis=0)))
+        reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
+        first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},

@@ -25,11 +25,11 @@ def scaled_frame(robot, left: float, right: float, low: float, high: float) -> d
 
 
 def with_looks(name: str, entries: dict, looks) -> Iterator[tuple]:
-    """((label, value), look) for each entry; ValueError where there are more of them than looks to tell them apart.
+    """((label, value), look) for each entry; ValueError where there is none, or more than looks to tell them apart.
 
     >>> list(with_looks("runs", {"PD": 1.0}, ("-", "--")))
     [(('PD', 1.0), '-')]
     """
-    if len(entries) > len(looks):
-        raise ValueError(f"{name} has {len(entries)} entries; allowed: up to {len(looks)}, which can be told apart")
+    if not 0 < len(entries) <= len(looks):
+        raise ValueError(f"{name} has {len(entries)} entries; allowed: 1 to {len(looks)}, which can be told apart")
     return zip(entries.items(), looks, strict=False)

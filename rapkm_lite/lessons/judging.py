@@ -233,7 +233,7 @@ def _design(exercise: Exercise, answer: Any) -> Any:
         raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     if callable(answer):
         # A judge may ask a design again for the same place; another check asks anew, whatever has become of it.
-        return Answer(answer)
+        return answer if isinstance(answer, type) else Answer(answer)
     return fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
 
 

@@ -36,21 +36,30 @@ class Rests(NamedTuple):
     def fit(self, i: int, *columns) -> tuple[np.ndarray, np.ndarray] | None:
         """Coefficients b, and their covariance, of the torque -b[0] e + b[1] column + ... of drive i at error e.
 
-        Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more.
-        None where the columns, each (k,), do not determine them.
+        Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more;
+        of few rests it is not sure how much, and five standard deviations are as sure as Student's t at a thousandth.
+        None where the columns, each (k,), do not determine them with a rest to spare.
         """
         design = np.stack([self.desired[:, i] - self.q_a[:, i], *columns], axis=-1)
         weighted = design.T * self.records
         information = weighted @ design
-        size = np.sqrt(np.diagonal(information))
-        if not size.all() or np.linalg.cond(information / np.outer(size, size)) > 1e10:
+        size, spare = np.sqrt(np.diagonal(information)), len(design) - design.shape[1]
+        if spare < len(columns) or not size.all() or np.linalg.cond(information / np.outer(size, size)) > 1e10:
             return None
         b = np.linalg.solve(information, weighted @ self.c[:, i])
-        left, spare = self.c[:, i] - design @ b, len(design) - len(b)
+        left = self.c[:, i] - design @ b
         both = np.array([1.0, b[0]])
         noise = np.mean(both @ self.noise[:, i] @ both)
-        scatter = self.records @ left**2 / spare if spare else 0.0
-        return b, np.linalg.inv(information) * max(noise, scatter)
+        if spare:
+            noise = max(noise, self.records @ left**2 / spare * max(1.0, _student(spare) / 5.0) ** 2)
+        return b, np.linalg.inv(information) * noise
+
+
+def _student(freedom: int) -> float:
+    """The quantile of Student's t beyond which lies a thousandth, on both sides."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.9995))
 
 
 class Gain(NamedTuple):

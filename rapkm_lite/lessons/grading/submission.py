@@ -112,7 +112,7 @@ def sources(path: Path) -> list[str]:
 
 
 def _plain(text: str) -> str:
-    """The source of a cell in plain Python, line for line."""
+    """The source of a cell in plain Python."""
     text = re.sub(r"\A(\s*)%%.*$", r"\1pass", text, flags=re.M)
     try:
         ast.parse(text)
@@ -217,7 +217,8 @@ def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
     names, kept = _with_bodies(wanted, bodies), []
     for statement in reversed(all_of_them):
         node = statement.node
-        changed = _changes(node) - (outside if _only_calls(node) else set())
+        shown = _only_calls(node) and _base(node.value) in ("plotting", "explore", "display")
+        changed = set() if shown else _changes(node) - (outside if _only_calls(node) else set())
         if isinstance(node, ast.Import | ast.ImportFrom) or _asks(node) or changed & names:
             kept.append(statement)
             if isinstance(node, ast.Assign):  # what the name held before does not matter
