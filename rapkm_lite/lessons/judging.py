@@ -233,7 +233,9 @@ def _design(exercise: Exercise, answer: Any) -> Any:
         raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     if callable(answer):
         # A judge may ask a design again for the same place; another check asks anew, whatever has become of it.
-        return answer if isinstance(answer, type) else Answer(answer)
+        # A class of the student's may make a law; one of the package is what was forgotten to be made.
+        ours = isinstance(answer, type) and answer.__module__.startswith("rapkm_lite.")
+        return answer if ours else Answer(answer)
     return fitting(numbers(answer), np.asarray(exercise.reference).shape)[()]
 
 

@@ -37,7 +37,7 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
         inside = reachable(robot, start + middle * (point - start))
         low, high = (middle, high) if inside else (low, middle)
     # A millimetre inside, where no arm is quite stretched.
-    return start + max(low - 1e-3 / np.linalg.norm(point - start), 0.0) * (point - start)
+    return start + max(low - 1e-3 / max(np.linalg.norm(point - start), 1e-300), 0.0) * (point - start)
 
 
 def singular_curves(robot: Manipulator, mode=None) -> dict:

@@ -217,7 +217,7 @@ def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
     names, kept = _with_bodies(wanted, bodies), []
     for statement in reversed(all_of_them):
         node = statement.node
-        shown = _only_calls(node) and _base(node.value) in ("plotting", "explore", "display")
+        shown = isinstance(node, ast.Expr) and _base(node.value) in ("plotting", "explore", "display")
         changed = set() if shown else _changes(node) - (outside if _only_calls(node) else set())
         if isinstance(node, ast.Import | ast.ImportFrom) or _asks(node) or changed & names:
             kept.append(statement)
