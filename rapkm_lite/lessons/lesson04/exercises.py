@@ -133,16 +133,16 @@ EXERCISES = {
         hints=(
             "Two torque vectors that give the same force at the end-effector differ only by antagonism. Which one of "
             "them has none?",
-            "Torques without antagonism are combinations of the columns of A, c_eff = A f. Two numbers f are unknown, "
+            "Torques without antagonism are combinations of the columns of A, c_eff = A z. Two numbers z are unknown, "
             "and the force gives two equations.",
-            "A^T A f = A^T c: f = np.linalg.solve(A.T @ A, A.T @ c), then A @ f.",
+            "A^T A z = A^T c: z = np.linalg.solve(A.T @ A, A.T @ c), then A @ z.",
         ),
         unit="N m",
         cases=lambda rng: [(A, rng.normal(0, 0.05, 3)) for A in _control_matrices(rng, 20)],
         invariant=_torque_law,
         tolerance=1e-10,
         close=3e-2,
-        improve="solve the two equations for f directly instead of searching for them",
+        improve="solve the two equations for z directly instead of searching for them",
         mistakes={
             "this is the complement, the antagonistic part of the torques: the filter keeps the rest, c minus this": (
                 lambda A, c: c - filtered_torques(A, c)
@@ -151,7 +151,7 @@ EXERCISES = {
                 lambda A, c: A @ (A.T @ c)
             ),
             "this is the force A^T c at the end-effector, not yet the torques": lambda A, c: A.T @ c,
-            "these are the two numbers f; the factor A is missing, c_eff = A f": (
+            "these are the two numbers z; the factor A is missing, c_eff = A z": (
                 lambda A, c: np.linalg.solve(A.T @ A, A.T @ c)
             ),
             "the columns of A are not at right angles: their parts cannot be added one by one": _one_by_one,

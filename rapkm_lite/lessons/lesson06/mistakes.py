@@ -175,11 +175,11 @@ MINIMA = {
     ),
     "this is the smallest entry of S, not its smallest eigenvalue": lambda S, size: size**2 * S.min(),
     "this is the mean cost over all directions; the least is wanted": _eigenvalues(lambda e, size: size**2 * e.mean()),
-    "this is the inverse of the smallest eigenvalue: its factor belongs above": _eigenvalues(
+    "the smallest eigenvalue divides here; it should multiply (its inverse is taken)": _eigenvalues(
         lambda e, size: size**2 / e[0]
     ),
     "these are the offsets; their energy is wanted": lambda S, size: size * np.linalg.eigh(S)[1][:, 0],
-    "this is a row of the eigenvectors, put in; they are the columns (transposed)": (
+    "a row of the matrix of eigenvectors is put in; the eigenvectors are its columns (transposed)": (
         lambda S, size: size**2 * (v := np.linalg.eigh(S)[1][0]) @ S @ v
     ),
     "these are all principal costs; the least is wanted": _eigenvalues(lambda e, size: size**2 * e),

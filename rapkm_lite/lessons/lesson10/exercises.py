@@ -67,7 +67,7 @@ EXERCISES = {
             "the fight is left out: this is the force of drives at peace": (
                 lambda A, fight, limit: float(np.min(limit / tasks.shares(A)))
             ),
-            "this is the strongest drive (max for min); what is left in every direction the weakest one decides": (
+            "this is the strongest drive (max for min); the weakest one decides what is left in every direction": (
                 lambda A, fight, limit: float(np.max((limit - np.abs(fight)) / tasks.shares(A)))
             ),
             "the absolute value is missing: a force comes with either sign, so does its torque": (

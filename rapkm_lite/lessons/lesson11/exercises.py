@@ -154,7 +154,7 @@ EXERCISES = {
         ),
         judge=tasks.three_duties,
         close=0.04,
-        improve="change the frequency of the loop by a tenth, up where the payload's error is short and down otherwise",
+        improve="change the frequency of the loop by a tenth: up if the error with the payload is too large, else down",
         points=10.0,
         mistakes={
             "a law that switches its pair: wherever it does, its torques jump, whatever the gains": (
