@@ -18,7 +18,7 @@ def _summary(options) -> None:
     from .simulation.compiled import without_compiler
     from .simulation.summary import as_text, summary
 
-    # Two runs are sooner done than compiled.
+    # Two runs take less time than the compiler.
     without_compiler()
     values = {"version": __version__} | summary()
     print(json.dumps(values, indent=2) if options.json else as_text(values))

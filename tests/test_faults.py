@@ -212,7 +212,7 @@ def test_a_run_knows_its_sensors_and_faults():
     assert run.faults == (rk.DeadDrive(0, 0.1),) and run.sensors == sensors
     assert run == rk.simulate(ROBOT, PD, PATH, sensors=sensors, faults=faults) == pickle.loads(pickle.dumps(run))
     assert run != rk.simulate(ROBOT, PD, PATH, sensors=sensors)
-    with pytest.raises(ValueError, match="allowed: one of both"):
+    with pytest.raises(ValueError, match="allowed: one of the two"):
         rk.simulate(ROBOT, PD, PATH, OFFSET, sensors=sensors)
 
 

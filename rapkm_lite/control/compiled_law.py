@@ -123,15 +123,15 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
     q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
-    read only: Python refuses to write into them, compiled code does it, for that sample.
+    read only: Python refuses writes into them, compiled code lets them through, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
     the sampling time of the path, which the function is not told, and which stay what they were at the first run.
     Where Python raises for plain numbers, as at 1.0 / 0.0 or math.sqrt(-1.0), compiled code goes on with infinity, NaN
     or, for whole numbers, which have 64 bits there, with 0.
-    Random numbers of `numpy.random` would be others in every run: noise belongs into an array, an entry per sample.
+    Random numbers of `numpy.random` would differ from run to run: noise belongs in an array, an entry per sample.
     It is compiled once in every session, in the first run, which takes some seconds: worth it for many runs.
-    Without Numba, and inside laws that run in Python, the function is called as it is; so it is to find out what it
-    raised, when it gave no finite torques, from the start of the run to there.
+    Without Numba, and inside laws that run in Python, the function is called as it is; where it gave no finite torques,
+    the run is repeated that way up to there, to find out what it raised.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.
 
     >>> import rapkm_lite as rk

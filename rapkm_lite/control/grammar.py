@@ -120,7 +120,7 @@ def as_law(law) -> Law:
 def begin(law, model: Manipulator, dt: float):
     """`start` of a law or callable, after a check that a run can call it.
 
-    Raises ValueError where a method of a user's law takes other arguments, or where no run would ask it.
+    Raises ValueError where a method of a user's law takes other arguments, or is one that no run would ask.
     """
     law = as_law(law)
     _check_asked(type(law))

@@ -17,7 +17,7 @@ from .grammar import UNASKED, LawLike, LawValue, as_law, ask, begin, coordinates
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PD(LawValue):
-    """Decentralized PD control (12), c = -K_P e - K_D ed, each drive for itself.
+    """Decentralized PD control (12), c = -K_P e - K_D ed, each drive on its own.
 
     K_P in N m/rad, K_D in N m s/rad: one number, one per drive (N,), or a positive definite (N, N).
     Raises ValueError when a gain is not positive.
@@ -64,7 +64,7 @@ class PID(LawValue):
     """PD (12) with the integral of the error, c = -(K_P e + K_D ed + K_I int e dt), cut off at +-limit.
 
     K_P, K_D : see `PD`.  K_I in N m/(rad s): likewise, zero allowed for a number or diagonal.
-    limit : largest torque in N m, one number or one per drive; its integral stands still while a drive is there.
+    limit : largest torque in N m, one number or one per drive; the integral of a drive stands still while it is there.
     Its memory is the integral (N,) in N m.
     Raises ValueError when a gain or the limit is out of range.
 

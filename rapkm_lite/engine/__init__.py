@@ -20,14 +20,14 @@ COMPILED = _WANTED and importlib.util.find_spec("numba") is not None
 
 @functools.cache
 def compiled() -> bool:
-    """Do kernels run compiled?  The first question imports Numba; one that does not import is named once."""
+    """Do kernels run compiled?  The first call imports Numba, and warns once where that fails."""
     if COMPILED:
         try:
             import numba
         except Exception as error:
             warnings.warn(
                 f"Numba is installed but does not import ({type(error).__name__}: {error}): runs go through plain "
-                "Python, slower, with the same numbers; RAPKM_LITE_NUMBA=0 leaves it alone",
+                "Python, slower, with the same numbers; RAPKM_LITE_NUMBA=0 does without it",
                 RuntimeWarning,
                 stacklevel=2,
             )

@@ -15,7 +15,7 @@ from numba.core.typing.context import Context
 from numba.extending import models, register_model
 
 IDLE = {"inline_closure_likes", "nopython_rewrites"}
-"""Passes over every line that look for what kernels do without: functions in functions, and expressions of arrays."""
+"""Passes over every line that look for what kernels do without: closures and array expressions."""
 
 
 class Operator(types.Function):
@@ -37,7 +37,7 @@ register_model(Operator)(models.OpaqueModel)
 
 
 class Rules(Context):
-    """Numba's rules of types, with operators that remember."""
+    """Numba's typing context, with operators that remember."""
 
     operators: ClassVar[dict] = {}
 

@@ -23,7 +23,7 @@ if COMPILED:
 
 
 # Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
-# Kernels write into arrays that they are given: without counts of who refers to them a sample takes up to a third less.
+# Kernels write into arrays that they are given: without reference counting a sample takes up to a third less.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 if COMPILED:
     _OPTIONS["pipeline_class"] = Wide
@@ -74,7 +74,7 @@ def kernel(function) -> Callable[..., Any]:
 
 
 def _forgiving(dispatcher):
-    """A cache that cannot be read or written (damaged, a full disk, rights that went) costs time, and no run."""
+    """A cache that cannot be read or written (damaged, a full disk, lost permissions) costs time, but no run."""
 
     def quiet(access):
         @functools.wraps(access)
@@ -87,7 +87,7 @@ def _forgiving(dispatcher):
         return tried
 
     def swept(*arguments):
-        """Save a kernel; those of earlier sources go, 24 MB of each, which nobody would ever read again."""
+        """Save a kernel, and delete those of earlier sources: 24 MB per version that nobody would ever read again."""
         for old in Path(cache.cache_path).glob(f"*_{'[0-9a-f]' * 12}-*.nb[ci]"):
             if _sources() not in old.name:
                 old.unlink(missing_ok=True)
@@ -100,7 +100,7 @@ def _forgiving(dispatcher):
 
 
 def leaf(function):
-    """Compile a function that only kernels call, and put it into each of them."""
+    """Compile a function that only kernels call, inlined into each of them."""
     return njit(forceinline=True, **_INNER)(function) if COMPILED else function
 
 
@@ -110,7 +110,7 @@ def view(function):
 
 
 def index(function):
-    """A `leaf` compiled once: for each whole number among its arguments that is a constant, Numba would do it anew."""
+    """A `leaf` compiled once: Numba would compile it anew for every constant integer among its arguments."""
     if not COMPILED:
         return function
     dispatcher = njit(forceinline=True, **_INNER)(function)

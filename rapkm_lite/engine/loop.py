@@ -77,7 +77,7 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
                 w[at(E, i, j, W, L)] = sensor.quantum * math.floor(w[at(E, i, j, W, L)] / sensor.quantum + 0.5)
         if len(faulty) > 0 and faults[(k * 4 + HELD) * W + i] > 0.0:
             for j in range(L):
-                # An encoder that repeats itself has read once.
+                # An encoder reads once before it repeats itself.
                 w[at(E, i, j, W, L)] = w[at(READ, i, j, W, L)] if k > 0 else w[at(E, i, j, W, L)]
                 w[at(ED, i, j, W, L)] = 0.0
         if sensor.filtered:
@@ -99,7 +99,7 @@ def take_answer(drives, arms, w, buffer):
     N, W = len(drives), len(arms)
     for i in range(N):
         c = buffer[len(buffer) - N + i]
-        # No limit of a drive makes a torque of what is none.
+        # A limit of a drive must not make a torque of what is none.
         w[C * W + i] = c if abs(c) < 1e100 else math.nan
 
 
@@ -198,7 +198,7 @@ def add_work(lanes, arms, w):
 def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, history, buffer):
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
 
-    None for what is not there leaves it out of the kernel, which is then sooner compiled; an `else` would stay.
+    None for what is not there leaves it out of the kernel, which then compiles sooner; an `else` branch would stay in.
     history, study : the `History` of a single run, or () for a study; the other one is None.
     modelled : None for laws without a model; else an entry where the model has friction or gravity.
     user : None, or the pointer of a law that a user compiled, which finds what it needs in `buffer`.

@@ -20,7 +20,7 @@ STIFF, MOST_STEPS = 1.0, 4000.0
 
 @outlined
 def sense(lanes, arms, extra, table, o, w, dt):
-    """Base angles and rates, geometry and shares of all arms; returns how many arms are far from where they should."""
+    """Base angles and rates, geometry and shares of all arms; returns 0 where no arm is far from the desired motion."""
     L, W = len(lanes), len(arms)
     count = 0
     for i in range(W):

@@ -39,7 +39,7 @@ def pointer(function, N: int, matrices: bool, memory: int):
     # What the user writes stays inside its arrays.
     law: Any = njit(error_model="numpy", boundscheck=True)(function) if isfunction(function) else function
     ask: Any = law
-    # All around the law in one piece: an array handed on costs more than a number in it.
+    # All around the law is inlined: handing on an array costs more than reading a number in it.
     inner = njit(forceinline=True)
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)

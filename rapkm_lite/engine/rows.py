@@ -53,7 +53,7 @@ ENVIRONMENT, SINGLES = 3, 55
 def counted(k):
     """The whole number k, of which the compiler then knows that it is not negative.
 
-    A negative index counts from the end of an array: asking that of each number keeps them from moving as vectors.
+    A negative index counts from the end of an array: testing each index for that would prevent vectorization.
     """
     return k & 0xFFFFFFFFFF
 

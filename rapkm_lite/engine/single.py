@@ -1,7 +1,7 @@
 """`sense` and `hold` of `plant` for one run, its arms side by side in a vector register and its state in scalars.
 
-Where a stage of the Runge-Kutta step is, the stage before the last one says: its geometry is made one stage ahead, in
-the same loop over the arms, and kept in the rows PLACE and OTHER by turns.  A processor then does both at a time.
+The place of a Runge-Kutta stage is known from the stage before the last one: its geometry is made one stage ahead, in
+the same loop over the arms, and kept in the rows PLACE and OTHER in turn.  A processor then does both at once.
 """
 
 from __future__ import annotations

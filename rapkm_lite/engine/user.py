@@ -48,7 +48,7 @@ def matrix(buffer, start, rows, columns):
 
 @outlined
 def fill(drives, arms, law, t, table, o, w, buffer):
-    """What a law may know at a sample; without a pose in `law.asks` only the desired motion."""
+    """What a law may know at a sample: time, measurement, desired motion, and the matrices that `law.asks` for."""
     N, W = len(drives), len(arms)
     buffer[0] = t
     for i in range(N):

@@ -118,7 +118,7 @@ def player(widget) -> widgets.Box:
     """A play button for a slider, with its speed."""
     ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
     play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
-    # Values in thousandths of a second and steps of 80 of them would be as fast as the clock.
+    # A step of 80 ms every 80 ms would be real time.
     speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
     widgets.jslink((play, "value"), (widget, "value"))
     return widgets.HBox([play, speed]).add_class("rapkm-player")
@@ -203,7 +203,7 @@ def moving(handles: list[dict], controls: dict) -> None:
 
 
 def follow(handles: list[dict], controls: dict) -> bool:
-    """A handle that was stopped short takes its sliders along; was there one?"""
+    """Move the sliders to where their handle was stopped short; did any of them move?"""
     before = [widget.value for widget in controls.values()]
     for handle in handles:
         x, y = handle["at"]

@@ -205,7 +205,7 @@ class Explorer:
 
     def _changed(self, change) -> None:
         said, value = "", tidied(change["new"])
-        # A browser lays its own steps and sends a value back that differs in the last digit.
+        # A browser rounds to steps of its own and sends back a value that differs in the last digit.
         if self._held or value == tidied(change["old"]):
             return
         near = snap(change["owner"], value)

@@ -123,7 +123,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
 
 @ready_made
 def own_machine(robot: Manipulator | None = None) -> Explorer:
-    """A machine in the middle of the triangle, the torques that move it, and those that offsets only press.
+    """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
 
     >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'

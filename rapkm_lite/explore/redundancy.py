@@ -42,7 +42,7 @@ RULES = {
 
 @ready_made
 def allocation(robot: Manipulator | None = None) -> Explorer:
-    """The torques that make one force: of least size (pale bars) and by the chosen rule; dots: the limits.
+    """The torques that make one force: of least size (pale bars) and by the chosen rule; dotted: the limits.
 
     >>> allocation().numbers["largest"]
     '100 % of the limit'

@@ -39,7 +39,7 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
 
 
 def size(robot: Manipulator) -> float:
-    """How wide the workspace is, on the testbed 1: 1, 2 or 5 times a power of ten, for round numbers on sliders."""
+    """Width of the workspace relative to the testbed's, rounded down to 1, 2 or 5 times a power of ten."""
     left, right, low, high = sampling_box(robot)
     wide = 1.25 * max(min(right - left, high - low), 1e-6) / 0.4
     power = 10 ** math.floor(math.log10(wide))
@@ -47,14 +47,14 @@ def size(robot: Manipulator) -> float:
 
 
 def length_slider(robot, label: str, low: float, high: float, step: float, value: float, middle: float = 0.0):
-    """A slider of a length in mm, given for the testbed, for a robot of another size; from `middle` in m on."""
+    """A slider of a length in mm; the numbers are the testbed's, scaled to the robot and shifted by `middle` in m."""
     low, high, step, value = (size(robot) * v for v in (low, high, step, value))
     first = step * round(1e3 * middle / step)
     return slider(label, first + low, first + high, step, first + value)
 
 
 def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
-    """Sliders x and y in mm for the place of the end-effector; the numbers are the testbed's, from its middle on."""
+    """Sliders x and y in mm for the end-effector's place; the numbers are the testbed's, from the robot's middle on."""
     right, up = robot.base.mean(axis=0)
     return {
         "x": length_slider(robot, f"{which}x in mm", low, -low, step, x, right),

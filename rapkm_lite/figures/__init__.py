@@ -2,5 +2,5 @@
 
 import logging
 
-# Where fonts are looked for the first time, as in each new browser, the first output of a lesson would be red.
+# Matplotlib's first search for fonts, as in each new browser, would put red text above the first output of a lesson.
 logging.getLogger("matplotlib.font_manager").addFilter(lambda record: "font cache" not in record.getMessage())

@@ -59,7 +59,7 @@ def _guard(picture: Callable) -> Callable:
         except Exception as error:
             if isinstance(error, RuntimeError) and type(error).__module__.startswith("rapkm_lite."):
                 raise  # a run that was lost, say
-            # Curves may have gaps; what could not be drawn is held to the names.
+            # Curves may have gaps; where drawing failed, arguments are checked strictly, to name the wrong one.
             for parameter in asked:
                 _check(parameter, given[parameter.name], known, _numbers)
             if isinstance(error, KeyError) and "allowed" in str(error):

@@ -133,7 +133,7 @@ def film(
     dpi: float = 96,
     most: int | None = _MOST_FRAMES,
 ) -> Film:
-    """A film of ``draw(ax, step)``, called for every step of `frames` on empty axes; the last expression of a cell.
+    """A film of ``draw(ax, step)``, called for every step of `frames` on empty axes; for the last line of a cell.
 
     alt : what is seen and what it shows, one or two sentences.
     panels : axes side by side; `draw` gets them as an array when there are several.

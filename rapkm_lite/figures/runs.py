@@ -6,7 +6,7 @@ from .style import arm_line, axes_or_new
 
 
 def plot_torques(run, ax=None, title: str = "", milli: bool = True):
-    """Drive torques over time, in mN m or, for large ones, in N m.
+    """Drive torques over time, in mN m, or in N m with ``milli=False``.
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])

@@ -30,7 +30,7 @@ class ConvergenceError(RuntimeError, ValueError):
 def real_array(name: str, value, *last: int) -> np.ndarray:
     """Return `value` as a float array of finite numbers whose trailing axes have the lengths `last`.
 
-    Raises ValueError when `value` is not numeric (text, logical and complex values are not), holds NaN, infinity or
+    Raises ValueError when `value` is not numeric (text, Boolean and complex values are not), holds NaN, infinity or
     numbers from 1e100 on, or has other trailing axes.
     """
     if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last:
@@ -48,7 +48,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
 
 
 def masked(value) -> bool:
-    """Is it a masked array?  NumPy reads their module, which takes a while, where somebody makes one and not before."""
+    """Is it a masked array?  NumPy loads their module, which takes a while, only when somebody makes one."""
     return "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray)
 
 

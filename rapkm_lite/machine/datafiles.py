@@ -75,7 +75,7 @@ def read_toml(source: str | Path) -> dict:
     of_kind("source", source, (str, Path), "a name such as 'testbed', or a path that ends in .toml")
     path = Path(source) if str(source).endswith(".toml") else _data_file("source", source, f"{source}.toml")
     try:
-        # Editors may write a mark before the first line.
+        # Editors may write a byte order mark before the first line.
         tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise _unread(path, f"cannot be read ({error.strerror})") from None

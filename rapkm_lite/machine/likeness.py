@@ -81,7 +81,7 @@ def _equal_items(a, b, begun) -> bool:
 
 
 def _decides(value) -> bool:
-    """Has its class an ``__eq__`` that is more than the identity, or than that of a dataclass, which arrays break?"""
+    """Does its class have an ``__eq__`` beyond the identity and that of a dataclass, which arrays break?"""
     if isinstance(value, type | types.ModuleType):
         return True
     if isinstance(value, types.FunctionType | types.MethodType) or type(value).__eq__ is object.__eq__:
@@ -100,7 +100,7 @@ def _parts(value) -> tuple | None:
         return value.__func__, value.__self__
     try:
         made = value.__reduce_ex__(4)
-        # A name stands for one thing only; items of lists and dictionaries come as iterators.
+        # A str names a global, equal only to itself; items of lists and dictionaries come as iterators.
         return None if isinstance(made, str) else tuple(tuple(p) if hasattr(p, "__next__") else p for p in made)
     except Exception:
         return getattr(value, "__dict__", None)

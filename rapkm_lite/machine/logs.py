@@ -68,8 +68,8 @@ def read_log(source: str | Path) -> Log:
     """A log from a CSV file with the columns and units of ``data/mystery_runs``, for any number of drives.
 
     The header is ``t in s, q1 measured in rad, ..., q1 desired in rad, ..., c1 in N m, ...``; a line is a record.
-    Raises ValueError with file, line and column for a file that cannot be read so, also where a number is missing or
-    not finite, where time does not increase, or where a step in time is over 1.5 times the usual one.
+    Raises ValueError with file, line and column for a file of another form, also where a number is missing or not
+    finite, where time does not increase, or where a step in time is over 1.5 times the usual one.
 
     >>> import rapkm_lite as rk
     >>> rk.read_log(rk.data_path("mystery_runs/gain.csv"))
@@ -77,11 +77,11 @@ def read_log(source: str | Path) -> Log:
     """
     path = Path(of_kind("source", source, str | Path, "the path of a CSV file"))
     try:
-        # Spreadsheets write a mark before the header, editors an empty line at the end.
+        # Spreadsheets write a byte order mark before the header, editors an empty line at the end.
         with path.open(newline="", encoding="utf-8-sig") as file:
             header, *lines = list(csv.reader(file)) or [[]]
     except (OSError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "no text in UTF-8"
+        reason = getattr(error, "strerror", None) or ("not UTF-8 text" if isinstance(error, UnicodeError) else error)
         raise ValueError(f"source = {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
     while lines and not lines[-1]:
         lines.pop()
@@ -123,7 +123,7 @@ def _check_times(path: Path, t: np.ndarray) -> None:
     late = np.flatnonzero(steps <= 0.0)
     if len(late):
         number = late[0] + 3
-        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: it does")
+        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: rising")
     gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) if len(steps) else steps
     if len(gaps):
         k = gaps[0]
@@ -157,7 +157,7 @@ def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> lis
     for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
         try:
             row.append(float(text))
-            # Python reads 1_0 as 10; in a file a line between two numbers is a slip.
+            # Python reads 1_0 as 10; in a file an underscore between digits is a typo.
             fine = abs(row[-1]) < 1e100 and "_" not in text
         except ValueError:
             fine = False

@@ -143,8 +143,8 @@ class Manipulator(Value):
     def replace(self, **changes) -> Manipulator:
         """A copy with some values changed, e.g. ``robot.replace(friction=0.0)``.
 
-        Inertias and centres of mass that were not given follow changed masses and lengths.  A machine of a class of
-        yours stays one, and keeps what the class has set besides.
+        Inertias and centres of mass that were not given follow changed masses and lengths.  A machine of your own class
+        keeps its class, and what the class has set besides.
         Raises ValueError for an unknown name, and for another number of arms that does not go with what is kept.
         """
         for key in changes:
@@ -222,7 +222,7 @@ def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
 def crossings(a: np.ndarray, b: np.ndarray, r_a: np.ndarray, r_b: np.ndarray) -> np.ndarray:
     """Where circles about a and b (k, ..., 2) of radii r (k,) cross: (2 k, ..., 2), first those left of b - a.
 
-    Circles that do not meet have the point between them on their radical axis, which of those that touch is the one.
+    Circles that do not meet give the point of their line of centres on the radical axis; touching ones touch there.
     """
     r_a, r_b = (r.reshape(-1, *[1] * (a.ndim - 1)) for r in (r_a, r_b))
     gap = b - a

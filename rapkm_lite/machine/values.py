@@ -56,7 +56,7 @@ else:
 
 
 def default(value: Any) -> Any:
-    """A default as it is given, of a field that keeps an array."""
+    """The default of a field that keeps an array, as a user would give it."""
     return value
 
 
@@ -81,9 +81,9 @@ def frozen(array) -> np.ndarray:
 
 
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Room to write into once, before anybody else sees it; and the same arrays as `frozen` hands them on.
+    """Arrays to write into once, before anybody else sees them; and the same arrays, read-only like those of `frozen`.
 
-    Nobody cleans it before: what is handed on has to be written.  The memory lives as long as the second arrays.
+    They are not initialized: all that is handed on has to be written.  The memory lives as long as the second ones.
 
     >>> (write, _), (read, _) = room(2, 3)
     >>> write[:] = 1.0, 2.0
@@ -130,8 +130,8 @@ class Value:
     `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
     pickling, ``copy.copy`` and ``copy.deepcopy``.  Two values are equal when they have the same type and equal fields
     (equal shapes and numbers; NaN equals NaN; functions and objects of a user as `likeness.equal` says); equal values
-    have equal hashes, computed once.  What a class of a user's sets besides its fields is compared, copied and printed
-    with them, and stays as it is.
+    have equal hashes, computed once.  What a user's class sets besides its fields is compared, copied and printed with
+    them, and stays as it is.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -215,7 +215,7 @@ class Value:
 
     @recursive_repr()
     def __repr__(self) -> str:
-        """The call that makes the value: required fields by position, others by name where they differ from theirs."""
+        """The call that makes the value: required fields by position, others by name where they are not the default."""
         parts = []
         for field in dataclasses.fields(self) if _names(type(self)) else ():
             value = getattr(self, field.name, None)

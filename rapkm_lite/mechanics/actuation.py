@@ -157,7 +157,7 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
 
 
 def prestress_projector(A, W=None) -> np.ndarray:
-    """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range are the torques that move nothing.
+    """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range is the torques that move nothing.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(np.linalg.matrix_rank(rk.prestress_projector(rk.control_matrix(robot, q))))

@@ -75,7 +75,7 @@ def null_basis(A) -> np.ndarray:
     anywhere = cores.null_space(A)
     if m > delta:
         # Any orthonormal basis, turned by U: the columns of U but the last from its components along the references.
-        # With @ one pose takes the steps of many; `product` would round otherwise.
+        # With @ one pose takes the steps of many; `product` would round differently.
         U, R = np.linalg.qr(anywhere.mT @ _references(m)[:, : m - delta - 1], mode="complete")
         size = np.diagonal(R, axis1=-2, axis2=-1)
         if np.any(np.abs(size) < 1e-12):
@@ -88,7 +88,7 @@ def null_basis(A) -> np.ndarray:
 
 
 def _references(m: int) -> np.ndarray:
-    """Harmonics of the drive number without the first one, which is the range of A of a symmetric machine."""
+    """Harmonics of the drive number without the first one, which spans the range of A of a symmetric machine."""
     turn = 2 * np.pi * np.arange(m) / m
     waves = [wave(k * turn) for k in range(2, m // 2 + 1) for wave in (np.cos, np.sin)]
     return np.stack([np.ones(m), *waves], axis=-1)
@@ -125,7 +125,7 @@ def null_direction(robot: Manipulator, q) -> np.ndarray:
 
 
 def common_sign(A) -> np.ndarray:
-    """Can a prestress load all drives with one sign, so that no gear has backlash?  Boolean (...,).
+    """Can a prestress load all drives with one sign, so that no gear feels its backlash?  Boolean (...,).
 
     A : (..., m, delta), of any mechanism.
     A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half space (Stiemke): in the plane,
@@ -145,20 +145,20 @@ def common_sign(A) -> np.ndarray:
         angle = np.sort(np.arctan2(A[..., 1], A[..., 0]), axis=-1)
         gaps = np.diff(np.concatenate([angle, angle[..., :1] + 2 * np.pi], axis=-1), axis=-1)
         return gaps.max(axis=-1) < np.pi - 1e-12  # opposite rows leave a half turn, rounded
-    # Rows of equal length: no sign changes, and none of the n_i is small for its units.
+    # Rows of equal length: no sign changes, and none of the n_i is small merely because of its units.
     basis = np.linalg.qr(A / np.where(size > 0.0, size, 1.0), mode="complete")[0][..., delta:]
     least = np.array([_most_even(basis[index]) for index in np.ndindex(A.shape[:-2])])
     return (least > 1e-12).reshape(A.shape[:-2])[()]
 
 
 def _most_even(basis: np.ndarray) -> float:
-    """The smallest component of the combination n of null vectors, columns of (m, k), where it is largest, n_i <= 1."""
+    """The largest possible smallest component of a combination n of null vectors, columns of (m, k), with n_i <= 1."""
     m, k = basis.shape
     if k < 2:
         return max((float(n.min()) for n in (*basis.T, *-basis.T)), default=0.0)
     from scipy.optimize import linprog
 
-    # Unknowns: the coefficients of the basis, and what is below all components.
+    # Unknowns: the coefficients of the basis, and a lower bound of all components.
     rows = np.block([[basis, np.zeros((m, 1))], [-basis, np.ones((m, 1))]])
     limits = np.append(np.ones(m), np.zeros(m))
     found = linprog(np.append(np.zeros(k), -1.0), rows, limits, bounds=(None, None))
@@ -222,8 +222,8 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     ideal = desired + steady_state_error(A, K_P, offset) + offset
     counts = _readable(A, np.rint(ideal / quantum), (desired + offset) / quantum)
     c = -matvec(positive_definite("K_P", K_P, N), quantum * counts - desired)
-    # Slabs |c_i - n_i| <= friction in the null space meet if they do without any one drive (Helly): the virtual work
-    # of the end-effector's motions that keep one drive still.
+    # Slabs |c_i - n_i| <= friction in the null space share a point if all but any one of them do (Helly): a bound on
+    # the virtual work of the end-effector's motions that keep that drive still.
     still = cross(A[:, None], A)
     return bool(np.any(np.all(np.abs(c @ still.T) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
 

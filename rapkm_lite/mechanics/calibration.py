@@ -55,8 +55,8 @@ class Calibration(Value):
     names : of the unknowns, in the order of the covariance.  estimate : (p,) rad and m.
     offset : (N,) rad, measured minus true base angle.  lengths : (N, 2) m.  base : (N, 2) m.
     covariance : (p, p) of the estimate for independent noise of the readings, by first order.
-    noise : rad, standard deviation of one reading that the covariance uses; of counts, of the readings that differ, so
-        that long rests that jitter make it larger (their means, with `noise` given, say more).
+    noise : rad, standard deviation of one reading that the covariance uses; with counts that of the distinct readings,
+        which long rests that jitter make larger (their means, with `noise` given, say more).
     freedom : how many readings were left over to estimate the noise from; infinite where it was given.
     rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
     unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.
@@ -86,9 +86,10 @@ class Calibration(Value):
     note: str = field(default="")
 
     def interval(self, level: float = 0.95) -> np.ndarray:
-        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, each for itself.
+        """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, each on its own.
 
-        Student's t where the residual showed the noise, with `freedom` degrees; normal where the noise was given.
+        Student's t where the residual showed the noise, with `freedom` degrees, and no narrower than
+        the steps of counts make it; normal where the noise was given.
         Raises ValueError where neither the log nor the caller said how large the noise is.
         """
         if self.noise == 0.0:
@@ -122,7 +123,7 @@ def calibrate(
     Equal readings count once, because a rest repeats one rounding however long it lasts.
 
     log : a `Log`, several of one machine, the path of a CSV file (`read_log`), or measured base angles (k, N) in rad.
-    unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these four motions stay unseen,
+    unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these, four motions stay unseen:
     scale, rotation and two translations of the whole machine.
     use : "angles", every sample, moving or not; or "torques", those of the rests of PD drives under a known gain, of
     which each says where its encoder stood, q_desired - c / K_P; friction before a torque sensor shifts that, and the
@@ -142,7 +143,7 @@ def calibrate(
     K_P = None if K_P is None else bounded("K_P", drive_values("K_P", K_P, robot.n_arms), 0.0, strict=True)
     noise = None if noise is None else positive_number("noise", noise)
     if noise is not None and noise >= 0.1:
-        raise ValueError(f"noise = {noise:g} rad of a reading lets nothing be seen; allowed: below 0.1 rad")
+        raise ValueError(f"noise = {noise:g} rad of a reading hides everything; allowed: below 0.1 rad")
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
     angles, logs = measured(robot, log)
@@ -171,7 +172,7 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     p, blur = nominal[:count], max(step, noise or 0.0)
     sure, x = certain(robot, angles)
     if basis.shape[1] < (N - 2) * sure.sum() < (N - 2) * len(angles):
-        # A sample on the wrong assembly holds the unknowns where it fits there: those in doubt wait for the others.
+        # A sample in the wrong assembly mode would hold the unknowns where it fits: those in doubt wait for the others.
         with suppress(ValueError):
             p = _minimum(robot, angles[sure], basis, p, p, x[sure], blur, enough=1e-3)[0]
     p, machine, x, left, sigma, Vt = _searched(robot, angles, basis, nominal[:count], p, x, blur)
@@ -221,11 +222,11 @@ def _searched(*given):
 
 
 def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
-    """Unknowns of least closure, Gauss and Newton from p and the places x (k, 2) m on.
+    """Unknowns of least closure, by Gauss-Newton steps from p and the places x (k, 2) m.
 
-    It ends where a step (in `basis`) is small enough or a rounding.
+    Ends where a step (in `basis`) is below `enough`, or no larger than its rounding error.
     Returns them, their machine, and of the last step the places (k, 2) m, the closure, and the singular values and
-    right vectors of its derivative.  blur : rad, what is known of the noise.  courage : 1 goes on where rank misses,
+    right vectors of its derivative.  blur : rad, what is known of the noise.  courage : 1 goes on where rank is lost,
     along what is determined there, 2 along all, in short steps: far from the minimum what is not explained is no noise.
     Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
     """
@@ -252,11 +253,11 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
             raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
         p, size = p + basis @ move, np.abs(move).max(initial=0.0)
         machine = changed(robot, p)
-        # No step gets smaller than its rounding.
+        # No step gets smaller than its rounding error.
         if size < max(enough, 1e-13 + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
             return p, machine, x, left, sigma, Vt
     raise ConvergenceError(
-        f"calibrate did not converge: a last step of {size:.3g} at offsets {p[:N].tolist()} rad; "
+        f"calibrate did not converge: its last step was {size:.3g} at offsets {p[:N].tolist()} rad; "
         "allowed: a log of this machine, whose angles are near a pose"
     )
 

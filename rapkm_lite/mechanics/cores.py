@@ -78,7 +78,7 @@ def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
 def check_tangent(tree: Tree, J: np.ndarray, qd: np.ndarray) -> None:
     """Raises ValueError where rates open the loops: |J qd| above 1e-2 of what the longest link could add to it.
 
-    So wide, because rates that are differences of closed poses, or belong to a slightly wrong model, are rates of use.
+    So wide, because rates that are differences of closed poses, or belong to a slightly wrong model, are useful, too.
     """
     speed = np.abs(matvec(J, qd)).max(axis=-1)
     # One rate may meet many poses.

@@ -118,7 +118,7 @@ def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndar
 def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
     """N_J = I - J^+ J of section 4.3, (..., 2N, 2N): the orthogonal projector onto the tangent space of V.
 
-    (21) partitions it into the rows of passive and driven joints, `redundant_control_matrix`.
+    (21) partitions it into the rows of passive and driven joints; the latter are `redundant_control_matrix`.
     Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

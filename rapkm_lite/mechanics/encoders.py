@@ -56,7 +56,7 @@ def measured(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
 def rounding(angles: np.ndarray) -> float:
     """Standard deviation of the rounding where the readings are counts of one size, that size over sqrt(12), or 0."""
     steps = np.diff(np.sort(angles, axis=0), axis=0).ravel()
-    # Below 1e-12 rad a step is a rounding of the computer.
+    # Below 1e-12 rad a step is floating-point rounding.
     steps = steps[steps > 1e-12]
     count = steps.min(initial=np.inf)
     if not len(steps) or np.abs(steps / count - np.rint(steps / count)).max() > 0.01:
@@ -96,7 +96,7 @@ def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
 
 
 def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the angles (k, N) rad leave no doubt of their assembly, (k,), and the places (k, 2) m of all.
+    """Which of the angles (k, N) rad leave no doubt about their assembly mode, (k,), and the places (k, 2) m of all.
 
     The worst misfit of all poses shows how wrong readings may be.  In doubt is what a second assembly may fit as well.
     Raises ValueError for angles that fit no pose.
@@ -128,7 +128,7 @@ def _fit(robot: Manipulator, angles: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """n^T (angles - q_a) at the poses, (k (N - 2),) rad, and its derivative by the first unknowns, (k (N - 2), count).
+    """n^T (angles - q_a) at the poses, (k (N - 2),) rad, and its Jacobian in the first unknowns, (k (N - 2), count).
 
     At a fixed end-effector d . db + (a . d / l1) dl1 + l2 dl2 + (a x d) dq_a = 0 for each arm.
     """
@@ -174,5 +174,5 @@ def cautions(
     if extent < 0.25 * robot.lengths.max():
         said.append(f"all places lie within {extent:.2g} m of their centre, close together: spread them")
     if condition > 50:
-        said.append(f"the equations have the condition {condition:.3g}, which multiplies what noise there is")
+        said.append(f"the equations have the condition number {condition:.3g}, which multiplies the noise")
     return said

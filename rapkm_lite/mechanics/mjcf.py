@@ -23,8 +23,8 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     angles and rates of the base joints, in rad and rad/s, and the position of tip 2 in m.  The load is lumped into the
     distal link of arm 2.  Not exported: Coulomb friction (another model there), resistance and torque constant.
 
-    q : (2N,) rad, where MuJoCo starts, at rest, and the keyframe "start"; default: with the end-effector amid the base
-    points, or, where they do not all reach that with a bend, at the place where the arms bend most evenly.
+    q : (2N,) rad, where MuJoCo starts, at rest, and the keyframe "start"; default: with the end-effector at the
+    mean of the base points, or, where not all arms reach that bent, where the arms bend most evenly.
     timestep : s; its integrator is RK4.
     Raises ValueError for values out of range, for a q that leaves the loops open, and where the default finds no place.
 
@@ -87,7 +87,7 @@ def _arm(robot: Manipulator, i: int, pose: np.ndarray) -> str:
     if min(i1, inertia) < 1e-14:
         raise ValueError(
             f"inertias of arm {i + 1} are {i1:g} and {inertia:g} kg m^2 about the centres of its links; allowed: 1e-14 "
-            "or more, MuJoCo knows no thin mass"
+            "or more, MuJoCo knows no point mass"
         )
     tip = f'        <site name="tip{i + 1}" pos="{l2:.17g} 0 0"/>\n'
     base, elbow = pose.reshape(2, -1)[:, i]

@@ -19,11 +19,11 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     """Torques c (m,) in N m of least (c - c0)^T W (c - c0) with A^T c = wrench and |c_i| <= limit_i.
 
     The least-distance programme of Lawson and Hanson in the coordinates of the null space, solved by SciPy's
-    non-negative least squares, which ends after finitely many steps; without limits in reach it is (11).
+    non-negative least squares, which ends after finitely many steps; where no limit is active it is (11).
     A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
     W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
-    Raises ValueError at input singularities, for a wrench beyond the limits, with the factor that is missing, and for a
-    prestress so far beyond them that rounding hides the nearest torques.
+    Raises ValueError at input singularities, for a wrench beyond the limits, with the factor by which they fall
+    short, and for a prestress so far beyond them that rounding hides the nearest torques.
 
     >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
     >>> rk.allocate_torques(A, [1.0, 1.0], limit=1.0).round(3), rk.allocate_torques(A, [1.0, 1.0], limit=0.6).round(3)
@@ -55,7 +55,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     r, slack = G.T @ u, 1.0 - h @ u / size
     # Where rounding leaves nothing to divide by, torques of least peak.
     c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
-    # So close to it that rounding was magnified, what was clipped is another force.
+    # Near the edge rounding is magnified, and what was clipped may make another force.
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
     if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
         raise ValueError(

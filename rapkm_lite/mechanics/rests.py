@@ -37,7 +37,7 @@ class Rests(NamedTuple):
         """Coefficients b, and their covariance, of the torque -b[0] e + b[1] column + ... of drive i at error e.
 
         Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more;
-        of few rests it is not sure how much, and five standard deviations are as sure as Student's t at a thousandth.
+        few rests leave it uncertain how much, and five standard deviations are as sure as Student's t at a thousandth.
         None where the columns, each (k,), do not determine them with a rest to spare.
         """
         design = np.stack([self.desired[:, i] - self.q_a[:, i], *columns], axis=-1)
@@ -95,7 +95,7 @@ def rests(logs: list[Log]) -> Rests | None:
 
 
 def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
-    """A sentence for each drive whose torques lie aside of -K_P e at all rests, by a line with slope and intercept.
+    """A sentence for each drive whose torques lie off -K_P e at all rests, by a line with slope and intercept.
 
     Friction between motor and torque sensor does that where all rests are approached from one side: the sensor reads
     c -+ f_c, and the offset comes out wrong by f_c / K_P.
@@ -108,7 +108,7 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
         aside, error = line[0][1], np.sqrt(line[1][1, 1])
         if abs(aside) > 5 * error and abs(aside) > 1e-4 * K_P[i]:
             said.append(
-                f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m aside of -K_P times the error, as with "
+                f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m off -K_P times the error, as with "
                 f"friction before a sensor: that shifts its offset by {-1e3 * aside / K_P[i]:+.2g} mrad; approach each "
                 "place from both sides"
             )
@@ -132,7 +132,7 @@ def fitted_gain(stand: Rests) -> Gain | None:
 
 
 def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes: list[str]) -> tuple[np.ndarray, float]:
-    """Readings at the rests from their torques, one row a rest, and their standard deviation by that of the torques."""
+    """Readings at the rests from their torques, one row a rest, and their standard deviation from the torques'."""
     if stand is None:
         raise ValueError(
             f"use = 'torques', and no log holds still for {2 * SHORTEST} records with torques; allowed: a Log, a path "

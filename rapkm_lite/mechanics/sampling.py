@@ -53,8 +53,8 @@ def equidistant(t) -> np.ndarray:
 
 
 def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:
-    """Refuse other shapes than (k, 2), and rates that are no derivative of the positions; a few jumps are set-points,
-    and allowed."""
+    """Refuse other shapes than (k, 2), and rates that are no derivative of the positions; a few jumps, as of
+    set-points, are allowed."""
     for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
         if v.shape != (len(t), 2):
             raise ValueError(
@@ -63,7 +63,7 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -
     for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
         if (fastest := np.abs(v).max()) > 1e30:
             raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")
-    # Accelerations may jump, from differences of a recorded path they are rough, and PD does without.
+    # Accelerations may jump, are rough where they are differences of a recorded path, and PD does without them.
     for name, v, rate, units, share in (("x", x, xd, ("m", "m/s"), 0.1), ("xd", xd, xdd, ("m/s", "m/s^2"), 0.5)):
         moved, (before, after) = np.diff(v, axis=0), (t[1] * rate[:-1], t[1] * rate[1:])
         meant = (before + after) / 2
@@ -83,15 +83,15 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -
 
 
 def quintic(s) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The way from 0 to 1 at the shares s (...,) of the time, from rest to rest, and its derivatives by s."""
+    """The way from 0 to 1 at the shares s (...,) of the time, from rest to rest, and its derivatives in s."""
     return s**3 * (10 - 15 * s + 6 * s * s), 30 * (s * (1 - s)) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
 
 
 def slow_edges(t: np.ndarray, edges: int, rest: float) -> float:
     """The time of an edge of a polygon in s, unless samples would miss a corner or the motion.
 
-    With two samples in that time one lies inside every edge, and one a quarter of it from every corner at most: a tenth
-    of an edge.
+    With two samples in that time one lies inside every edge, and one within a quarter of it of every corner, where a
+    tenth of the edge is covered.
     """
     duration, dt = t[-1], t[-1] / (len(t) - 1)
     if not 0.0 <= 2 * rest < duration:
@@ -135,7 +135,7 @@ def columns(robot: Manipulator, t: np.ndarray, motion: Motion, given: dict) -> l
         for column, part in zip(made, parts, strict=True):
             column[rows] = part
     del column
-    made.reverse()  # and emptied on the way, so that of minutes no two columns stand twice
+    made.reverse()  # and emptied on the way, so that only one column at a time exists twice
     return [frozen(made.pop()) for _ in range(len(made))]
 
 

@@ -100,7 +100,7 @@ class Trajectory(Desired):
 
     @cached_property
     def _samples(self) -> dict[int, Desired]:
-        """Samples that were asked for: a loop asks for each, as often as it runs; minutes are not kept."""
+        """Samples that were asked for: a loop asks for each, as often as it runs; those of long paths are not kept."""
         return {}
 
     def _sample(self, k) -> Desired:
@@ -165,8 +165,8 @@ class Trajectory(Desired):
 def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
-    Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero (to 1e-6 of a
-    step), and for xd or xdd that err by a tenth or half of the largest step, but at a few jumps or with xdd = 0 always.
+    Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero on (to 1e-6 of a
+    step), and where xd errs by a tenth, or xdd by half, of the largest step, except at a few jumps; xdd may be all 0.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
@@ -190,7 +190,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     """The closed polygon through `corners` (k, 2) in m, each edge quintic from rest to rest in the same time.
 
     duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after.
-    Raises ValueError when the path leaves the workspace, or a time does not fit, so that an edge has two samples.
+    Raises ValueError when the path leaves the workspace, or a time does not fit; every edge needs two samples.
 
     >>> import rapkm_lite as rk
     >>> rk.polygon(rk.load(), [[-0.05, 0.01], [0.05, 0.01], [0.0, 0.05]], duration=3.0).x[1000].round(3)

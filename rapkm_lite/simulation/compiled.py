@@ -19,7 +19,7 @@ from .setup import Outcome, Setup
 LAW_FAILED = -2
 """Status beside those of the engine: the law raised, or the user pressed Ctrl-C."""
 LANES = 32
-"""Runs side by side: in the first cache of a core, and enough of them that no register waits for another."""
+"""Runs side by side: few enough for a core's L1 cache, and enough that no register waits for another."""
 
 __all__ = [
     "COMPILED", "DONE", "LAW_FAILED", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled",
@@ -44,7 +44,7 @@ def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]
     samples, N, interrupt = len(setup.trajectory), setup.robot.n_arms, None
     spare = tables.width(N, True) - N
     flat, kept = room(2 * samples, 2 * samples, *3 * [N * samples + spare], samples)
-    # Kernels do not hear a Ctrl-C: what they have done when it is raised, the numbers tell.
+    # Kernels do not hear a Ctrl-C: the NaN that are left tell how far they came.
     flat[0][:] = np.nan
     history = tables.History._make([*flat[:-1], flat[-1].view(np.int32), N])
     try:
@@ -252,7 +252,7 @@ class Plant:
             self.hold(start, np.zeros(robot.n_arms), self._dt)
 
     def observe(self, k: int, state) -> tuple[np.ndarray, np.ndarray]:
-        """True base angles and rates (N,) at sample k; of the sample after the last one, on the same turn."""
+        """True base angles and rates (N,) at sample k; where k follows the last call's, on the same turn."""
         q, qd, follows, self._next = np.empty(self._N), np.empty(self._N), k == self._next, k + 1
         self._observe(self._arms, self._extra, self._table[k], *state, self._w, q, qd, follows)
         return q, qd

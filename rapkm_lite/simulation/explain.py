@@ -47,7 +47,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         return too_stiff(setup)
     written = _written_by_user(law)
     if status == SINGULAR and written is not None:
-        # In Python it did neither; what a compiled function raises does not leave it.
+        # Run in Python it did neither; an exception cannot leave a compiled function.
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, k, written is None, c), f"look at gains{_too(setup)} and the path")
@@ -55,7 +55,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
 
 
 def _said(error: BaseException | None) -> str:
-    """The words of an exception, after a colon; those that fail themselves are none."""
+    """The words of an exception, after a colon; none where `str` itself fails."""
     try:
         words = str(error)
     except Exception:

@@ -164,7 +164,7 @@ def kinds() -> dict[str, type[Fault]]:
 
 
 def _from(t: np.ndarray, time: float) -> np.ndarray:
-    """True from `time` on; a sample that misses it by rounding only counts."""
+    """True from `time` on; a sample that misses it only by rounding counts, too."""
     return t >= time - 1e-6 * t[1]
 
 

@@ -72,7 +72,7 @@ def swinging(c: np.ndarray) -> float:
 
 
 def swung(c: np.ndarray, dt: float) -> str:
-    """The sentence on torques (k, N) that swung so, half as large again and more; empty where they did not.
+    """The sentence on torques (k, N) that swung so and grew by more than half; empty where they did not.
 
     >>> swung((-2.0) ** np.arange(12)[:, None], 1e-3)
     'unstable gain: in the end the torques swung to and fro within 12 samples of 0.001 s and grew 64-fold'

@@ -15,7 +15,7 @@ from .sensors import Encoders
 from .setup import Outcome, Setup, blank
 
 LOST = 1e9
-"""Rates in rad/s that say that the machine was lost in the hold before; what a law makes of them is no fault of its."""
+"""Rates in rad/s that say that the machine was lost in the hold before; what a law makes of them is not its fault."""
 
 
 def own_copy(law):
@@ -36,7 +36,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     """One run with a law or callable that nobody else uses; returns it and the exception that stopped it.
 
     What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
-    A law that fails because the state is beyond all measure is not to blame: the machine was lost in the hold before.
+    A law that fails because the state is absurdly large is not to blame: the machine was lost in the hold before.
     """
     robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
@@ -76,8 +76,8 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
 def again_in_python(setup: Setup, law, outcome: Outcome) -> tuple[Outcome, BaseException | None]:
     """How a run ended in which a compiled law gave no finite torques, and what the law raised in Python there.
 
-    The compiled law cannot say it, so the same run is repeated up to there; at the first sample the law belongs to the
-    caller, as in `closed_loop`.
+    The compiled law cannot say it, so the same run is repeated up to there; what it raises at the first sample goes to
+    the caller, as in `closed_loop`.
     """
     with np.errstate(all="ignore"):
         again, cause = closed_loop(setup.begin(outcome.sample + 1), law)

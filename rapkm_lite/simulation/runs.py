@@ -68,10 +68,10 @@ class Run(Value):
     """Result of a sampled closed loop, one row per sample.
 
     law : the law that ran; a copy, when it was an object in Python.
-    model : the controller's own manipulator, whose desired motion `trajectory` is.
+    model : the controller's own manipulator; `trajectory` is its desired motion.
     sensors, faults : with which it measured, and what was broken.
     t : (k,) s.  x, xd : (k, 2) true end-effector motion, m and m/s.  q_a, qd_a : (k, N) true base angles and rates.
-    c : (k, N) drive torques in N m that act; c[k] is held from t[k] to t[k+1] (the last row is not applied any more).
+    c : (k, N) drive torques in N m that act; c[k] is held from t[k] to t[k+1] (the last row is never applied).
     pairs : (k, 2) independent joints in use at each sample, -1 where the law has none.
 
     >>> import rapkm_lite as rk
@@ -204,8 +204,8 @@ def simulate(
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s it errs by less than 1 nm at dt = 2 ms, by
     0.2 micrometres at 10 ms.
-    Stiff friction costs time: a hold in which a drive is nearly at rest takes dt f_c / v0 over the inertia that the
-    drive moves in Runge-Kutta steps, one for the friction of the testbed, 2400 (0.4 ms) in its middle for 1 N m and
+    Stiff friction costs time: a hold in which a drive is nearly at rest takes as many Runge-Kutta steps as dt f_c / v0
+    over the inertia that the drive moves: one for the testbed's friction, 2400 (0.4 ms) in its middle for 1 N m and
     v0 = 0.1 mrad/s; beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python raises
     at the first sample comes through.  Whatever stops the run later raises SimulationError with the run up to there: a
@@ -219,7 +219,7 @@ def simulate(
     """
     given = Sensors(offset, encoder, velocity_filter)
     if sensors is not None and given != Sensors():
-        raise ValueError(f"sensors = {short(sensors)} together with {given!r}; allowed: one of both")
+        raise ValueError(f"sensors = {short(sensors)} together with {given!r}; allowed: one of the two")
     return complete(prepare(robot, trajectory, given if sensors is None else sensors, model, faults), law)
 
 

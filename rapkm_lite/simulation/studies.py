@@ -32,7 +32,7 @@ class Sweep(Value):
     failed : (k,) True where a run could not be finished.  failure_time : (k,) s, masked where it could.
     model, sensors, faults : the controller's own manipulator, how all runs measured but for their offsets, and what was
         broken.
-    stopped : (k,) in few words what stopped each run, None where nothing did; `reasons` says why.
+    stopped : (k,) in a few words what stopped each run, None where nothing did; `reasons` says why.
 
     >>> import rapkm_lite as rk
     >>> study = rk.sweep(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), 1e-3 * np.eye(3))
