@@ -286,8 +286,15 @@ def test_one_place_is_refused_with_what_it_does_say():
     # The sentence tells the same numbers, but for what prints as nothing.
     said = re.findall(r"([+-]\d\.\d{3}) offset (\d)", str(error))
     assert said == [(f"{c:+.3f}", str(i + 1)) for i, c in enumerate(error.known[0]) if round(abs(c), 3) > 0.0]
+    assert error.known[0, np.abs(error.known[0]).argmax()] > 0.0
     # One number is known, to second order in offsets of some milliradians.
     assert_allclose(error.known @ hidden("offset_c")[0], error.value, rtol=0, atol=2e-4)
+
+
+def test_a_calibration_prints_its_offsets_in_mrad():
+    found = rk.calibrate(TESTBED, rk.mystery_run("offset_a"))
+    said = re.search(r"offset \[(.*)\] mrad, rank 3", repr(found)).group(1)
+    assert_allclose([float(number) for number in said.split(",")], 1e3 * found.offset, rtol=1e-3)
 
 
 def test_what_is_known_of_one_place_is_exact_to_second_order():

@@ -387,6 +387,14 @@ def test_a_run_of_few_samples_swings_within_these():
         assert swinging(1e150 * (-1e100) ** np.arange(2)[:, None]) == pytest.approx(1e100)
 
 
+def test_torques_that_only_pause_do_not_swing():
+    """A sign changes between two torques of opposite sign, small ones too, and not at a zero."""
+    pausing = 1e-3 * np.array([1.0, 0.0, 2.0, 0.0, 4.0, 0.0, 8.0, 0.0, 16.0, 0.0, 32.0, 0.0])[:, None]
+    with np.errstate(all="raise"):
+        assert swinging(pausing) == swinging(-pausing) == 0.0
+        assert swinging(1e-3 * (-2.0) ** np.arange(12)[:, None]) == pytest.approx(64.0)
+
+
 def test_fewer_than_two_torques_do_not_swing():
     assert swinging(np.zeros((0, 3))) == swinging(np.ones((1, 3))) == 0.0
 

@@ -1,5 +1,7 @@
 """Constraints, Jacobians, inverse kinematics, closing the loops: identities, finite differences, geometry."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -223,6 +225,12 @@ def test_pose_fails_loudly():
         rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [0.0, 0.0])
     with pytest.raises(rk.ConvergenceError, match="outside the workspace"):
         rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [1.0, 0.0])
+    # One step of at most a tenth of a proximal link leads to a place well inside.
+    q_a = rk.inverse_kinematics(TESTBED, [0.05, 0.05])[:3]
+    with pytest.raises(rk.ConvergenceError, match="inside the workspace") as caught:
+        rk.estimate_pose(TESTBED, q_a, [-0.05, -0.05], iterations=1)
+    step = np.array(re.search(r"x = \[(.*?), (.*?)\]", str(caught.value)).groups(), dtype=float) - [-0.05, -0.05]
+    assert np.abs(step).max() == pytest.approx(0.1 * 0.2, abs=1e-6)
 
 
 # Facts of reference: the shape of the workspace.

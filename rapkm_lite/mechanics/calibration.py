@@ -29,7 +29,8 @@ class CalibrationError(ValueError):
     """The samples do not determine the unknowns; nothing is estimated.
 
     rank : how many combinations the samples determine.  needed : how many there are to find.
-    known : (rank, p) their coefficients, orthonormal rows, p unknowns in the order of `Calibration.names`.
+    known : (rank, p) their coefficients, p unknowns in the order of `Calibration.names`; orthonormal rows, of each the
+    coefficient largest in size is positive.
     value : (rank,) what these combinations are, rad and m.
 
     >>> import rapkm_lite as rk
@@ -268,7 +269,7 @@ def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
     known = rows @ np.linalg.pinv(basis)
     value = known @ moved - step
     Q, R = np.linalg.qr(known.T)  # orthonormal in radians and metres, too
-    sign = np.where(np.diagonal(R) < 0.0, -1.0, 1.0)
+    sign = np.where(Q.max(axis=0) < -Q.min(axis=0), -1.0, 1.0)
     known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value), unknown_names(robot.n_arms)
     spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
     terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])

@@ -120,7 +120,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     lead = check_leading(q_a=q_a.shape[:-1], guess=guess.shape[:-1])
     q_a, x = np.broadcast_to(q_a, (*lead, robot.n_arms)), np.broadcast_to(guess, (*lead, 2))
     size, limit = np.full((*lead, 1), np.inf), small_number("tolerance", tolerance) * robot.lengths.max()
-    limit += 8.0 * np.spacing(np.abs(robot.base).max() + robot.lengths.max())  # the rounding of x far from the origin
+    # The rounding of x far from the origin.
+    limit += 8.0 * np.spacing(np.abs(robot.base).max() + robot.lengths.max())
     q, residual, square = misfit(robot, q_a, x)
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         if np.isinf(square).any():
