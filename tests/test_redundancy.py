@@ -76,6 +76,32 @@ def test_on_an_edge_drives_that_do_not_hold_it_still_choose(A, wrench, W, want):
     assert_allclose(rk.allocate_torques(A, wrench, 0.2, W), want, rtol=0, atol=1e-12)
 
 
+def test_on_an_edge_a_drive_that_moves_nothing_keeps_its_prestress():
+    """Drives 1 and 2 pull alike and together just reach the wrench; the least change of drive 4 is none."""
+    A = [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]
+    c = rk.allocate_torques(A, [2.0, 0.0], 1.0, W=[1.0, 3.0, 1.0, 1.0], prestress=[0.0, 0.0, 0.0, 0.3])
+    assert_allclose(c, [1.0, 1.0, 0.0, 0.3], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("power", range(13))
+def test_a_prestress_beyond_all_measure_is_refused_or_makes_no_other_force(power):
+    """To 1e-9 of what the limits make; ten times the limits are no such prestress."""
+    wrench, limit = [0.5, 0.3], 0.2
+    try:
+        c = rk.allocate_torques(CENTRE, wrench, limit, prestress=10.0**power * rk.null_basis(CENTRE)[:, 0])
+    except ValueError as error:
+        assert "rounding hides the nearest torques" in str(error) and power > 1
+    else:
+        assert np.abs(c).max() <= limit
+        assert_allclose(CENTRE.T @ c, wrench, rtol=0, atol=1e-9 * limit * np.abs(CENTRE).max())
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6])
+def test_torques_of_least_peak_grow_with_the_wrench(scale):
+    wrench = np.array([0.5, 0.3])
+    assert_allclose(rk.minimax_torques(CENTRE, scale * wrench), scale * rk.minimax_torques(CENTRE, wrench), rtol=1e-9)
+
+
 def test_corners_of_the_force_polygon_go_round_once_from_the_lowest_one_on():
     """Every corner is a sum of the rows with signs, of all of which none lies lower; the edges turn by 2 pi in all."""
     many = np.random.default_rng(2).normal(size=(6, 4, 2))

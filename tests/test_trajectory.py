@@ -257,6 +257,18 @@ def test_times_that_are_not_equidistant_say_where():
         rk.follow(TESTBED, t, path.x, path.xd, path.xdd)
 
 
+def test_times_that_fall_are_told_what_times_are():
+    path = rk.circle(TESTBED, 0.05, 1.0, dt=1e-2)
+    with pytest.raises(ValueError, match="allowed: rising, equidistant times that start at 0"):
+        rk.follow(TESTBED, np.r_[0.0, 1e-2, -1e-2], path.x[:3], path.xd[:3], path.xdd[:3])
+
+
+def test_a_desired_motion_has_equal_leading_axes():
+    path = rk.circle(TESTBED, 0.05, 1.0, dt=1e-2)
+    with pytest.raises(ValueError, match="the leading axes do not fit together"):
+        rk.Desired(3, path.x[:5], path.xd[:5], path.xdd[:5], path.q[:4], path.qd[:4], path.qdd[:4])
+
+
 def test_set_points_on_another_turn_are_refused():
     path = rk.circle(TESTBED, 0.12, 1.0)
     with pytest.raises(ValueError, match=r"q_a = .* rad lies 6.28 rad away from the path; allowed: up to pi"):
