@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Collection, Hashable
 
@@ -109,9 +110,16 @@ def parts(draw, controls, play, live, about) -> None:
         having(f"controls[{name!r}]", widget, "a widget with a value, such as slider returns", "value", "observe")
     if play is not None and (not isinstance(play, str) or play not in controls):
         raise ValueError(f"play = {short(play)}; allowed: one of {', '.join(controls)}")
-    if live is not None:
-        truth("live", live)
+    truth("live", live)
     of_kind("about", about, str, "text")
+    parameters = list(inspect.signature(draw).parameters.values())[1:]
+    names = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
+    rest = len(names) < len(parameters)
+    if not set(names) <= set(controls) or (not rest and set(controls) - set(names)):
+        raise ValueError(
+            f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
+            f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
+        )
 
 
 def player(widget) -> widgets.Box:

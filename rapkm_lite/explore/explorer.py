@@ -66,17 +66,8 @@ def explorer(
     >>> explore.explorer(draw, {"gain": explore.slider("gain in N m/rad", 1, 9, 1, 5)}, {"a": {"xlabel": "time in s"}})
     Explorer(draw: gain = 5)
     """
-    parts(draw, controls, play, live, about)
-    parameters = list(inspect.signature(draw).parameters.values())[1:]
-    names = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
-    rest = len(names) < len(parameters)
-    if not set(names) <= set(controls) or (not rest and set(controls) - set(names)):
-        raise ValueError(
-            f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
-            f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
-        )
-    picture = Picture(panels, layout, widths, size, setup)
-    return Explorer(draw, controls, picture, play, COMPILED if live is None else live, about)
+    live = COMPILED if live is None else live
+    return Explorer(draw, controls, Picture(panels, layout, widths, size, setup), play, live, about)
 
 
 class Explorer:
@@ -132,8 +123,8 @@ class Explorer:
     @property
     def sentence(self) -> str:
         """What is to be seen, in words."""
-        said = [self.problem] if self.problem else [f"{name}: {text}." for name, text in self.numbers.items()]
-        return " ".join([self.about, *said]).strip()
+        said = [self.about, self.problem, *(f"{name}: {text}." for name, text in self.numbers.items())]
+        return " ".join(filter(None, said))
 
     @property
     def png(self) -> bytes:
@@ -262,8 +253,8 @@ class Explorer:
 
     def stored(self) -> dict:
         """The picture and its words as a MIME bundle, for readers without a kernel."""
-        said = [self.problem] if self.problem else [f"{name}: {text}" for name, text in self.numbers.items()]
-        return {**bundle(self.png, self.sentence), "text/plain": "\n".join([repr(self), *said])}
+        said = [repr(self), self.problem, *(f"{name}: {text}" for name, text in self.numbers.items())]
+        return {**bundle(self.png, self.sentence), "text/plain": "\n".join(filter(None, said))}
 
     def _ipython_display_(self, **kwargs) -> None:
         """Two outputs: the stored picture, and the widget, which hides it as soon as a kernel has answered."""

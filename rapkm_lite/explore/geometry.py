@@ -81,7 +81,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, palette, clip=outline)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
-        point, q = held_machine(picture, "machine", robot, x, y, modes[mode])
+        point, q, _ = held_machine(picture, "machine", robot, x, y, modes[mode])
         for curve in curves(mode, which[drives]) if which[drives] else ():
             picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
             picture.line("machine", *curve.T, **pair_line(robot, which[drives]) | {"linewidth": 2.2}, zorder=2)

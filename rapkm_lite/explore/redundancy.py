@@ -20,17 +20,7 @@ from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import (
-    draw_forces,
-    force_panel,
-    frictionless,
-    held_machine,
-    length_slider,
-    place_sliders,
-    ready_made,
-    size,
-    stopped,
-)
+from .shared import draw_forces, force_panel, frictionless, held_machine, length_slider, place_sliders, ready_made, size
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -50,7 +40,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
 
     def draw(picture, x, y, f_x, f_y, limit, rule):
-        point, q = held_machine(picture, "machine", robot, x, y)
+        _, q, stop = held_machine(picture, "machine", robot, x, y)
         A, f = control_matrix(robot, q), np.array([f_x, f_y])
         draw_forces(picture, A, limit)
         inner = shortest_reach(A, 1e-3 * limit, 181)
@@ -66,7 +56,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
             "torques": marks.per_drive(1e3 * torques, 1) + " mN m",
             "of least size": marks.per_drive(1e3 * plain, 1) + " mN m",
             "largest": f"{np.abs(torques).max() / limit * 1e5:.0f} % of the limit",
-        } | stopped(point, x, y)
+        } | stop
 
     times = size(robot)
     # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.

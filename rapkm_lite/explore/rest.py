@@ -19,17 +19,7 @@ from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
 from .controls import log_slider, offset_sliders
 from .explorer import Explorer, explorer
-from .shared import (
-    curves,
-    frictionless,
-    held_machine,
-    length_slider,
-    over_time,
-    place_sliders,
-    ready_made,
-    size,
-    stopped,
-)
+from .shared import curves, frictionless, held_machine, length_slider, over_time, place_sliders, ready_made, size
 
 
 @ready_made
@@ -48,7 +38,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         K_P = np.array([values[f"K_P_{i + 1}"] for i in range(N)])
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
         K_D = 0.225 * np.sqrt(K_P / 7.05)
-        point, q = held_machine(picture, "plane", robot, x, y)
+        point, q, stop = held_machine(picture, "plane", robot, x, y)
         A = act.control_matrix(robot, q)
         weight = act.required_wrench(robot, q, 0 * q, 0 * q)
         theory = 1e3 * steady_state_error(A, K_P, offset, weight)
@@ -69,7 +59,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
             "rest torque": marks.per_drive(torque, 1) + " mN m",
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
-        } | stopped(point, x, y)
+        } | stop
 
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
     wide = {"color": NEUTRAL, "linewidth": 7}

@@ -69,19 +69,18 @@ def central_triangle(robot: Manipulator, side: float | None = None, **times) -> 
 
 
 def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):
-    """The machine with a handle on its end-effector, on the way to (x, y) in mm; its place (2,) in m and pose (2N,)."""
+    """The machine with a handle on its end-effector, on the way to (x, y) in mm.
+
+    Its place (2,) in m, its pose (2N,), and where it stops, in words, when the arms do not reach (x, y).
+    """
     point = marks.clamped(robot, 1e-3 * np.array([x, y]))
     q = inverse_kinematics(robot, point, mode)
     marks.draw_machine(picture, panel, robot, q)
     picture.handle(panel, *point, x=(1e3, 0), y=(0, 1e3))
-    return point, q
-
-
-def stopped(point, x: float, y: float) -> dict[str, str]:
-    """Where the end-effector is, in words, when the arms do not reach (x, y) in mm."""
     there = 1e3 * point
     short = np.abs(there - [x, y]).max() > 0.5
-    return {"end-effector": f"({there[0]:z.0f}, {there[1]:z.0f}) mm: an arm reaches no further"} if short else {}
+    words = {"end-effector": f"({there[0]:z.0f}, {there[1]:z.0f}) mm: an arm reaches no further"} if short else {}
+    return point, q, words
 
 
 def force_panel(limit: float) -> dict:
