@@ -175,15 +175,10 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
     drives = marks.drive_lines(robot)
     way = {"xlabel": "place on the path in %", "xlim": (0, 100)}
+    measures = {"title": "Pairs", "ylabel": "σ_min in rad/m", "legend": marks.pair_lines(robot)}
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "sigma": way
-        | {
-            "title": "Pairs",
-            "ylabel": "σ_min in rad/m",
-            "ylim": (0, 8 / size(robot)),
-            "legend": marks.pair_lines(robot),
-        },
+        "sigma": way | measures | {"ylim": (0, 8 / size(robot))},
         "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
         "force": force_panel(2 / size(robot)) | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
     }

@@ -13,13 +13,7 @@ from ..figures.maps import mode_name
 from ..figures.style import NEUTRAL
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.actuation import (
-    control_matrix,
-    prestress_projector,
-    required_wrench,
-    singular_values,
-    weighted_pseudoinverse,
-)
+from ..mechanics import actuation as act
 from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import triangle
@@ -88,7 +82,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     middle = robot.base.mean(axis=0)
     path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5)
     q = inverse_kinematics(robot, middle)
-    A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
+    A, inertia = act.control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
     # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
     carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
     laws = {
@@ -147,10 +141,9 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         except ValueError:
             marks.draw_workspace(picture, "machine", own)
             raise
-        A = control_matrix(own, path.q)
-        inverse = weighted_pseudoinverse(A)
-        moving = matvec(inverse, required_wrench(own, path.q, path.qd, path.qdd))
-        pressing = -GAIN * matvec(prestress_projector(A), offset)
+        A = act.control_matrix(own, path.q)
+        moving = act.inverse_dynamics(own, path.q, path.qd, path.qdd)
+        pressing = -GAIN * matvec(act.prestress_projector(A), offset)
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)
@@ -160,7 +153,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
             "cost of the offsets, at rest everywhere": f"{heat:.2f} J",
             "largest torques that press": marks.per_drive(1e3 * np.abs(pressing).max(axis=0), 0) + " mN m",
-            "smallest σ_min on the triangle": f"{singular_values(A)[:, 1].min():.2f} rad/m",
+            "smallest σ_min on the triangle": f"{act.singular_values(A)[:, 1].min():.2f} rad/m",
         }
 
     (left, low), (right, high) = middle - 0.48, middle + 0.48

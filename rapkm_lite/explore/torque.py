@@ -45,16 +45,14 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     pairs = act.drive_pairs(robot)
     singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
-    words = [*fixed, "switched pair", "redundant coordinates"]
+    laws = {word: partial(CTC, independent=pair) for word, pair in fixed.items()}
+    laws |= {"switched pair": SwitchedCTC, "redundant coordinates": RedundantCTC}
     path = lru_cache(maxsize=16)(partial(central_triangle, robot))
     coarse = lru_cache(maxsize=64)(partial(central_triangle, robot, dt=0.01))
 
     def law_of(word, rate):
         # Two equal real poles at -rate.
-        gains = rate**2, 2.0 * rate
-        if word in fixed:
-            return CTC(*gains, fixed[word])
-        return SwitchedCTC(*gains) if word == "switched pair" else RedundantCTC(*gains)
+        return laws[word](rate**2, 2.0 * rate)
 
     @lru_cache(maxsize=64)
     def distance(law: str, side: int) -> str:
@@ -103,8 +101,8 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
 
     low, high = robot.base.min(axis=0) - [0, 0.06 * size(robot)], robot.base.max(axis=0) + [0, 0.02 * size(robot)]
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
-    laws = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
-    feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": laws}
+    both = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
+    feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": both}
     panels = {
         "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])},
         "map": over_time("norm in N m s²/rad", **feedback),
@@ -112,7 +110,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         "error": over_time("angle error in mrad", robot=robot, title="Error"),
     }
     controls = {
-        "law": choice("law", words),
+        "law": choice("law", laws),
         "side": length_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
         "rate": slider("poles at −1/s times", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
