@@ -12,9 +12,8 @@ from .seen import Seen, alike, ratio_of
 
 def _argument(seen: Seen, k: int) -> list[np.ndarray]:
     """Argument k of all cases where it always has the shape of the answer, else an empty list."""
-    values = [case[k] for case in seen.cases if k < len(case) and isinstance(case[k], np.ndarray)]
-    fits = len(values) == len(seen.cases) and all(a.shape == w.shape for a, w in zip(values, seen.want, strict=True))
-    return values if fits else []
+    values = seen.argument(k)
+    return values if [a.shape for a in values] == [w.shape for w in seen.want] else []
 
 
 def from_argument(seen: Seen) -> str:
@@ -48,7 +47,7 @@ def _whole_factor(seen: Seen) -> str:
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
     if not all(ratios) or not seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
         return ""
-    for name, values in quantities(seen.names, seen.cases):
+    for name, values in quantities(seen):
         if abs(values[0] - 1.0) <= 1e-6:
             continue
         for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
@@ -67,11 +66,11 @@ def argument_factor(seen: Seen) -> str:
     """A factor per case, or per entry, that is a power of one of the arguments: missing or one too many."""
     if words := _whole_factor(seen):
         return words
-    for name, scales in entrywise(seen.names, seen.cases, seen.want):
+    for name, scales in entrywise(seen):
         for p in (-1.0, 1.0, -2.0, 2.0):
             if seen.same([w * s**p for w, s in zip(seen.want, scales, strict=True)]):
                 return f"each entry has the factor {name}{_power(p)} {'missing' if p < 0 else 'once too many'}"
-    return next((name for name, models in matrices(seen.names, seen.cases, seen.want) if seen.same(models)), "")
+    return next((name for name, models in matrices(seen) if seen.same(models)), "")
 
 
 def constant_factor(seen: Seen) -> str:

@@ -119,7 +119,7 @@ def another_frame(seen: Seen) -> str:
     got, want = (np.concatenate([v.reshape(-1, 2) for v in side]) for side in (seen.got, seen.want))
     U, _, Vt = np.linalg.svd(want.T @ got)
     turn = U @ Vt
-    if not alike(want @ turn, got, max(seen.slack, 1e-6)):
+    if not alike(want @ turn, got, seen.slack):
         return ""
     if np.linalg.det(turn) < 0:
         return "the vectors are mirrored: x and y are exchanged, or one axis points the other way (another frame)"
@@ -137,28 +137,24 @@ DETECTORS: tuple[Callable[[Seen], str], ...] = (
 
 def named(seen: Seen) -> str:
     """The first detector that explains all cases; an empty string when none does."""
-    if not all(g.shape == w.shape for g, w, _ in seen):
-        return ""
     with np.errstate(all="ignore"):
         return next(filter(None, (detect(seen) for detect in DETECTORS)), "")
 
 
 def where(seen: Seen, right: list[bool]) -> str:
     """Words for where an answer is right and where it is not: kinds of cases, numbers of drives, single entries."""
-    bad = [case for case, good in zip(seen.cases, right, strict=True) if not good]
-    good = [case for case, fine in zip(seen.cases, right, strict=True) if fine]
-    if good:
-        labels = sorted({getattr(case, "label", "") for case in bad})
-        if all(labels) and not {getattr(case, "label", "") for case in good} & set(labels):
-            return f"it is right in {len(good)} of {len(right)} cases, and wrong for " + ", ".join(labels)
-        return f"it is right in {len(good)} of {len(right)} cases"
-    return _wrong_lines(seen)
+    if not any(right):
+        return _wrong_lines(seen)
+    labels = [(getattr(case, "label", ""), fine) for case, fine in zip(seen.cases, right, strict=True)]
+    good, bad = ({label for label, fine in labels if fine == wanted} for wanted in (True, False))
+    kinds = f", and wrong for {', '.join(sorted(bad))}" if all(bad) and not good & bad else ""
+    return f"it is right in {sum(right)} of {len(right)} cases{kinds}"
 
 
 def _wrong_lines(seen: Seen) -> str:
     """The rows, columns or entries that hold all that is wrong, where there are others."""
     shapes = {w.shape for w in seen.want}
-    if len(shapes) > 1 or not all(g.shape == w.shape for g, w, _ in seen) or len(shape := shapes.pop()) not in (1, 2):
+    if len(shapes) > 1 or len(shape := shapes.pop()) not in (1, 2):
         return ""
     scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
     wrong = np.any([np.abs(g - w) > seen.slack * scale for g, w, _ in seen], axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -128,7 +129,7 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
 def _by_a_factor(seen: Seen) -> bool:
     """Is the answer the right one times a constant, and not of a number that was rounded, such as 3.14?"""
     k = ratio_of(seen.got, seen.want)
-    tight = Seen(seen.got, seen.want, seen.cases, seen.names, 1e-9)
+    tight = replace(seen, slack=1e-9)
     return abs(k - 1.0) > 0.01 and len(seen.want) > 1 and tight.same([k * w for w in seen.want])
 
 
@@ -169,14 +170,14 @@ def _sign(mistake: Callable, seen: Seen) -> int:
             made = [np.asarray(mistake(*map(copied, case)), dtype=float) for case in seen.cases]
     except Exception:
         return 0
-    if all(m.shape == w.shape and alike(m, w, max(1e-9, seen.slack)) for m, w in zip(made, seen.want, strict=True)):
+    if all(m.shape == w.shape and alike(m, w, seen.slack) for m, w in zip(made, seen.want, strict=True)):
         return 0
     return next((sign for sign in (1, -1) if seen.same([sign * m for m in made])), 0)
 
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:
     """End the examination where the answer is that of a mistake the exercise knows by name."""
-    if all(alike(w, g, max(seen.slack, 0.0)) for g, w, _ in seen):
+    if all(alike(w, g, seen.slack) for g, w, _ in seen):
         return
     signs = {sentence: _sign(mistake, seen) for sentence, mistake in exercise.mistakes.items()}
     # What explains the answer as it is goes before what explains its opposite.
@@ -193,7 +194,7 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> N
     """End the examination with the name of the mistake, or with the place where it was made, if either is found."""
     scale = max(map(_size, seen.want), default=0.0) or 1.0
     loose = min(0.2, max(1e-6, exercise.close, 1.5 * exercise.tolerance / scale))
-    rough = Seen(seen.got, seen.want, seen.cases, seen.names, loose)
+    rough = replace(seen, slack=loose)
     words = named(seen)
     if not words and loose > 1e-6:
         _known_mistake(exercise, rough)

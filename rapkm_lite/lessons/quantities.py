@@ -9,6 +9,7 @@ import numpy as np
 
 from ..machine.manipulator import Manipulator
 from ..mechanics.trajectory import Trajectory
+from .seen import Seen
 
 
 def _of(name: str, value: Any) -> dict[str, float]:
@@ -34,10 +35,10 @@ def _of(name: str, value: Any) -> dict[str, float]:
     return found
 
 
-def quantities(names: tuple[str, ...], cases: list[tuple]) -> Iterator[tuple[str, np.ndarray]]:
+def quantities(seen: Seen) -> Iterator[tuple[str, np.ndarray]]:
     """Words and one number per case: numbers of single arguments that are positive in every case."""
-    for k, name in enumerate(names):
-        found = [_of(name, case[k]) if k < len(case) else {} for case in cases]
+    for k, name in enumerate(seen.names):
+        found = [_of(name, case[k]) if k < len(case) else {} for case in seen.cases]
         for words in found[0]:
             if all(words in f for f in found):
                 values = np.array([f[words] for f in found])
@@ -57,34 +58,26 @@ def _vectors(name: str, value: Any) -> dict[str, np.ndarray]:
     return {name: np.diag(value)} if diagonal else {}
 
 
-def entrywise(
-    names: tuple[str, ...], cases: list[tuple], want: list[np.ndarray]
-) -> Iterator[tuple[str, list[np.ndarray]]]:
+def entrywise(seen: Seen) -> Iterator[tuple[str, list[np.ndarray]]]:
     """Words and, per case, an array that scales the entries or rows of the right answer by those of an argument."""
-    for k, name in enumerate(names):
-        vectors = [_vectors(name, case[k]) if k < len(case) else {} for case in cases]
+    for k, name in enumerate(seen.names):
+        vectors = [_vectors(name, case[k]) if k < len(case) else {} for case in seen.cases]
         for words in vectors[0]:
             scales = [
                 v[words].reshape(-1, *[1] * (w.ndim - 1))
-                for v, w in zip(vectors, want, strict=True)
+                for v, w in zip(vectors, seen.want, strict=True)
                 if words in v and w.ndim and len(v[words]) == len(w) and np.all(v[words])
             ]
-            if len(scales) == len(cases):
+            if len(scales) == len(seen.cases):
                 yield words, scales
 
 
-def matrices(
-    names: tuple[str, ...], cases: list[tuple], want: list[np.ndarray]
-) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Words and, per case, the right answer with a square argument multiplied on, divided off, or transposed."""
-    for k, name in enumerate(names):
-        found = [case[k] for case in cases if k < len(case) and isinstance(case[k], np.ndarray)]
-        if len(found) < len(cases) or not all(
-            M.ndim == 2 and M.shape[0] == M.shape[1] and w.ndim and len(M) == len(w)
-            for M, w in zip(found, want, strict=True)
-        ):
+def matrices(seen: Seen) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Words and, per case, the right answer with a square argument multiplied on, or divided off."""
+    for k, name in enumerate(seen.names):
+        pairs = list(zip(seen.argument(k), seen.want, strict=False))
+        if not pairs or not all(w.ndim and M.shape == (len(w), len(w)) for M, w in pairs):
             continue
-        pairs = list(zip(found, want, strict=True))
         yield f"the factor {name} is one too many", [M @ w for M, w in pairs]
-        if all(abs(np.linalg.det(M)) > 1e-12 for M in found):
+        if all(abs(np.linalg.det(M)) > 1e-12 for M, _ in pairs):
             yield f"the factor {name} is missing", [np.linalg.solve(M, w) for M, w in pairs]

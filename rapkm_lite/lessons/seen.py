@@ -25,6 +25,11 @@ class Seen:
         """True when the model gives the same as the answer in every case."""
         return all(alike(m, g, self.slack) for m, g in zip(model, self.got, strict=True))
 
+    def argument(self, k: int) -> list[np.ndarray]:
+        """Argument k of all cases where it always is an array, else an empty list."""
+        values = [case[k] for case in self.cases if k < len(case) and isinstance(case[k], np.ndarray)]
+        return values if len(values) == len(self.cases) else []
+
     def __iter__(self) -> Iterator[tuple]:
         return zip(self.got, self.want, self.cases, strict=True)
 
