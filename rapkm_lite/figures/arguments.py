@@ -48,20 +48,18 @@ def _guard(picture: Callable) -> Callable:
     @functools.wraps(picture)
     def checked(*args, **named):
         given = signature.bind(*args, **named).arguments
-        known: Known = dict(given)
         parameters = [signature.parameters[name] for name in given]
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
-        asked = [p for p in plain if not (given[p.name] is None and p.default is None)]
-        for parameter in asked:
-            _check(parameter, given[parameter.name], known, _drawable)
+        for parameter in plain:
+            _check(parameter, given, _drawable)
         try:
             return picture(*args, **named)
         except Exception as error:
             if isinstance(error, RuntimeError) and type(error).__module__.startswith("rapkm_lite."):
                 raise  # a run that was lost, say
             # Curves may have gaps; where drawing failed, arguments are checked strictly, to name the wrong one.
-            for parameter in asked:
-                _check(parameter, given[parameter.name], known, _numbers)
+            for parameter in plain:
+                _check(parameter, given, _numbers)
             if isinstance(error, KeyError) and "allowed" in str(error):
                 raise ValueError(error.args[0]) from error  # a KeyError shows its words in quotes
             if "allowed" in str(error) or "needed" in str(error):
@@ -78,9 +76,10 @@ def _size(value) -> str:
     return f"an array {value.shape}" if isinstance(value, np.ndarray) else short(value)
 
 
-def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -> None:
+def _check(parameter: inspect.Parameter, known: Known, curve: Callable) -> None:
     name, kind, default = parameter.name, str(parameter.annotation), parameter.default
-    if value is None and kind.endswith("| None"):
+    value = known[name]
+    if value is None and (default is None or kind.endswith("| None")):
         return
     if kind == "bool" or isinstance(default, bool):
         switch(name, value)
@@ -103,10 +102,6 @@ def _check(parameter: inspect.Parameter, value, known: Known, curve: Callable) -
 def _dictionary(name: str, value) -> None:
     if not isinstance(value, dict) or not value:
         raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
-
-
-def _robot(name: str, value, known: Known) -> None:
-    manipulator(value, name)
 
 
 def _trajectory(name: str, value, known: Known) -> None:
@@ -222,7 +217,7 @@ def _gain(name: str, value, known: Known) -> None:
 
 
 _RULES: dict[str, Callable[[str, Any, Known], None]] = {
-    "robot": _robot,
+    "robot": lambda name, value, known: manipulator(value, name),
     "log": _having("a Log, such as mystery_run returns", "t q_a q_a_desired c"),
     "table": _having("what table1() returns", "measured simulated"),
     "q": _pose,
