@@ -35,10 +35,9 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
     friction = robot.friction if np.any(robot.friction) else load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
-    paths = {"centred triangle": central_triangle(robot)}
+    paths, table = {"centred triangle": central_triangle(robot)}, None
     if robot.same_kinematics(load()):
-        paths["reading of Table 1"] = experiment("table1_reading").trajectory
-    table = measured_energies() if robot.same_kinematics(load()) else None
+        paths["reading of Table 1"], table = experiment("table1_reading").trajectory, measured_energies()
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
         offset = marks.offset_values(offsets, N)
@@ -172,8 +171,8 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
-        q_a, samples, law = between(legs).copy(), late // 2, PD(7.05, 0.225)
-        q_a[samples:, 0], q_a[:samples, 0] = q_a[: len(q_a) - samples, 0].copy(), q_a[0, 0]
+        q_a, law = between(legs).copy(), PD(7.05, 0.225)
+        q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
         done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
         return done, antagonistic_torque(done)
 
