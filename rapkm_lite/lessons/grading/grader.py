@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,10 +85,9 @@ def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     grades = []
     for name, exercise in exercises().items():
         if name.startswith(f"{submission.lesson}."):
-            word, sentence, mistake = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
+            word, *said = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
             points = exercise.points if word in ("ok", "close") else 0.0
-            words, place = (sentence, mistake), str(submission.path)
-            grades.append(Grade(submission.student, name, word, points, exercise.points, *words, place))
+            grades.append(Grade(submission.student, name, word, points, exercise.points, *said, str(submission.path)))
     return grades
 
 
@@ -162,9 +162,7 @@ def _environment() -> dict[str, str]:
 def _end(worker: subprocess.Popen) -> None:
     """End a worker and what it started."""
     if os.name == "posix":
-        try:
+        with suppress(ProcessLookupError):
             os.killpg(worker.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
     worker.kill()
     worker.wait()

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import argparse
 import ast
-import contextlib
 import io
 import json
 import linecache
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -122,12 +123,11 @@ class NoNotebook:
         return lambda *arguments, **named: None
 
 
-def quiet() -> contextlib.ExitStack:
+@contextmanager
+def quiet() -> Iterator[None]:
     """Nothing that the student's code prints is kept."""
-    stack = contextlib.ExitStack()
-    stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
-    stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
-    return stack
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        yield
 
 
 def main(arguments: list[str]) -> None:
