@@ -179,15 +179,15 @@ def _known_mistake(exercise: Exercise, seen: Seen) -> None:
     """End the examination where the answer is that of a mistake the exercise knows by name."""
     if all(alike(w, g, seen.slack) for g, w, _ in seen):
         return
-    signs = {sentence: _sign(mistake, seen) for sentence, mistake in exercise.mistakes.items()}
-    # What explains the answer as it is goes before what explains its opposite.
-    for sentence in sorted(signs, key=lambda sentence: -signs[sentence]):
-        if signs[sentence] != 0:
-            turned = ", and the sign is opposite" * (signs[sentence] < 0)
-            off = ""
-            if all(g.shape == w.shape for g, w, _ in seen):
-                off = f"; off by up to {max(_deviation(g, w) for g, w, _ in seen):.3g} {exercise.unit}"
-            raise Ended("wrong", f"{sentence}{turned}{off}", sentence)
+    signs = {words: sign for words, mistake in exercise.mistakes.items() if (sign := _sign(mistake, seen))}
+    if signs:
+        # What explains the answer as it is goes before what explains its opposite.
+        sentence = max(signs, key=lambda words: signs[words])
+        turned = ", and the sign is opposite" * (signs[sentence] < 0)
+        off = ""
+        if all(g.shape == w.shape for g, w, _ in seen):
+            off = f"; off by up to {max(_deviation(g, w) for g, w, _ in seen):.3g} {exercise.unit}"
+        raise Ended("wrong", f"{sentence}{turned}{off}", sentence)
 
 
 def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> None:
@@ -198,9 +198,7 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> N
     words = named(seen)
     if not words and loose > 1e-6:
         _known_mistake(exercise, rough)
-    if words := words or named(rough):
-        raise Ended("wrong", f"{words}; {off}", words)
-    if words := where(seen, right):
+    if words := words or named(rough) or where(seen, right):
         raise Ended("wrong", f"{words}; {off}", words)
 
 
