@@ -27,6 +27,7 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.trajectory import Trajectory
+from .marks.given import numbers
 
 Known = dict[str, Any]
 # More samples or frames than this are a slip of the hand: they would take all the memory.
@@ -176,12 +177,7 @@ def _logical(value) -> bool:
 
 def _drawable(name: str, value, known: Known) -> None:
     """What Matplotlib would draw as a curve: numbers, of which some may be missing or hidden."""
-    try:
-        fine = np.ma.asarray(value).dtype.kind in "biuf" and not isinstance(value, bytes | bytearray)
-    except Exception:
-        fine = False
-    if not fine:
-        _numbers(name, value, known)
+    numbers(name, value, most=9)
 
 
 def _level(name: str, value, known: Known) -> None:

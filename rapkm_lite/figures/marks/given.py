@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...machine.arguments import exact_array, masked, of_kind, positive_number, real_array, short
+from ...machine.arguments import exact_array, masked, of_kind, one_of, positive_number, real_array, short
 
 
 def numbers(name: str, value, *shape: int, most: int = 0) -> np.ndarray:
@@ -54,7 +54,7 @@ def check_panel(settings: dict) -> None:
             numbers(name, real_array(name, value), -1)
         elif name == "legend":
             legend_entries(name, value)
-        elif name == "yscale" and value not in ("linear", "log"):
-            raise ValueError(f"yscale = {short(value)}; allowed: 'linear', 'log'")
+        elif name == "yscale":
+            one_of(name, value, ("linear", "log"))
         elif name == "aspect" and not (isinstance(value, str) and value in ("equal", "auto")):
             positive_number(name, value)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap, is_color_like, to_hex
 
-from ...machine.arguments import bounded, exact_array, real_array, short
+from ...machine.arguments import bounded, exact_array, one_of, real_array, short
 
 LINE = {"color", "linewidth", "linestyle", "alpha", "zorder", "solid_capstyle"}
 LINE |= {"marker", "markersize", "markerfacecolor", "markeredgewidth"}
@@ -66,14 +66,12 @@ def checked(kind: str, style: dict) -> dict:
         raise ValueError(f"{kind} has no style {unknown[0]!r}; allowed: {', '.join(sorted(allowed))}")
     for name in _SIZES & set(style):
         bounded(name, exact_array(name, style[name]), -np.inf if name == "zorder" else 0.0, strict=False)
-    if not isinstance(style.get("marker", "o"), str) or style.get("marker", "o") not in MARKERS:
-        raise ValueError(f"marker = {short(style['marker'])}; allowed: {', '.join(MARKERS)}")
+    one_of("marker", style.get("marker", MARKERS[0]), MARKERS)
     line = style.get("linestyle", "-")
     if not isinstance(line, str | tuple) or (isinstance(line, str) and line not in _DASHES):
         raise ValueError(f"linestyle = {short(line)}; allowed: {', '.join(map(repr, _DASHES))} or (0, (on, off, ...))")
     for name, places in _PLACES.items():
-        if style.get(name, places[0]) not in places:
-            raise ValueError(f"{name} = {style[name]!r}; allowed: {', '.join(places)}")
+        one_of(name, style.get(name, places[0]), places)
     try:
         canvas_style(kind, tuple(style.items()))
     except (IndexError, TypeError, ValueError) as error:

@@ -12,11 +12,11 @@ from ...mechanics.maps import sampling_box
 from ..maps import grid_points, on_grid
 
 
-def workspace_outline(robot, n: int = 161) -> np.ndarray:
+def workspace_outline(robot) -> np.ndarray:
     """Rings (k, 2) in m around the points that all arms reach, separated by rows of NaN."""
     left, right, low, high = sampling_box(robot)
     wide, tall = 0.01 * (right - left), 0.01 * (high - low)
-    x, y = np.linspace(left - wide, right + wide, n), np.linspace(low - tall, high + tall, n)
+    x, y = np.linspace(left - wide, right + wide, 161), np.linspace(low - tall, high + tall, 161)
     reach = np.linalg.norm(np.stack(np.meshgrid(x, y), axis=-1)[..., None, :] - robot.base, axis=-1)
     l1, l2 = robot.lengths.T
     inner = np.abs(l1 - l2)
@@ -40,10 +40,10 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
     return start + max(low - 1e-3 / max(np.linalg.norm(point - start), 1e-300), 0.0) * (point - start)
 
 
-def singular_curves(robot: Manipulator, mode=None) -> dict:
+def singular_curves(robot: Manipulator) -> dict:
     """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
     x, y, inside, points = grid_points(robot, 161)
-    values = distal_cross_products(robot, inverse_kinematics(robot, points, mode))
+    values = distal_cross_products(robot, inverse_kinematics(robot, points))
     return {pair: zero_lines(x, y, inside, values[:, i]) for i, pair in enumerate(drive_pairs(robot))}
 
 

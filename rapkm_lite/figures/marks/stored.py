@@ -28,8 +28,6 @@ _ALONE = (
     "<style>.jp-OutputArea-child:has(.rapkm-stored) + .jp-OutputArea-child:has(.jupyter-widgets)"
     ":not(:has(.rapkm, .noUi-target, button, input, select)){display:none}</style>"
 )
-
-
 _RIM = patheffects.withStroke(linewidth=2.5, foreground="white")
 _RC = mpl.rc_params_from_file(STYLE, use_default_template=False)
 
@@ -67,12 +65,12 @@ def figure(picture: Picture, problem: str = "") -> Figure:
     return made
 
 
-def png(picture: Picture, problem: str = "", dpi: float = 144) -> bytes:
+def png(picture: Picture, problem: str = "") -> bytes:
     """The picture as a PNG of 256 colours."""
     drawn = figure(picture, problem)
     file = io.BytesIO()
     with mpl.rc_context(_RC):
-        drawn.savefig(file, dpi=dpi)
+        drawn.savefig(file, dpi=144)
     image = Image.open(file).convert("RGB").quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     file = io.BytesIO()
     image.save(file, "PNG", optimize=True)
