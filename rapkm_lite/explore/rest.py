@@ -115,11 +115,10 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             seen.append(spots[np.argmin(far[:, i + 1] - 20 * room)])
             look = {"color": arm_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
             picture.text("opinions", *seen[-1], f"{i + 1}", **look)
-        corners = []
         if N == 3 and np.abs(cross(normal, np.roll(normal, 1, axis=0))).min() > 1e-9:
             corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
-        if corners and max(np.ptp(corners, axis=0)) < 3 * half:
-            picture.polygon("opinions", corners, facecolor="#DCE6F0", zorder=0.5)
+            if max(np.ptp(corners, axis=0)) < 3 * half:
+                picture.polygon("opinions", corners, facecolor="#DCE6F0", zorder=0.5)
         picture.line("opinions", 0, 0, color=NEUTRAL, marker="+", markersize=13, markeredgewidth=2, zorder=5)
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}
         picture.line("opinions", *rest, color=NEUTRAL, zorder=6, **tip)
