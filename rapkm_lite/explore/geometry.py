@@ -210,8 +210,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
 
     def draw(picture, level, side):
         t, least, projector = along(side)
-        wish = 1e-3 * level * np.ones(robot.n_arms)
-        stress = matvec(projector, wish)
+        stress = matvec(projector, np.full(robot.n_arms, 1e-3 * level))
         c = least + stress
         for panel, torque in (("without", least), ("with", c)):
             marks.traces(picture, panel, t.t, 1e3 * torque)

@@ -143,10 +143,6 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
 
 
-# Energies in J of the level lines.
-LEVELS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-
-
 @ready_made
 def landscape(robot: Manipulator | None = None) -> Explorer:
     """Level lines of the antagonistic energy over two offsets, and the share of each principal direction.
@@ -161,6 +157,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=robot.base.mean(axis=0) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
+    levels = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # J
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
@@ -173,10 +170,10 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         centre = -np.linalg.solve(S11, S12 @ dq[2:])
         rest = dq[2:] @ S[2:, 2:] @ dq[2:] - centre @ S11 @ centre
         root, taken = np.linalg.inv(np.linalg.cholesky(S11)).T, [dq[:2]]
-        for k, level in enumerate(LEVELS):
+        for k, level in enumerate(levels):
             if level > rest:
                 ring = centre[:, None] + np.sqrt(level - rest) * root @ wheel
-                shade = str(0.62 - 0.55 * k / (len(LEVELS) - 1))
+                shade = str(0.62 - 0.55 * k / (len(levels) - 1))
                 picture.line("map", *ring, color=shade, linewidth=1.6)
                 # The number stands where the lines are far apart, and on no other.
                 away = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1]
@@ -196,13 +193,12 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
             picture.text("shares", k + 1, share, f"{share:.2f}", ha="center", va="bottom", fontsize=9)
         picture.fit("shares", 1.2 * shares, symmetric=False, least=0.5)
-        for i in range(robot.n_arms):
-            for k in range(robot.n_arms):
-                at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
-                component = directions[i, k] * np.sign(directions[:, k].sum() or 1)
-                picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
-                va = "bottom" if component >= 0 else "top"
-                picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
+        directions *= np.where(directions.sum(axis=0) < 0, -1, 1)
+        for (i, k), component in np.ndenumerate(directions):
+            at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
+            picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
+            va = "bottom" if component >= 0 else "top"
+            picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")
         return {
             "antagonistic energy": f"{dq @ S @ dq:.2f} J",

@@ -80,10 +80,6 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=[["torque", "energy"], ["error", "energy"]], size=(9.4, 4.6))
 
 
-# Metres of arrow for 1 N on the testbed, and the newtons of the arrow that shows it.
-SCALE, UNIT = 0.4, 0.25
-
-
 @ready_made
 def animation(robot: Manipulator | None = None) -> Explorer:
     """The machine moves along the triangle; arrows are the forces of the drives at the end-effector.
@@ -94,13 +90,13 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N = robot.n_arms
     path, times = central_triangle(robot), size(robot)
-    # Forces of equal torques go with one over the length.
-    scale, unit, wide = SCALE * times**2, UNIT / times, 0.009 * times
-    calibration = {False: np.zeros(N), True: 1e-3 * np.resize([4.0, -2.0, 5.0], N)}
+    # Metres of arrow for 1 N, and newtons of the arrow that shows it: forces of equal torques go with one over the length.
+    scale, unit, wide = 0.4 * times**2, 0.25 / times, 0.009 * times
+    some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
 
     @lru_cache(maxsize=8)
     def recorded(filter: str, offsets: bool):
-        run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, calibration[offsets])
+        run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, offsets * some)
         A = act.control_matrix(robot, run.q)
         return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
 
@@ -151,9 +147,6 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 4.8), setup=setup, play="time")
 
 
-WAYS = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
-
-
 @ready_made
 def via_points(robot: Manipulator | None = None) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
@@ -167,6 +160,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
+    axes = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
     between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1)))
 
     @lru_cache(maxsize=128)
@@ -181,8 +175,8 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         there = len(path) // 2 + 1
         off = 1e3 * (done.x - path.x)[:there]
         pressing = 1e3 * null
-        for axis in (0, 1):
-            picture.trace("way", way[:there], off[:, axis], **WAYS[axis][1])
+        for values, (_, look) in zip(off.T, axes, strict=True):
+            picture.trace("way", way[:there], values, **look)
         picture.fit("way", off, least=1.0)
         curves(picture, "torque", done.t, pressing, 5.0)
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
@@ -194,7 +188,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         }
 
     along = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, edge)}
-    panels = {"way": along | {"legend": WAYS}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
+    panels = {"way": along | {"legend": axes}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
     counts = [(f"{edge / legs:.4g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
     controls = {
         "legs": choice("distance of the via points", counts, 8),

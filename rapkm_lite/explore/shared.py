@@ -18,8 +18,6 @@ from ..mechanics.trajectory import Trajectory, triangle
 from .controls import slider
 from .explorer import Explorer
 
-TIME = "time in s"
-
 
 def ready_made(make: Callable) -> Callable[..., Explorer]:
     """An explorer of the package, whose line of code has its name; a machine that was given is called robot there."""
@@ -99,13 +97,14 @@ def draw_forces(picture, A, torque: float) -> np.ndarray:
 def over_time(ylabel: str, end: float = 5.0, robot: Manipulator | None = None, **more) -> dict:
     """Keywords of a panel of curves over time up to `end` in s, with a legend of the drives of `robot`."""
     legend = {} if robot is None else {"legend": marks.drive_lines(robot)}
-    return {"xlabel": TIME, "ylabel": ylabel, "xlim": (0, end)} | legend | more
+    return {"xlabel": "time in s", "ylabel": ylabel, "xlim": (0, end)} | legend | more
 
 
 def curves(picture, panel: str, t, values, least: float, most: float = np.inf) -> None:
-    """A curve for each drive, values (k, N), and limits that hold them."""
+    """A curve for each drive, values (k, N), and limits that hold them; where they go beyond `most`, a word."""
     marks.traces(picture, panel, t, values)
     picture.fit(panel, values, least=least, most=most)
+    beyond(picture, panel, values)
 
 
 def beyond(picture, panel: str, values) -> None:

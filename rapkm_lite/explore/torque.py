@@ -17,10 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import beyond, central_triangle, curves, frictionless, length_slider, over_time, ready_made, size
-
-# Where torques in mN m and errors in mrad of a failing law leave the picture, so that those of a working one stay seen.
-MOST = {"torque": 1000.0, "error": 100.0}
+from .shared import central_triangle, curves, frictionless, length_slider, over_time, ready_made, size
 
 
 def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
@@ -82,9 +79,9 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        for panel, values, least in (("torque", torque, 50.0), ("error", error, 5.0)):
-            curves(picture, panel, run.t, values, least, MOST[panel])
-            beyond(picture, panel, values)
+        # What a failing law does leaves the picture, so that what a working one does stays seen.
+        curves(picture, "torque", run.t, torque, 50.0, most=1000.0)
+        curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {
