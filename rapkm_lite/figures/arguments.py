@@ -212,7 +212,7 @@ def _gain(name: str, value, known: Known) -> None:
         positive_number(name, value)
 
 
-_RULES: dict[str, Callable[[str, Any, Known], None]] = {
+_RULES: dict[str, Callable[[str, Any, Known], object]] = {
     "robot": lambda name, value, known: manipulator(value, name),
     "log": _having("a Log, such as mystery_run returns", "t q_a q_a_desired c"),
     "table": _having("what table1() returns", "measured simulated"),

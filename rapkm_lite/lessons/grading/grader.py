@@ -85,9 +85,10 @@ def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     grades = []
     for name, exercise in exercises().items():
         if name.startswith(f"{submission.lesson}."):
-            word, *said = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
+            word, sentence, mistake = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
             points = exercise.points if word in ("ok", "close") else 0.0
-            grades.append(Grade(submission.student, name, word, points, exercise.points, *said, str(submission.path)))
+            said = sentence, mistake, str(submission.path)
+            grades.append(Grade(submission.student, name, word, points, exercise.points, *said))
     return grades
 
 
