@@ -90,7 +90,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N = robot.n_arms
     path, times = central_triangle(robot), size(robot)
-    # Metres of arrow for 1 N, and newtons of the arrow that shows it: forces of equal torques go with one over the length.
+    # Metres of arrow for 1 N, newtons of the arrow that shows it; forces of equal torques go with one over the length.
     scale, unit, wide = 0.4 * times**2, 0.25 / times, 0.009 * times
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
 

@@ -51,9 +51,6 @@ class Answer:
     student : the same, guarded, where it is wrong or close and the lesson goes on with the package's; else None.
     """
 
-    own: Callable | None
-    student: Callable | None
-
     def __init__(self, function: Callable, own: Callable | None = None, student: Callable | None = None):
         functools.update_wrapper(self, function)
         self._function, self.own, self.student = function, own, student

@@ -107,21 +107,16 @@ def _own_value(own: Any, package: Any) -> Any:
         return np.full(np.shape(package), np.nan).view(NotYet)
 
 
-def own_answer(name: str) -> Any:
-    """The answer of this session that was wrong or close when it was checked last, guarded; None when there is none.
+def own_answer(name: str) -> tuple[str, Any]:
+    """The last verdict of this session on an exercise, "todo" before that, and the answer, guarded, if wrong or close.
 
     Raises ValueError for an unknown exercise.
     """
     _known(name)
     word, own = _latest.get(name, ("todo", None))
     if word not in ("wrong", "close"):
-        return None
-    return Answer(own) if callable(own) else tidied(own)
-
-
-def verdict_of(name: str) -> str:
-    """The verdict of this session on an exercise that was checked last, "todo" before that."""
-    return _latest.get(name, ("todo", None))[0]
+        return word, None
+    return word, Answer(own) if callable(own) else tidied(own)
 
 
 def hint(name: str, step: int | None = None) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .checker import own_answer, verdict_of
+from .checker import own_answer
 
 
 def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) -> None:
@@ -21,7 +21,7 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
     """
     from ..figures.style import ALARM, arm_colour  # matplotlib is not needed for a check
 
-    own = own_answer(name)
+    verdict, own = own_answer(name)
     if own is None:
         return
     try:
@@ -36,5 +36,5 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
     if per_arm:
         for i, line in enumerate(lines):
             line.set_color(arm_colour(i))
-    word = {"close": "close", "wrong": "not yet right"}[verdict_of(name)]
+    word = {"close": "close", "wrong": "not yet right"}[verdict]
     print(f"Dashed: your own {name} ({word}). Solid: the package's, with which the lesson goes on.")
