@@ -52,7 +52,7 @@ def _guard(picture: Callable) -> Callable:
         parameters = [signature.parameters[name] for name in given]
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
         for parameter in plain:
-            _check(parameter, given, _drawable)
+            _check(parameter, given)
         try:
             return picture(*args, **named)
         except Exception as error:
@@ -60,7 +60,7 @@ def _guard(picture: Callable) -> Callable:
                 raise  # a run that was lost, say
             # Curves may have gaps; where drawing failed, arguments are checked strictly, to name the wrong one.
             for parameter in plain:
-                _check(parameter, given, _numbers)
+                _check(parameter, given, strict=True)
             if isinstance(error, KeyError) and "allowed" in str(error):
                 raise ValueError(error.args[0]) from error  # a KeyError shows its words in quotes
             if "allowed" in str(error) or "needed" in str(error):
@@ -77,7 +77,7 @@ def _size(value) -> str:
     return f"an array {value.shape}" if isinstance(value, np.ndarray) else short(value)
 
 
-def _check(parameter: inspect.Parameter, known: Known, curve: Callable) -> None:
+def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> None:
     name, kind, default = parameter.name, str(parameter.annotation), parameter.default
     value = known[name]
     if value is None and (default is None or kind.endswith("| None")):
@@ -87,7 +87,8 @@ def _check(parameter: inspect.Parameter, known: Known, curve: Callable) -> None:
     elif kind == "str" or isinstance(default, str):
         _text(name, value)
     elif kind == "dict":
-        _dictionary(name, value)
+        if not isinstance(value, dict) or not value:
+            raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
     elif kind.startswith("int"):
         whole_number(name, value, -1 if default == -1 else 0, _MOST)
     elif kind == "float" or isinstance(default, float):
@@ -96,13 +97,10 @@ def _check(parameter: inspect.Parameter, known: Known, curve: Callable) -> None:
         function(name, value)
     elif name in _RULES:
         _RULES[name](name, value, known)
+    elif name in _CURVES and strict:
+        _numbers(name, value, known)
     elif name in _CURVES:
-        curve(name, value, known)
-
-
-def _dictionary(name: str, value) -> None:
-    if not isinstance(value, dict) or not value:
-        raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
+        numbers(name, value, most=9)
 
 
 def _trajectory(name: str, value, known: Known) -> None:
@@ -173,11 +171,6 @@ def _logical(value) -> bool:
         return isinstance(value, np.ndarray | list) and np.asarray(value).dtype == bool
     except ValueError:
         return False
-
-
-def _drawable(name: str, value, known: Known) -> None:
-    """What Matplotlib would draw as a curve: numbers, of which some may be missing or hidden."""
-    numbers(name, value, most=9)
 
 
 def _level(name: str, value, known: Known) -> None:
