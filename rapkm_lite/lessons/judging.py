@@ -22,9 +22,11 @@ def judged(exercise: Exercise, answer: Any) -> Result:
         answer = _unwrapped(answer)
         if exercise.judge and exercise.raw:
             return guarded(exercise.judge, answer)
-        if exercise.judge:
-            return _behaviour(exercise, answer)
-        return _near_and_far(exercise, answer)
+        cases = exercise.cases(np.random.default_rng(20_111_130))
+        if not exercise.is_value(cases) and not callable(answer):
+            words = "the answer is a value; give the function itself, without calling it"
+            raise Ended("wrong", words, "not a function")
+        return _behaviour(exercise, answer) if exercise.judge else _near_and_far(exercise, answer, cases)
     except Ended as end:
         return end.result._replace(sentence=end.result.sentence + "".join(getattr(end, "__notes__", ())))
 
@@ -44,9 +46,8 @@ def _is_far(case: tuple) -> TypeGuard[Case]:
     return isinstance(case, Case) and case.beyond
 
 
-def _near_and_far(exercise: Exercise, answer: Any) -> Result:
+def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     """The verdict on the plain cases; what is right there may fall short in those that lie beyond."""
-    cases = exercise.cases(np.random.default_rng(20_111_130))
     far = [case for case in cases if _is_far(case)]
     result = _numbers(exercise, answer, [case for case in cases if not _is_far(case)])
     if not far:
@@ -99,8 +100,6 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
 
 
 def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
-    if not exercise.is_value(cases) and not callable(answer):
-        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     seen = _seen(exercise, answer, cases)
     want = seen.want
     worst = [_deviation(g, w) for g, w, _ in seen]
@@ -228,8 +227,6 @@ def _design(exercise: Exercise, answer: Any) -> Any:
     """A design as its judge wants it: a function where one is asked for, else numbers of the right shape."""
     if callable(answer) and not callable(exercise.reference):
         raise Ended("wrong", "the answer is a function; a value is wanted", "not a value")
-    if not callable(answer) and callable(exercise.reference):
-        raise Ended("wrong", "the answer is a value; give the function itself, without calling it", "not a function")
     if callable(answer):
         # A judge may ask a design again for the same place; another check asks anew, whatever has become of it.
         # A class of the student's may make a law; one of the package is what was forgotten to be made.
