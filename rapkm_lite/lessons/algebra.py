@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .quantities import entrywise, matrices, quantities
-from .seen import Seen, alike, ratio_of
+from .seen import Seen, alike, largest, ratio_of
 
 
 def _argument(seen: Seen, k: int) -> list[np.ndarray]:
@@ -149,7 +149,7 @@ def _mixed(M: np.ndarray, part: str) -> str:
 def shifted(seen: Seen) -> str:
     """The right answer plus a constant."""
     gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
-    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    scale = max(map(largest, seen.want))
     if len(gaps) > 1 and np.ptp(gaps) <= min(seen.slack * max(scale, abs(gaps[0])), 0.1 * abs(gaps[0])):
         return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
     return ""

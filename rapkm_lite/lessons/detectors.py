@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .algebra import argument_factor, combination, constant_factor, from_argument, function_of, mixture, shifted
-from .seen import Seen, alike, ratio_of
+from .seen import Seen, alike, largest, ratio_of
 
 # Factor -> what it tells.
 FACTORS = {
@@ -58,7 +58,7 @@ def _some_signs(seen: Seen) -> str:
     """Words for the rows, columns or entries that have the opposite sign."""
     if seen.want[0].ndim == 0:
         return "the size is right, but in some cases the sign is opposite"
-    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    scale = max(map(largest, seen.want))
     flipped = {
         tuple(int(i) for i in place) for g, w, _ in seen for place in np.argwhere(np.abs(g - w) > seen.slack * scale)
     }
@@ -89,9 +89,9 @@ def transposed(seen: Seen) -> str:
 
 def _reordered(got: np.ndarray, want: np.ndarray, slack: float) -> bool:
     """True when the rows of one are the rows of the other in some order."""
-    left, limit = list(range(len(want))), slack * float(np.max(np.abs(want), initial=1e-300))
+    left, limit = list(range(len(want))), slack * max(largest(want), 1e-300)
     for row in got:
-        match = next((i for i in left if np.max(np.abs(want[i] - row), initial=0.0) <= limit), None)
+        match = next((i for i in left if largest(want[i] - row) <= limit), None)
         if match is None:
             return False
         left.remove(match)
@@ -156,7 +156,7 @@ def _wrong_lines(seen: Seen) -> str:
     shapes = {w.shape for w in seen.want}
     if len(shapes) > 1 or len(shape := shapes.pop()) not in (1, 2):
         return ""
-    scale = max(float(np.max(np.abs(w), initial=0.0)) for w in seen.want)
+    scale = max(map(largest, seen.want))
     wrong = np.any([np.abs(g - w) > seen.slack * scale for g, w, _ in seen], axis=0)
     for axis in range(len(shape)):
         lines = wrong if wrong.ndim == 1 else wrong.any(axis=1 - axis)

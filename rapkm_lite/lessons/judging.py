@@ -13,7 +13,7 @@ from ..machine.manipulator import Manipulator
 from .answers import NOTHING, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
-from .seen import Seen, alike, ratio_of
+from .seen import Seen, alike, largest, ratio_of
 
 
 def judged(exercise: Exercise, answer: Any) -> Result:
@@ -103,7 +103,7 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     seen = _seen(exercise, answer, cases)
     want = seen.want
     worst = [_deviation(g, w) for g, w, _ in seen]
-    allowed = [max(exercise.tolerance, 1e-9 * _size(w)) for w in want]
+    allowed = [max(exercise.tolerance, 1e-9 * largest(w)) for w in want]
     right = [d <= a for d, a in zip(worst, allowed, strict=True)]
     lawful, sentence = _law(exercise, seen)
     if all(right) and lawful <= exercise.tolerance:
@@ -134,17 +134,13 @@ def _by_a_factor(seen: Seen) -> bool:
 
 def _share(worst: list[float], want: list[np.ndarray], right: list[bool]) -> float:
     """The largest deviation, relative: small cases against the mean size, for a search errs as much everywhere."""
-    usual = float(np.mean([_size(w) for w in want])) or 1.0
-    return max(d / max(_size(w), usual) if not good else 0.0 for d, w, good in zip(worst, want, right, strict=True))
-
-
-def _size(want: np.ndarray) -> float:
-    return float(np.max(np.abs(want), initial=0.0))
+    usual = float(np.mean([largest(w) for w in want])) or 1.0
+    return max(d / max(largest(w), usual) if not good else 0.0 for d, w, good in zip(worst, want, right, strict=True))
 
 
 def _deviation(got: np.ndarray, want: np.ndarray) -> float:
     with np.errstate(over="ignore"):
-        return float(np.max(np.abs(got - want), initial=0.0))
+        return largest(got - want)
 
 
 def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
@@ -191,7 +187,7 @@ def _known_mistake(exercise: Exercise, seen: Seen) -> None:
 
 def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> None:
     """End the examination with the name of the mistake, or with the place where it was made, if either is found."""
-    scale = max(map(_size, seen.want), default=0.0) or 1.0
+    scale = max(map(largest, seen.want), default=0.0) or 1.0
     loose = min(0.2, max(1e-6, exercise.close, 1.5 * exercise.tolerance / scale))
     rough = replace(seen, slack=loose)
     words = named(seen)

@@ -39,7 +39,12 @@ def alike(model, got: np.ndarray, slack: float) -> bool:
     model = np.asarray(model, dtype=float)
     if model.shape != got.shape or not np.all(np.isfinite(model)):
         return False
-    return float(np.max(np.abs(model - got), initial=0.0)) <= slack * float(np.max(np.abs(model), initial=1e-300))
+    return largest(model - got) <= slack * max(largest(model), 1e-300)
+
+
+def largest(array: np.ndarray) -> float:
+    """The largest magnitude among the entries; 0.0 where there are none."""
+    return float(np.max(np.abs(array), initial=0.0))
 
 
 def ratio_of(got: list[np.ndarray], want: list[np.ndarray]) -> float:
