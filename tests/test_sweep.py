@@ -50,6 +50,15 @@ def test_rows_are_single_runs(law, sensors):
         np.testing.assert_allclose(study.torque_norm[i], np.sqrt(mean_square), rtol=1e-10)
 
 
+def test_rows_of_a_law_in_python_are_single_runs_too():
+    def law(t, q_a, qd_a, desired):
+        return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
+
+    fast, slow = (rk.sweep(ROBOT, law, PATH, OFFSETS[:2]) for law in (PD, law))
+    for name in COLUMNS:
+        np.testing.assert_allclose(getattr(slow, name), getattr(fast, name), rtol=1e-10, atol=1e-12)
+
+
 def test_bits_do_not_depend_on_chunks_threads_or_order():
     law = rk.AntagonismFilter(PD)
     study = rk.sweep(ROBOT, law, PATH, OFFSETS)
