@@ -34,7 +34,7 @@ class Code:
         return self.form, self.filter, self.true_pose, self.switched, self.user
 
 
-_FORMS = {
+FORMS = {
     PD: "PD",
     PID: "PID",
     APD: "APD",
@@ -43,7 +43,7 @@ _FORMS = {
     RedundantAPD: "REDUNDANT_APD",
     RedundantCTC: "REDUNDANT_CTC",
 }
-_FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
+FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
 
 
 def code_of(law: Any, model) -> Code | None:
@@ -52,8 +52,8 @@ def code_of(law: Any, model) -> Code | None:
     The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
     """
     form, weights, pose = "NO_FILTER", None, getattr(law, "pose", None)
-    if type(law) in _FILTERS:
-        form, weights, law = _FILTERS[type(law)], getattr(law, "W", None), law.law
+    if type(law) in FILTERS:
+        form, weights, law = FILTERS[type(law)], getattr(law, "W", None), law.law
         if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
             return None
     own = getattr(law, "W", None)
@@ -62,7 +62,7 @@ def code_of(law: Any, model) -> Code | None:
         return None
     if type(law) is CompiledLaw:
         code, drives, run, user = "USER", {}, {}, law
-    elif type(law) in _FORMS and not any(np.ndim(getattr(law, name, 0.0)) > 1 for name in ("K_P", "K_D", "K_I")):
+    elif type(law) in FORMS and not any(np.ndim(getattr(law, name, 0.0)) > 1 for name in ("K_P", "K_D", "K_I")):
         (code, drives, run), user = _gains(law, model.n_arms), None
     else:
         return None
@@ -72,7 +72,7 @@ def code_of(law: Any, model) -> Code | None:
 
 def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
     """Code of a law of this package, and what it fills the rows of drives and runs with."""
-    code = _FORMS[type(law)]
+    code = FORMS[type(law)]
     if code in ("PD", "PID"):
         names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == "PID" else {})
         return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}

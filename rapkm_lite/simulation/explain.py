@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from ..control.compiled_law import CompiledLaw
-from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.grammar import BadAnswer, coordinates
-from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
+from ..control.laws import PID
 from ..machine.arguments import short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
+from .codes import FILTERS, FORMS
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
 from .faults import Fault, TorqueLimit, blank_table
 from .growth import growth, inner_law, magnified, swung
@@ -262,10 +262,9 @@ def _runs(setup: Setup, law, k: int) -> bool:
 
 def _written_by_user(law):
     """The part of a law that a user wrote; None where all of it is of this package."""
-    if type(law) in (AntagonismFilter, CommandFilter):
+    if type(law) in FILTERS:
         return _written_by_user(law.law)
-    ours = type(law) in (PD, PID, APD, CTC, SwitchedCTC, RedundantAPD, RedundantCTC)
-    return None if ours else law
+    return None if type(law) in FORMS else law
 
 
 def _name(law) -> str:
