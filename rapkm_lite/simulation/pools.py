@@ -6,6 +6,7 @@ import pickle
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 
 from ..machine.arguments import short
 
@@ -73,18 +74,17 @@ class Serial(Executor):
     """Does a job when its result is asked for, in the thread that asks."""
 
     def submit(self, function, *arguments, **named):
-        return Job(function, arguments, named)
+        return Job(partial(function, *arguments, **named))
 
 
 class Job(Future):
     """A job of `Serial`."""
 
-    def __init__(self, *job):
+    def __init__(self, work):
         super().__init__()
-        self._job = job
+        self._work = work
 
     def result(self, timeout=None):
         if not self.done():
-            function, arguments, named = self._job
-            self.set_result(function(*arguments, **named))
+            self.set_result(self._work())
         return super().result(timeout)
