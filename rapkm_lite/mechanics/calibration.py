@@ -208,18 +208,16 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
 
 def _searched(*given):
     """As `_minimum`, with more courage where it is refused; the refusal is that of the more cautious searches."""
-    try:
-        return _minimum(*given)
-    except CalibrationError as error:
-        refusal = error
-    for courage in (1, 2):
+    refused = {}
+    for courage in range(3):
         try:
             return _minimum(*given, courage=courage)
         except CalibrationError as error:
-            refusal = error if courage == 1 else refusal
+            refused[courage] = error
         except ValueError:
-            continue
-    raise refusal
+            if courage == 0:
+                raise
+    raise refused.get(1, refused[0])
 
 
 def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
