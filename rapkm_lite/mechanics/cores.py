@@ -13,6 +13,10 @@ from ..machine.tree import Tree
 from .linalg import linear, minors, orthogonal, pairs, pivots, product, solve
 
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+_INPUT_SINGULARITY = (
+    "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
+    "actuation"
+)
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
@@ -229,10 +233,7 @@ def full_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Q, R = orthogonal(A)
     measure = pivots(R)[1]
     if measure < 1e-12:
-        raise ValueError(
-            f"{name} has lost rank (relative pivot {measure:.3g}): an input singularity, where the drives cannot "
-            "produce every control force; allowed: poses with the full degree of actuation"
-        )
+        raise ValueError(f"{name} has lost rank (relative pivot {measure:.3g}): {_INPUT_SINGULARITY}")
     return Q, R
 
 
@@ -272,8 +273,5 @@ def redundant_right_inverse(T: np.ndarray, m: int) -> np.ndarray:
         square = (X * X).sum((-2, -1), keepdims=True) / 2
         smallest = square.min(initial=np.inf)
     if smallest < 1e-24:
-        raise ValueError(
-            f"A~ has lost rank (product of its singular values {smallest**0.5:.3g}): an input singularity, "
-            "where the drives cannot produce every control force; allowed: poses with the full degree of actuation"
-        )
+        raise ValueError(f"A~ has lost rank (product of its singular values {smallest**0.5:.3g}): {_INPUT_SINGULARITY}")
     return product(X, turned, T.mT) / square
