@@ -17,7 +17,7 @@ from ..machine.manipulator import Manipulator, crossings
 from . import cores
 from .at import At, at
 from .closure import estimate_pose, misfit
-from .kinematics import cross, unit_vector
+from .kinematics import cross, turn, unit_vector
 from .linalg import minors
 
 
@@ -150,10 +150,8 @@ def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
 def gauge(robot: Manipulator) -> np.ndarray:
     """Scale, rotation and translations of the base points alone, orthonormal columns (2N, 4)."""
     arm = robot.base - robot.base.mean(axis=0)
-    turned = np.stack([-arm[:, 1], arm[:, 0]], axis=-1)
-    ones = np.ones(robot.n_arms)
-    shifts = (np.outer(ones, axis).ravel() for axis in np.eye(2))
-    return np.linalg.qr(np.stack([arm.ravel(), turned.ravel(), *shifts], axis=-1))[0]
+    shifts = np.tile(np.eye(2), (robot.n_arms, 1))
+    return np.linalg.qr(np.column_stack([arm.ravel(), turn(arm).ravel(), shifts]))[0]
 
 
 def cautions(

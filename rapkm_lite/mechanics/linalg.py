@@ -50,9 +50,8 @@ def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.nd
     packed, scales, _, _ = factor(M)
     R = packed[:k] * _upper(k)
     if complete:
-        start = np.empty((m, m), order="F")
-        start[:, :k] = packed
-        return generate(start, scales, overwrite_a=1)[0], R
+        columns, packed = packed, np.empty((m, m), order="F")
+        packed[:, :k] = columns
     return generate(packed, scales, overwrite_a=1)[0], R
 
 

@@ -76,7 +76,7 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
     N = manipulator(robot).n_arms
     drives = list(range(N) if pair is None else joint_indices("pair", pair, N, 2, "drive"))
     x, y, inside = workspace_grid(robot, n, box)
-    values = _MEASURES[measure](robot, _poses(robot, x, y, inside, mode), drives)
+    values = _MEASURES[measure](robot, poses_inside(robot, x, y, inside, mode), drives)
     return x, y, _on_grid(values, inside, limit=1e12)
 
 
@@ -96,7 +96,7 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     """
     one_of("rule", rule, ("cross", *PARTITION_RULES))
     x, y, inside = workspace_grid(robot, n, box)
-    q = _poses(robot, x, y, inside, mode)
+    q = poses_inside(robot, x, y, inside, mode)
     if rule == "cross":
         merit = np.abs(distal_cross_products(robot, q))
     else:
@@ -108,8 +108,8 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
 
 
-def _poses(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode) -> np.ndarray:
-    """Joint angles (..., points inside, 2N)."""
+def poses_inside(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode=None) -> np.ndarray:
+    """Joint angles (..., points inside, 2N) on a `workspace_grid`."""
     points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
     mode = robot.mode if mode is None else real_array("mode", mode, robot.n_arms)
     return inverse_kinematics(robot, points, mode[..., None, :])

@@ -8,7 +8,7 @@ from ..machine.arguments import exact_array, positive_number
 from ..machine.manipulator import Manipulator, manipulator
 from .at import at
 from .kinematics import inverse_kinematics, reachable
-from .maps import workspace_grid
+from .maps import poses_inside, workspace_grid
 
 # Loops are closed by stiff, critically damped springs between the tips: the gaps of a run stay below a nanometre.
 _LOOP = 'solref="-1e6 -2e3" solimp="0.9999 0.9999 0.001"'
@@ -41,8 +41,7 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     gx, gy = robot.gravity
     arms = "".join(_arm(robot, i, pose) for i in range(N))
     loops = "".join(f'    <connect site1="tip{i + 1}" site2="tip2" {_LOOP}/>\n' for i in range(N) if i != 1)
-    drives = [f"drive{i + 1}" for i in range(N)]
-    motors = "".join(f'    <motor name="{d}" joint="base{i + 1}"/>\n' for i, d in enumerate(drives))
+    motors = "".join(f'    <motor name="drive{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
     angles = "".join(f'    <jointpos name="q{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
     rates = "".join(f'    <jointvel name="qd{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
     # A tree is read arm by arm: base1 elbow1 base2 elbow2 ...
@@ -65,8 +64,7 @@ def _home(robot: Manipulator) -> np.ndarray:
     if np.all(reachable(robot, centre)) and _bend(q := inverse_kinematics(robot, centre)) > 0.1:
         return q
     try:
-        x, y, inside = workspace_grid(robot, 100)
-        q = inverse_kinematics(robot, np.stack(np.meshgrid(x, y), axis=-1)[inside])
+        q = poses_inside(robot, *workspace_grid(robot, 100))
         return q[np.argmax(_bend(q))]
     except ValueError:
         raise ValueError(

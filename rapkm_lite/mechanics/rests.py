@@ -51,15 +51,10 @@ class Rests(NamedTuple):
         both = np.array([1.0, b[0]])
         noise = np.mean(both @ self.noise[:, i] @ both)
         if spare:
-            noise = max(noise, self.records @ left**2 / spare * max(1.0, _student(spare) / 5.0) ** 2)
+            from scipy.special import stdtrit
+
+            noise = max(noise, self.records @ left**2 / spare * max(1.0, stdtrit(spare, 0.9995) / 5.0) ** 2)
         return b, np.linalg.inv(information) * noise
-
-
-def _student(freedom: int) -> float:
-    """The quantile of Student's t beyond which lies a thousandth, on both sides."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, 0.9995))
 
 
 class Gain(NamedTuple):

@@ -11,6 +11,7 @@ from ..machine.arguments import check_leading, exact_array, positive_number, rea
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
 from . import sampling
+from .kinematics import unit_vector
 from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_edges, slow_turns
 
 
@@ -239,7 +240,7 @@ def triangle(
     if abs(angle) > 1e6:
         raise ValueError(f"angle = {angle:g} rad; allowed: up to 1e6 rad, beyond which corners would be rounded")
     turned = angle + np.deg2rad([210.0, 330.0, 90.0])
-    corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * unit_vector(turned)
     return _polygon(robot, corners, duration, dt, rest, {"side": side, "centre": centre, "angle": angle})
 
 
