@@ -39,7 +39,7 @@ def exercises() -> dict[str, Exercise]:
 
 def _known(name: str) -> Exercise:
     found = exercises()
-    known("name", name, sorted(found))
+    known("name", [name], sorted(found))
     return found[name]
 
 

@@ -33,12 +33,17 @@ UNITS_OF = {
 """Keys of every table of a data file, and their units."""
 
 
-def known(what: str, key, allowed) -> None:
-    """Refuse a word that is none of those allowed, with the nearest one."""
-    if not isinstance(key, str) or key not in allowed:
-        close = difflib.get_close_matches(str(key), allowed, n=1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
-        raise ValueError(f"unknown {what} {short(key)}{hint}; allowed: {', '.join(sorted(allowed))}")
+def known(what: str, keys, allowed) -> None:
+    """Refuse words that are none of those allowed, with the nearest one."""
+    for key in keys:
+        if not isinstance(key, str) or key not in allowed:
+            words = f"unknown {what} {short(key)}{_nearest(key, allowed)}"
+            raise ValueError(f"{words}; allowed: {', '.join(sorted(allowed))}")
+
+
+def _nearest(key, allowed) -> str:
+    close = difflib.get_close_matches(str(key), allowed, n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def data_path(name: str) -> Path:
@@ -83,8 +88,7 @@ def read_toml(source: str | Path) -> dict:
         raise _unread(path, "is nested too deeply") from None
     except ValueError as error:  # also a NUL in the path, and numbers of more digits than Python reads
         raise _unread(path, f"is not valid TOML: {error}") from None
-    for key in tables:
-        known("TOML table", key, ["name", "about", *UNITS_OF])
+    known("TOML table", tables, ["name", "about", *UNITS_OF])
     return {key: _table(key, value) for key, value in tables.items()}
 
 
@@ -101,8 +105,7 @@ def _entries(name: str, values) -> dict:
     of_kind(name, values, dict, f"a table [{name}]")
     for key, value in values.items():
         if name == "fault" and key not in UNITS_OF[name] and isinstance(value, dict) and "unit" in value:
-            close = difflib.get_close_matches(key, UNITS_OF[name], n=1)
-            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            hint = _nearest(key, UNITS_OF[name])
             words = f"which is not known here{hint}; allowed: a number in the unit of its class"
             raise ValueError(f"{key} in [[fault]] has the unit {short(value['unit'])}, {words}")
     return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
@@ -116,8 +119,7 @@ def _plain(key: str, value, unit: str | None):
     """The number of {value, unit, source}; keys without a unit of ours are left to who reads the table."""
     if not isinstance(value, dict):
         return value
-    for part in value:
-        known(f"entry of {key}", part, ["value", "unit", "source"])
+    known(f"entry of {key}", value, ["value", "unit", "source"])
     if "value" not in value:
         raise ValueError(f"{key} = {short(value)} lacks its value; needed: value, allowed beside it: unit, source")
     if unit is not None and value.get("unit", unit) != unit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -57,7 +57,7 @@ class Manipulator(Value):
     gravity: Array = default((0.0, 0.0))
     load: float = 0.0
     mode: Array = default(1)
-    name: str = field(default="manipulator")
+    name: str = "manipulator"
 
     def __post_init__(self):
         base = _base_points(self.base)
@@ -93,8 +93,7 @@ class Manipulator(Value):
         if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
             raise ValueError(
                 f"lengths = {lengths.round(6).tolist()} let no point be reached by all {N} arms from base = "
-                f"{base.round(6).tolist()}; "
-                "allowed: arms that can meet (longer links or closer base points)"
+                f"{base.round(6).tolist()}; allowed: arms that can meet (longer links or closer base points)"
             )
 
     @cached_property
@@ -147,8 +146,7 @@ class Manipulator(Value):
         keeps its class, and what the class has set besides.
         Raises ValueError for an unknown name, and for another number of arms that does not go with what is kept.
         """
-        for key in changes:
-            known("argument", key, [f.name for f in dataclasses.fields(self)])
+        known("argument", changes, [f.name for f in dataclasses.fields(self)])
         rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
         middles = np.array_equal(self.centers, self.lengths / 2)
         changes = ({"inertias": None} if rods else {}) | ({"centers": None} if middles else {}) | changes
@@ -253,8 +251,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """
     tables = read_toml(source)
     values = tables.get("manipulator", {})
-    for key in values:
-        known("TOML key", key, list(UNITS))
+    known("TOML key", values, UNITS)
     for key in ("base", "lengths", "masses"):
         if key not in values:
             raise ValueError(f"the table [manipulator] of {str(source)!r} lacks {key!r}; needed: base, lengths, masses")

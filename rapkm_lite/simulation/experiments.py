@@ -66,8 +66,7 @@ def experiment(source="testbed") -> Experiment:
     """
     robot, tables = load(source), read_toml(source)
     for table, needed in (("control", ("K_P", "K_D")), ("path", ()), ("sensor", ())):
-        for key in tables.get(table, {}):
-            known(f"TOML key in [{table}]", key, list(UNITS_OF[table]))
+        known(f"TOML key in [{table}]", tables.get(table, ()), UNITS_OF[table])
         if table != "sensor" and table not in tables:
             raise ValueError(f"the file {str(source)!r} lacks the table [{table}]; needed: [control] and [path]")
         for key in needed:

@@ -233,13 +233,12 @@ def read_fault(table) -> Fault:
     if not isinstance(table, dict) or "kind" not in table:
         raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(kinds())}")
     values = {key: value for key, value in table.items() if key != "kind"}
-    known("kind of fault", table["kind"], list(kinds()))
+    known("kind of fault", [table["kind"]], kinds())
     kind = kinds()[table["kind"]]
     # The signature knows defaults, also of a class that is no dataclass.
     parameters = inspect.signature(kind).parameters.values()
     given = {p.name: p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)}
-    for key in values:
-        known(f"entry of {table['kind']}", key, list(given))
+    known(f"entry of {table['kind']}", values, given)
     needed = [name for name, parameter in given.items() if parameter.default is parameter.empty]
     for name in needed:
         if name not in values:
