@@ -42,7 +42,7 @@ def answer(job: Future, first: int, setup, laws, offsets):
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         named = {f"law of run {i}": law for i, law in enumerate(laws, first)}
         for name, value in (named | {f"fault {i}": fault for i, fault in enumerate(setup.broken)}).items():
-            if words := _kept_here(value):
+            if words := kept_here(value):
                 raise ValueError(
                     f"{name} = {short(value)} cannot be sent to another process ({words}); allowed: what pickle sends, "
                     "such as a def or a class of a module, or threads (executor = None or a ThreadPoolExecutor)"
@@ -50,10 +50,10 @@ def answer(job: Future, first: int, setup, laws, offsets):
         raise
 
 
-def _kept_here(value) -> str:
+def kept_here(value) -> str:
     """Why a value cannot be sent to another process; nothing where it can."""
     try:
-        pickle.dumps(value)
+        pickle.loads(pickle.dumps(value))
         return ""
     except Exception as error:
         return " ".join(str(error).split()) or type(error).__name__

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +24,7 @@ from .explain import explain
 from .faults import Fault, FaultsLike, check_faults, fault_table
 from .loop import again_in_python, closed_loop, own_copy
 from .patience import patience
+from .pools import kept_here
 from .sensors import Encoders, Sensors
 from .setup import Outcome, Setup, friction_steps, prepare
 
@@ -53,7 +53,7 @@ class SimulationError(RuntimeError):
         self.time, self.reason, self.partial, self.run, self.sweep = time, reason, partial, run, sweep
 
     def __reduce__(self):
-        cause = self.__cause__ if _picklable(self.__cause__) else None
+        cause = None if kept_here(self.__cause__) else self.__cause__  # its words are in `reason`
         arguments = self.time, self.reason, self.partial, self.run, self.sweep
         return SimulationError, arguments, (cause, list(getattr(self, "__notes__", [])))
 
@@ -269,12 +269,3 @@ def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so."""
     error.partial = partial
     error.add_note(note)
-
-
-def _picklable(error) -> bool:
-    """Can the cause travel?  An exception of a class from a notebook may not; its words are in `reason`."""
-    try:
-        pickle.loads(pickle.dumps(error))
-        return True
-    except Exception:
-        return False
