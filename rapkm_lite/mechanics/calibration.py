@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -84,7 +84,7 @@ class Calibration(Value):
     residual: float
     K_P: Any
     corrected: Manipulator
-    note: str = field(default="")
+    note: str = ""
 
     def interval(self, level: float = 0.95) -> np.ndarray:
         """Lower and upper limits (2, p) of the estimate at a level of confidence between 0 and 1, each on its own.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, real_array
+from ..machine.arguments import real_array
 from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator, crossings
 from . import cores
@@ -91,7 +91,7 @@ def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
     best = np.argmin(_fit(robot, angles, starts), axis=0)
     try:
         return estimate_pose(robot, angles, starts[best, np.arange(len(angles))])
-    except (ConvergenceError, ValueError) as error:
+    except ValueError as error:
         raise ValueError(f"log holds angles that fit no pose of {robot!r}: {error}") from None
 
 

@@ -54,8 +54,7 @@ def projector(J) -> np.ndarray:
     >>> projector([[1.0, 0.0, 0.0]]) @ [1.0, 2.0, 3.0]
     array([0., 2., 3.])
     """
-    J = _jacobian(J)
-    return cores.projector(*cores.row_space(J, _size(J), of_pose=False))
+    return cores.projector(*_row_space(_jacobian(J)))
 
 
 def projector_dot(J, J_dot) -> np.ndarray:
@@ -65,7 +64,7 @@ def projector_dot(J, J_dot) -> np.ndarray:
     -2.0
     """
     J, J_dot = _jacobians(J, J_dot)
-    Q, R = cores.row_space(J, _size(J), of_pose=False)
+    Q, R = _row_space(J)
     return cores.projector_dot(Q, R, J_dot, cores.projector(Q, R))
 
 
@@ -114,8 +113,8 @@ def _independent(J: np.ndarray, independent) -> list[int]:
     return list(joint_indices("independent", independent, n, n - J.shape[-2]))
 
 
-def _size(J: np.ndarray) -> float:
-    return max(float(np.abs(J).max(initial=0.0)), 1e-300)
+def _row_space(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return cores.row_space(J, max(float(np.abs(J).max(initial=0.0)), 1e-300), of_pose=False)
 
 
 def _tree(n: int, lead: tuple[int, ...], G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
