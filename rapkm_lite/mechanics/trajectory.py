@@ -205,15 +205,14 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
 
 def _polygon(robot: Manipulator, corners: np.ndarray, duration, dt, rest, given: dict) -> Trajectory:
     t, rest, edges = sample_times(duration, dt), float(exact_array("rest", rest)), len(corners)
-    edge_time = slow_edges(t, edges, rest)
-    ends = np.roll(corners, -1, axis=0)
+    edge_time, steps = slow_edges(t, edges, rest), np.roll(corners, -1, axis=0) - corners
 
     def motion(rows: slice):
         phase = np.clip((t[rows] - rest) / edge_time, 0.0, edges)
         edge = np.minimum(np.floor(phase).astype(int), edges - 1)
         s = phase - edge
         way, rate, rate_dot = quintic(s)
-        first, step = corners.T[:, edge], (ends - corners).T[:, edge]
+        first, step = corners.T[:, edge], steps.T[:, edge]
         return (first + way * step).T, (rate * step / edge_time).T, (rate_dot * step / edge_time**2).T
 
     return _follow(robot, t, motion, given)
