@@ -51,13 +51,11 @@ def code_of(law: Any, model) -> Code | None:
 
     The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
     """
-    form, weights, pose = "NO_FILTER", None, getattr(law, "pose", None)
+    form, weights, pose = "NO_FILTER", getattr(law, "W", None), getattr(law, "pose", None)
     if type(law) in FILTERS:
-        form, weights, law = FILTERS[type(law)], getattr(law, "W", None), law.law
+        form, law = FILTERS[type(law)], law.law
         if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
             return None
-    own = getattr(law, "W", None)
-    weights = weights if own is None else own
     if weights is not None and np.ndim(weights) > 1:
         return None
     if type(law) is CompiledLaw:
@@ -77,9 +75,9 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         names = {"GAIN_P": "K_P", "GAIN_D": "K_D"} | ({"GAIN_I": "K_I", "LIMIT": "limit"} if code == "PID" else {})
         return code, {row: _per(name, getattr(law, name), N) for row, name in names.items()}, {}
     if code in ("REDUNDANT_APD", "REDUNDANT_CTC"):
-        (P, elbow_P), (D, elbow_D) = _joint_gains("K_P", law.K_P, N), _joint_gains("K_D", law.K_D, N)
+        P, D = (np.diagonal(joint_gain(name, getattr(law, name), N)) for name in ("K_P", "K_D"))
         code = code if law.projected else f"{code}_LINE2"
-        return code, {"GAIN_P": P, "ELBOW_P": elbow_P, "GAIN_D": D, "ELBOW_D": elbow_D}, {}
+        return code, {"GAIN_P": P[:N], "ELBOW_P": P[N:], "GAIN_D": D[:N], "ELBOW_D": D[N:]}, {}
     gains = *_per("K_P", law.K_P, 2), *_per("K_D", law.K_D, 2)
     joints = getattr(law, "independent", None) or (-1, -1)
     if max(joints) >= 2 * N:
@@ -94,9 +92,3 @@ def _per(name: str, value, size: int) -> np.ndarray:
     if value.shape not in ((), (size,)):
         raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
     return np.full(size, value)
-
-
-def _joint_gains(name: str, K, N: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gains of drives and elbows."""
-    diagonal = np.diagonal(joint_gain(name, K, N))
-    return diagonal[:N], diagonal[N:]
