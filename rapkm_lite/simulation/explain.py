@@ -44,12 +44,18 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
             return str(cause)
         return f"the law raised {type(cause).__name__}{_said(cause)}{place(cause)}"
     if status == TOO_STIFF:
-        return too_stiff(setup)
+        friction, v0 = setup.robot.friction.max(), setup.robot.friction_velocity
+        return (
+            f"{REASONS[TOO_STIFF]} of {setup.trajectory.dt:g} s: f_c / v0 = {friction / v0:g} N m s/rad (friction "
+            f"{friction:g} N m, friction_velocity {v0:g} rad/s) needs more than 4000 steps in a hold; allowed: a "
+            "larger friction_velocity, less friction or a shorter dt"
+        )
     written = _written_by_user(law)
     if status == SINGULAR and written is not None:
         # Run in Python it did neither; an exception cannot leave a compiled function.
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
-        return f"the law {_name(written)} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
+        name = getattr(getattr(written, "function", written), "__name__", None) or short(written)
+        return f"the law {name} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, k, written is None, c), f"look at gains{_too(setup)} and the path")
     return f"{REASONS[status]} ({words})"
 
@@ -81,17 +87,6 @@ def _library(file: str) -> bool:
         return True
     path = Path(file)
     return "site-packages" in path.parts or any(path.is_relative_to(folder) for folder in _FOREIGN)
-
-
-def too_stiff(setup: Setup) -> str:
-    """The sentence on friction that would need more steps per hold than the engine takes."""
-    robot = setup.robot
-    return (
-        f"{REASONS[TOO_STIFF]} of {setup.trajectory.dt:g} s: f_c / v0 = "
-        f"{robot.friction.max() / robot.friction_velocity:g} N m s/rad (friction {robot.friction.max():g} N m, "
-        f"friction_velocity {robot.friction_velocity:g} rad/s) needs more than 4000 steps in a hold; allowed: a "
-        "larger friction_velocity, less friction or a shorter dt"
-    )
 
 
 def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
@@ -265,11 +260,6 @@ def _written_by_user(law):
     if type(law) in FILTERS:
         return _written_by_user(law.law)
     return None if type(law) in FORMS else law
-
-
-def _name(law) -> str:
-    """What the user called it."""
-    return getattr(getattr(law, "function", law), "__name__", None) or short(law)
 
 
 def _replaced(law, **changes):
