@@ -43,7 +43,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
         fine = np.abs(array) < 1e100
         if not np.all(fine):
             bad = np.argwhere(~fine)[0]
-            raise ValueError(f"{name}{_at(bad)} = {array[*bad]}; allowed: finite numbers, below 1e100 in magnitude")
+            raise ValueError(f"{name}{entry(bad)} = {array[*bad]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
 
@@ -77,8 +77,7 @@ def exact_array(name: str, value, *shape: int) -> np.ndarray:
     """`real_array` of exactly this shape, without leading axes."""
     array = real_array(name, value)
     if array.shape != shape:
-        want = "one number" if not shape else f"({shape[0]},)" if len(shape) == 1 else shape
-        raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
+        raise ValueError(f"{name} has shape {array.shape}; allowed: {shape or 'one number'}")
     return array
 
 
@@ -145,7 +144,7 @@ def bounded(name: str, array: np.ndarray, low: float, *, strict: bool) -> np.nda
         where = np.argwhere(bad)[0]
         number, sign = array[tuple(where)], ">" if strict else ">="
         least = f", from {_LEAST:g} on" if strict and number > low else ""
-        raise ValueError(f"{name}{_at(where)} = {number:g}; allowed: {sign} {low:g}{least}")
+        raise ValueError(f"{name}{entry(where)} = {number:g}; allowed: {sign} {low:g}{least}")
     return array
 
 
@@ -267,7 +266,8 @@ def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 
-def _at(index) -> str:
+def entry(index) -> str:
+    """An index as one writes it, such as "[3, 1]"; nothing for a number."""
     return f"[{', '.join(map(str, index))}]" if len(index) else ""
 
 

@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..machine.arguments import check_leading, real_array, short
+from ..machine.arguments import check_leading, entry, real_array, short
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at, given
@@ -38,10 +38,8 @@ def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> a, d = rk.arm_vectors(robot, q)
-    >>> (robot.base + a + d).round(3)
-    array([[0.02, 0.05],
-           [0.02, 0.05],
-           [0.02, 0.05]])
+    >>> np.allclose(robot.base + a + d, [0.02, 0.05])
+    True
     """
     pose = at(robot, q)
     return pose.a.copy(), pose.d.copy()
@@ -51,10 +49,8 @@ def tips(robot: Manipulator, q) -> np.ndarray:
     """Tips of the N arms of the cut tree, (..., N, 2) in m.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> rk.tips(robot, q).round(3)
-    array([[0.02, 0.05],
-           [0.02, 0.05],
-           [0.02, 0.05]])
+    >>> np.allclose(rk.tips(robot, q), [0.02, 0.05])
+    True
     """
     pose = at(robot, q)
     return robot.base + pose.a + pose.d
@@ -171,10 +167,9 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
     outside = np.abs(cosine) > 1.0 + 1e-12
     if np.any(outside):
         *where, arm = np.argwhere(outside)[0]
-        name = f"x[{', '.join(map(str, where))}]" if where else "x"
         (l1, l2), point = robot.lengths[arm], x[tuple(where)]
         raise ValueError(
-            f"{name} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is "
+            f"x{entry(where)} = ({point[0]:.6g}, {point[1]:.6g}) m lies outside the workspace: it is "
             f"{np.hypot(*(point - robot.base[arm])):.6g} m from base point {arm + 1}; "
             f"allowed: {abs(l1 - l2):g} to {l1 + l2:g} m"
         )
