@@ -70,14 +70,14 @@ class APD(LawValue):
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
-        state = _joint_state(model, q, qd, q_a, qd_a, desired)
+        angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
         qd = np.asarray(qd, dtype=float)
         if self.independent is None:
             xd = matvec(np.linalg.pinv(at(model, q).F), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
             return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
         j = list(joint_indices("independent", self.independent, model.n_joints))
-        e, ed = state[0][..., j] - desired.q[..., j], state[1][..., j] - desired.qd[..., j]
+        e, ed = angles[..., j] - desired.q[..., j], rates[..., j] - desired.qd[..., j]
         return e, ed, desired.qd[..., j], desired.qdd[..., j], qd[..., j], control_matrix(model, q, j)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
@@ -214,9 +214,9 @@ class RedundantAPD(LawValue):
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """K_P e + K_D ed in all joints, and (A~^T)^+."""
-        state = _joint_state(model, q, qd, q_a, qd_a, desired)
+        angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
         K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
-        feedback = matvec(K_P, state[0] - desired.q) + matvec(K_D, state[1] - desired.qd)
+        feedback = matvec(K_P, angles - desired.q) + matvec(K_D, rates - desired.qd)
         A_tilde = redundant_control_matrix(model, q)
         return feedback, explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
 

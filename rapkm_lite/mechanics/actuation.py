@@ -71,9 +71,8 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 def actuation_type(robot: Manipulator, q):
     """'underactuated' (alpha < 2), 'fully actuated' (alpha = m = 2) or 'redundantly actuated' (m > alpha = 2), by (10).
 
-    The text after it asks two questions: underactuated (alpha < delta) or full-actuated (alpha = delta), and
-    redundantly (m > alpha) or non-redundantly actuated (m = alpha).  A pose with alpha < 2 is both underactuated and
-    redundantly actuated, since m >= 2: redundantly underactuated.
+    The text after it compares alpha with delta and with m, separately: since m >= 2, a pose with alpha < 2 is both
+    underactuated (alpha < delta) and redundantly actuated (m > alpha), so redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
     Raises ValueError at c-space singularities.
 
@@ -125,8 +124,7 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
 def singular_values(A) -> np.ndarray:
     """Singular values (..., delta) of A (..., m, delta), largest first, for any mechanism.
 
-    Two columns have a closed form: their product is the root of the sum of the squared minors, which near an input
-    singularity errs by less than a general decomposition does.
+    For two columns from the minors, which near an input singularity errs by less than a general decomposition.
 
     >>> import rapkm_lite as rk
     >>> rk.singular_values([[3.0, 0.0], [0.0, 4.0], [0.0, 0.0]])

@@ -52,12 +52,12 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
         step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
         size = np.linalg.norm(step, axis=-1, keepdims=True)
         q = q + step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
-    worst = np.unravel_index(np.argmax(np.abs(loop_constraints(robot, q)).max(axis=-1)), q.shape[:-1])
-    h = np.abs(loop_constraints(robot, q[worst])).max()
+    gaps = np.abs(loop_constraints(robot, q)).max(axis=-1)
+    worst = np.unravel_index(np.argmax(gaps), gaps.shape)
     raise ConvergenceError(
-        f"close_loops found no configuration near q = {q0[worst].round(6).tolist()}: the closure error is {h:.3g} m at "
-        f"{q[worst].round(6).tolist()}, tolerance = {tolerance:g} of the longest link; allowed: a q near a regular "
-        "configuration of this machine"
+        f"close_loops found no configuration near q = {q0[worst].round(6).tolist()}: the closure error is "
+        f"{gaps[worst]:.3g} m at {q[worst].round(6).tolist()}, tolerance = {tolerance:g} of the longest link; allowed: "
+        "a q near a regular configuration of this machine"
     )
 
 
