@@ -175,9 +175,8 @@ class Manipulator(Value):
     def same_kinematics(self, other: Manipulator) -> bool:
         """True when both machines have the same joint motion for the same end-effector motion."""
         manipulator(other, "other")
-        return self is other or all(
-            np.array_equal(getattr(self, k), getattr(other, k)) for k in ("base", "lengths", "mode")
-        )
+        same = (np.array_equal(getattr(self, k), getattr(other, k)) for k in ("base", "lengths", "mode"))
+        return self is other or all(same)
 
     @property
     def signs(self) -> str:

@@ -139,14 +139,13 @@ def common_sign(A) -> np.ndarray:
     """
     A = tall_matrix("A", A)
     cores.full_rank("A", A)
-    delta = A.shape[-1]
     size = np.linalg.norm(A, axis=-1, keepdims=True)
-    if delta == 2 and np.all(size > 0.0):  # a drive without any direction fits into every half plane
+    if A.shape[-1] == 2 and np.all(size > 0.0):  # a drive without any direction fits into every half plane
         angle = np.sort(np.arctan2(A[..., 1], A[..., 0]), axis=-1)
         gaps = np.diff(np.concatenate([angle, angle[..., :1] + 2 * np.pi], axis=-1), axis=-1)
         return gaps.max(axis=-1) < np.pi - 1e-12  # opposite rows leave a half turn, rounded
     # Rows of equal length: no sign changes, and none of the n_i is small merely because of its units.
-    basis = np.linalg.qr(A / np.where(size > 0.0, size, 1.0), mode="complete")[0][..., delta:]
+    basis = cores.null_space(A / np.where(size > 0.0, size, 1.0))
     least = np.array([_most_even(basis[index]) for index in np.ndindex(A.shape[:-2])])
     return (least > 1e-12).reshape(A.shape[:-2])[()]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..machine.arguments import real_array
+from ..machine.arguments import matvec, real_array
 from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator, crossings
 from . import cores
@@ -138,12 +138,12 @@ def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
     i = np.arange(N)
     lever = cross(pose.a, d)
     columns[:, i, i] = 1.0
-    columns[:, i, N + 2 * i] = -np.einsum("kij,kij->ki", pose.a, d) / l1 / lever
+    columns[:, i, N + 2 * i] = -np.vecdot(pose.a, d) / l1 / lever
     columns[:, i, N + 2 * i + 1] = -l2 / lever
     for axis in (0, 1):
         columns[:, i, 3 * N + 2 * i + axis] = -d[..., axis] / lever
     n = cores.null_space(pose.A)
-    left = np.einsum("kij,ki->kj", n, cores.wrap(angles - pose.q[:, :N])).ravel()
+    left = matvec(n.mT, cores.wrap(angles - pose.q[:, :N])).ravel()
     return left, -(n.mT @ columns[..., :count]).reshape(len(left), count)
 
 

@@ -65,14 +65,14 @@ def experiment(source="testbed") -> Experiment:
     (3,)
     """
     robot, tables = load(source), read_toml(source)
-    for table, needed in (("control", ("K_P", "K_D")), ("path", ()), ("sensor", ())):
+    for table in ("control", "path", "sensor"):
         known(f"TOML key in [{table}]", tables.get(table, ()), UNITS_OF[table])
         if table != "sensor" and table not in tables:
             raise ValueError(f"the file {str(source)!r} lacks the table [{table}]; needed: [control] and [path]")
-        for key in needed:
-            if key not in tables[table]:
-                raise ValueError(f"the table [{table}] of {str(source)!r} lacks {key!r}; needed: {', '.join(needed)}")
     control = tables["control"]
+    for key in ("K_P", "K_D"):
+        if key not in control:
+            raise ValueError(f"the table [control] of {str(source)!r} lacks {key!r}; needed: K_P, K_D")
     law = PD(control["K_P"], control["K_D"])
     law.gains(robot.n_arms)
     path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])

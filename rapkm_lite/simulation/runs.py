@@ -188,8 +188,7 @@ def simulate(
 ) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
-    The run starts on the path: at its first point, with the velocity of the path there.  The controller measures
-    q_a + offset and the true rates.
+    The run starts on the path: at its first point, with the velocity of the path there.
 
     law : a law of `rapkm_lite.control`, a `Law` of your own, or any callable ``(t, q_a, qd_a, desired) -> c`` with c
         (N,) in N m.  An object in Python is copied for the run and the copy is `Run.law`: equal calls, equal numbers.
