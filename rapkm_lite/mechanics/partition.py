@@ -35,8 +35,8 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     B = product(A1T_pinv, A2.mT)
     if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):
         raise ValueError(f"rows holds {first.shape[-1]} rows, fewer than the rank of A_tilde; allowed: delta of them")
-    small, right = np.eye(B.shape[-1]) + product(B.mT, B), product(B.mT, A1T_pinv)
-    bottom = right / small if small.shape[-1] == 1 else np.linalg.solve(small, right)
+    small, right = product(B.mT, B), product(B.mT, A1T_pinv)
+    bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
     return _rows(np.concatenate([top, bottom], axis=-2), back)
 
