@@ -20,7 +20,7 @@ class NoPose(ConvergenceError):
 
 
 def one_instant(model, t, q_a, qd_a, desired, truth) -> tuple:
-    """The same, checked: `measured`, without leading axes."""
+    """What a controller is called with, after the checks of `measured`, and without leading axes."""
     q_a, qd_a = measured(model, q_a, qd_a, desired)
     exact_array("desired.q", desired.q, model.n_joints)
     q_a, qd_a = exact_array("q_a", q_a, model.n_arms), exact_array("qd_a", qd_a, model.n_arms)

@@ -21,7 +21,7 @@ from .at import at
 from .encoders import cautions, certain, changed, closure, gauge, measured, poses, rounding, unknown_names
 from .rests import angles_of_torques, fitted_gain, rests
 
-UNKNOWNS = ("offsets", "offsets+lengths", "all")
+UNKNOWNS = {"offsets": 1, "offsets+lengths": 3, "all": 5}  # per drive
 GAUGE = ("scale", "rotation", "translation x", "translation y")
 
 
@@ -164,7 +164,7 @@ def calibrate(
 def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     N = robot.n_arms
     nominal = np.concatenate([np.zeros(N), robot.lengths.ravel(), robot.base.ravel()])
-    count = N * {"offsets": 1, "offsets+lengths": 3, "all": 5}[unknowns]
+    count = N * UNKNOWNS[unknowns]
     # Steps z of equal size: one for an angle of 1 rad or for the longest link; the gauge of the base points stands.
     basis = np.diag(np.concatenate([np.ones(N), np.full(4 * N, robot.lengths.max())])[:count])
     if unknowns == "all":
