@@ -10,9 +10,8 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import linear, minors, orthogonal, pairs, pivots, product, solve
+from .linalg import by_minors, linear, minors, orthogonal, pairs, pivots, product, solve
 
-_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 _INPUT_SINGULARITY = (
     "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
     "actuation"
@@ -259,19 +258,9 @@ def prestress_shares(A: np.ndarray) -> np.ndarray:
 
 
 def redundant_right_inverse(T: np.ndarray, m: int) -> np.ndarray:
-    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of `tangent`: A~^T = T T_a^T, (..., m, 2N).
-
-    T_a has two columns, so its minors X_ij = t_i x t_j say it all: det(T_a^T T_a) is the sum of their squares over
-    i < j, without cancellation, and (T_a^T)^+ = X E T_a over it.
-    """
-    driven = T[..., :m, :]
-    turned = product(driven, _QUARTER)
-    X = product(driven, turned.mT)
-    if X.ndim == 2:
-        square = smallest = float(np.vdot(X, X)) / 2
-    else:
-        square = (X * X).sum((-2, -1), keepdims=True) / 2
-        smallest = square.min(initial=np.inf)
+    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of `tangent`: A~^T = T T_a^T, (..., m, 2N)."""
+    over, square = by_minors(T[..., :m, :])
+    smallest = square.min(initial=np.inf) if isinstance(square, np.ndarray) else square
     if smallest < 1e-24:
         raise ValueError(f"A~ has lost rank (product of its singular values {smallest**0.5:.3g}): {_INPUT_SINGULARITY}")
-    return product(X, turned, T.mT) / square
+    return product(over, T.mT) / square
