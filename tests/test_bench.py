@@ -12,7 +12,7 @@ from tests.bench.turns import Times
 ROBOT = rk.load()
 
 
-def once(repeats, clock=None, **jobs):
+def once(repeats, clock=None, warm=False, **jobs):
     for job in jobs.values():
         job()
     return {name: Times(1.0, 1.0) for name in jobs}

@@ -96,7 +96,7 @@ def single_runs(robot, folder: Path) -> None:
     """Print single runs: times, and ratios to C without and with friction and to our PD."""
     jobs = {name: single(machine, law, path) for name, machine, law, path in cases(robot)}
     against = yards(folder, robot, 1, IN_C)
-    t = in_turns(25, OWN_TIME, **jobs, **against)
+    t = in_turns(25, OWN_TIME, True, **jobs, **against)
     print("\nOne run of 5 s, kernel alone; medians in turns (in brackets: shortest times)")
     print(f"{'':40}{'ms':>6}{'/ C':>14}{'/ C, friction':>15}{'/ our PD':>14}")
     for name in jobs:

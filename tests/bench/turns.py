@@ -22,13 +22,19 @@ class Times(NamedTuple):
         return f"{self.median / other.median:.2f} ({self.least / other.least:.2f})"
 
 
-def in_turns(repeats: int, clock=time.perf_counter, **jobs) -> dict[str, Times]:
-    """Run all jobs once unmeasured, then A B C A B C ..."""
+def in_turns(repeats: int, clock=time.perf_counter, warm: bool = False, **jobs) -> dict[str, Times]:
+    """Run all jobs once unmeasured, then A B C A B C ...
+
+    warm : run each twice in its turn, and measure the second time: jobs of half a millisecond would else be told apart
+    by what the job before them has left in the caches.
+    """
     times = {name: [] for name in jobs}
     for job in jobs.values():
         job()
     for _ in range(repeats):
         for name, job in jobs.items():
+            if warm:
+                job()
             start = clock()
             job()
             times[name].append(clock() - start)
