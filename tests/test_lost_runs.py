@@ -257,6 +257,29 @@ class Custom(Exception):
         self.two = two
 
 
+class Rooted(Exception):
+    """One that cannot travel, for a reason that has no words."""
+
+    def __reduce__(self):
+        raise Wordless
+
+    def __str__(self):
+        return "rooted"
+
+
+class Wordless(Exception):
+    def __str__(self):
+        raise RuntimeError("no words")
+
+
+def test_an_error_travels_without_a_cause_that_cannot():
+    error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)
+    error.__cause__ = Rooted()
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.time, again.reason) == (str(error), error.time, error.reason)
+    assert again.__cause__ is None
+
+
 def test_errors_travel():
     error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)
     error.add_note("seen")

@@ -64,7 +64,7 @@ class PID(LawValue):
     """PD (12) with the integral of the error, c = -(K_P e + K_D ed + K_I int e dt), cut off at +-limit.
 
     K_P, K_D : see `PD`.  K_I in N m/(rad s): likewise, zero allowed for a number or diagonal.
-    limit : largest torque in N m, one number or one per drive; the integral of a drive stands still while it is there.
+    limit : largest torque in N m, one number or one per drive; the integral of a drive at its limit stands still.
     Its memory is the integral (N,) in N m.
     Raises ValueError when a gain or the limit is out of range.
 

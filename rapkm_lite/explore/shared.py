@@ -37,7 +37,7 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
 
 
 def size(robot: Manipulator) -> float:
-    """Width of the workspace relative to the testbed's, rounded down to 1, 2 or 5 times a power of ten."""
+    """Width of the workspace relative to the testbed's, rounded to 1, 2 or 5 times a power of ten."""
     left, right, low, high = sampling_box(robot)
     wide = 1.25 * max(min(right - left, high - low), 1e-6) / 0.4
     power = 10 ** math.floor(math.log10(wide))

@@ -78,7 +78,7 @@ def many_inverses(A: np.ndarray) -> np.ndarray | None:
 
 
 def by_minors(A: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
-    """X E A and d of A (A^T A)^-1 = X E A / d for A (..., m, 2), with the minors X_ij = a_i x a_j of its rows.
+    """X A E and d of A (A^T A)^-1 = X A E / d for A (..., m, 2), with the minors X_ij = a_i x a_j of its rows.
 
     Their squares over i < j add up to d = det(A^T A), without cancellation: a fifth of the cost of factorizations.
     """

@@ -56,7 +56,10 @@ def kept_here(value) -> str:
         pickle.loads(pickle.dumps(value))
         return ""
     except Exception as error:
-        return " ".join(str(error).split()) or type(error).__name__
+        try:
+            return " ".join(str(error).split()) or type(error).__name__
+        except Exception:  # words that fail themselves
+            return type(error).__name__
 
 
 def _threads() -> bool:

@@ -203,7 +203,7 @@ class Picture:
     def fit(self, panel: str, *values, symmetric: bool = True, least: float = 1e-9, most: float = np.inf) -> None:
         """Vertical limits that hold all `values`, in steps of 1, 1.5, 2, 3, 5, 7 so that they seldom change.
 
-        The limits shrink only when the values fill less than half of them; they end at the step above `most`.
+        The limits shrink only when the values fill less than half of them; they end at the first step not below `most`.
         """
         low, now = self.ylim(panel)
         sizes = (np.abs(numbers("values", v, most=9)) for v in values)

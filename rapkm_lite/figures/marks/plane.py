@@ -23,7 +23,8 @@ def workspace_outline(robot) -> np.ndarray:
     # Arms of equal links reach their own base, a single point that would only dent the outline.
     room = np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
     rings = contour_generator(x, y, room).lines(0.0)
-    return np.concatenate([part for ring in rings for part in (np.asarray(ring), np.full((1, 2), np.nan))])[:-1]
+    parts = [part for ring in rings for part in (np.asarray(ring), np.full((1, 2), np.nan))]
+    return np.concatenate([*parts, np.empty((0, 2))])[:-1]
 
 
 def clamped(robot: Manipulator, point) -> np.ndarray:
