@@ -10,7 +10,6 @@ from . import cores
 from .at import at
 from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
-from .linalg import orthogonal, pivots
 from .redundancy import endeffector_stiffness
 
 
@@ -35,13 +34,13 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     gap = max(tolerance * scale, 4.0 * np.spacing(np.abs(robot.base).max()))
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
-        Q, R = orthogonal(J.mT, complete=True)
-        if pivots(R)[0] < 1e-10 * scale:
+        Q, R = np.linalg.qr(J.mT, mode="complete")
+        if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
             break
         range_, tangent = Q[..., :r], Q[..., r:]
-        back = -matvec(range_, np.linalg.solve(R.mT, h[..., None])[..., 0])
+        back = -matvec(range_, np.linalg.solve(R[..., :r, :].mT, h[..., None])[..., 0])
         gradient = q - q0
-        multiplier = -np.linalg.solve(R, matvec(range_.mT, gradient)[..., None])[..., 0]
+        multiplier = -np.linalg.solve(R[..., :r, :], matvec(range_.mT, gradient)[..., None])[..., 0]
         hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
         reduced = tangent.mT @ hessian @ tangent
         convex = np.linalg.eigvalsh(reduced)[..., 0] > 0.1
