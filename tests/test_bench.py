@@ -7,7 +7,7 @@ import pytest
 import rapkm_lite as rk
 from rapkm_lite.simulation.compiled import COMPILED
 from tests.bench import kernels, user_laws, yardsticks
-from tests.bench.turns import Times
+from tests.bench.turns import Times, in_turns
 
 ROBOT = rk.load()
 
@@ -16,6 +16,12 @@ def once(repeats, clock=None, warm=False, **jobs):
     for job in jobs.values():
         job()
     return {name: Times(1.0, 1.0) for name in jobs}
+
+
+def test_a_warm_job_runs_twice_in_its_turn():
+    ran = []
+    times = in_turns(3, warm=True, a=lambda: ran.append("a"), b=lambda: ran.append("b"))
+    assert ran == ["a", "b", *3 * ["a", "a", "b", "b"]] and list(times) == ["a", "b"]
 
 
 @pytest.fixture
