@@ -10,16 +10,14 @@ from ..machine.arguments import (
     exact_array,
     joint_indices,
     joint_vectors,
-    matvec,
     real_array,
     solve,
     tall_matrix,
     wide_matrix,
 )
 from ..machine.manipulator import Manipulator, manipulator
-from ..mechanics.actuation import weighted_pseudoinverse
-from ..mechanics.at import at
-from ..mechanics.linalg import product
+from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
+from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .grammar import joint_gain
 
@@ -84,10 +82,11 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     """
     q, e, ed = joint_vectors(manipulator(robot).n_joints, q=q, e=e, ed=ed)
     eps = float(bounded("eps", exact_array("eps", eps), 0.0, strict=False))
-    pose, K = at(robot, q), joint_gain("K_P", K_P, robot.n_arms)
+    Gt, _, _ = redundant_dynamics(robot, q, np.zeros(robot.n_joints))
+    K = joint_gain("K_P", K_P, robot.n_arms)
     check_leading(q=q.shape[:-1], e=e.shape[:-1], ed=ed.shape[:-1], K_P=K.shape[:-2])
-    momentum = matvec(product(pose.N, pose.G, pose.N), ed)
-    return (np.vecdot(ed, momentum) + np.vecdot(e, matvec(K, e)) + eps * np.vecdot(e, momentum)) / 2
+    form = lambda u, M, v: np.einsum("...i,...ij,...j->...", u, M, v)  # noqa: E731
+    return (form(ed, Gt, ed) + form(e, K, e) + eps * form(e, Gt, ed)) / 2
 
 
 def feedback_norm(robot, q, pair=None) -> np.ndarray:
@@ -100,18 +99,18 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     >>> float(rk.feedback_norm(robot, q).round(4))
     0.0056
     """
-    pose = at(robot, q)
+    still = np.zeros(manipulator(robot).n_joints)
     if pair is None:
-        A = pose.A_tilde
-        M = explicit_pseudoinverse(A, select_independent(A)) @ product(pose.N, pose.G, pose.N)
+        A = redundant_control_matrix(robot, q)
+        M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
     else:
         pair = joint_indices("pair", pair, robot.n_arms, 2, "drive")
         # In end-effector coordinates first, so that a grid point on the curve is no special case.
-        A = pose.A
+        A = control_matrix(robot, q)
         a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
         det = a * d - b * c
         least = 1e-12 * np.linalg.norm(A, axis=(-2, -1)) ** 2
         det = np.where(np.abs(det) < least, least, det)
         to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
-        M = weighted_pseudoinverse(A) @ product(pose.F.mT, pose.G, pose.F) @ to_ee
+        M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
     return np.linalg.norm(M, 2, axis=(-2, -1))
