@@ -188,15 +188,18 @@ def simulate(
 ) -> Run:
     """Run a control law on the machine along a trajectory, sampled at the trajectory's rate with zero-order hold.
 
-    The run starts on the path: at its first point, with the velocity of the path there.
+    The run starts on the path: at its first point, with the velocity of the path there.  The controller measures
+    q_a + offset and, without a velocity filter, the true rates.
 
     law : a law of `rapkm_lite.control`, a `Law` of your own, or any callable ``(t, q_a, qd_a, desired) -> c`` with c
         (N,) in N m.  An object in Python is copied for the run and the copy is `Run.law`: equal calls, equal numbers.
         (A function that remembers in variables outside cannot be copied: write an object, or a `Law` with `start`.)
     offset : calibration offsets (N,) in rad, measured minus true angle.
-    encoder, velocity_filter : counts per turn, and a time constant in s, see `Sensors`; None is ideal.
+    encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles, from
         which set-points of `Trajectory.with_set_points` stay as far as they are from the path's.
+    velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
+        first-order low-pass; None for the true rates.
     faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s it errs by less than 1 nm at dt = 2 ms, by
