@@ -82,17 +82,13 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
     value = known[name]
     if value is None and (default is None or kind.endswith("| None")):
         return
-    if kind == "bool" or isinstance(default, bool):
-        switch(name, value)
-    elif kind == "str" or isinstance(default, str):
-        _text(name, value)
-    elif kind == "dict":
-        if not isinstance(value, dict) or not value:
-            raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
+    if isinstance(default, bool | str | float):
+        kind = type(default).__name__
+    check = _KINDS.get(kind)
+    if check is not None:
+        check(name, value)
     elif kind.startswith("int"):
         whole_number(name, value, -1 if default == -1 else 0, _MOST)
-    elif kind == "float" or isinstance(default, float):
-        exact_array(name, value)
     elif kind.startswith("Callable"):
         function(name, value)
     elif name in _RULES:
@@ -101,6 +97,11 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
         _numbers(name, value, known)
     elif name in _CURVES:
         numbers(name, value, most=9)
+
+
+def _dictionary(name: str, value) -> None:
+    if not isinstance(value, dict) or not value:
+        raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
 
 
 def _trajectory(name: str, value, known: Known) -> None:
@@ -205,6 +206,9 @@ def _gain(name: str, value, known: Known) -> None:
         positive_number(name, value)
 
 
+_KINDS: dict[str, Callable[[str, Any], object]] = {
+    "bool": switch, "str": _text, "float": exact_array, "dict": _dictionary,
+}  # fmt: skip
 _RULES: dict[str, Callable[[str, Any, Known], object]] = {
     "robot": lambda name, value, known: manipulator(value, name),
     "log": _having("a Log, such as mystery_run returns", "t q_a q_a_desired c"),
