@@ -112,7 +112,7 @@ def test_sentences_say_what_happened(graded):
 
 def test_the_tables_count_mistakes_and_points(graded, tmp_path):
     write_csv(tmp_path / "grades.csv", graded)
-    rows = list(csv.DictReader((tmp_path / "grades.csv").open(encoding="utf-8")))
+    rows = list(csv.DictReader((tmp_path / "grades.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(graded) and {row["verdict"] for row in rows} <= {"ok", "close", "wrong", "todo"}
     assert "1 x the answer has the opposite sign" in by_exercise(graded)
     line = next(line for line in by_student(graded).splitlines() if line.startswith("ben"))

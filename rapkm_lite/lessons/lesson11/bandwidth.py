@@ -18,7 +18,7 @@ def _driven(robot) -> np.ndarray:
 
 
 def _shares(robot, q) -> np.ndarray:
-    return np.linalg.eigvals(effective_gain(orthogonal_complement(robot, q), _driven(robot))).real
+    return np.real(np.linalg.eigvals(effective_gain(orthogonal_complement(robot, q), _driven(robot))))
 
 
 def gain_for_bandwidth(robot, q, omega: float) -> float:
@@ -54,7 +54,7 @@ def _printed_gain(independent):
 def _line_2(robot, q, omega):
     F, G = orthogonal_complement(robot, q), mass_matrix(robot, q)
     gain = np.linalg.solve(F.mT @ G @ F, F.mT @ G @ _driven(robot) @ F)
-    return omega**2 / np.linalg.eigvals(gain).real.min()
+    return omega**2 / np.min(np.real(np.linalg.eigvals(gain)))
 
 
 def _singular_value(robot, q, omega):
@@ -68,7 +68,7 @@ GAIN_FOR_BANDWIDTH = Exercise(
         "The corrected (35) says which share of a gain acts. Which pose and which direction decide?",
         "rk.effective_gain of the matrix that selects the driven joints, at every pose; its smallest eigenvalue "
         "over all of them is the share that is left of K_P.",
-        "K_P times the smallest eigenvalue is omega^2: omega**2 / np.linalg.eigvals(gain).real.min().",
+        "K_P times the smallest eigenvalue is omega^2: omega**2 / np.min(np.real(np.linalg.eigvals(gain))).",
     ),
     unit="1/s^2",
     cases=_bandwidths,

@@ -15,7 +15,7 @@ from .bandwidth import GAIN_FOR_BANDWIDTH
 
 def _frequencies(matrix) -> np.ndarray:
     """Frequencies in Hz from the eigenvalues of a matrix (2, 2)."""
-    return np.sqrt(np.abs(np.sort(np.linalg.eigvals(matrix).real))) / (2 * np.pi)
+    return np.sqrt(np.abs(np.sort(np.real(np.linalg.eigvals(matrix))))) / (2 * np.pi)
 
 
 def _taken_for_symmetric(robot, q, K_P) -> np.ndarray:
@@ -66,7 +66,7 @@ EXERCISES = {
             "Springs at the drives, a mass: how stiff is that at the end-effector, and how heavy is the machine there?",
             "The drives turn by A dx, so the stiffness is A^T diag(K_P) A; the inertia in these coordinates is Gbar, "
             "from rk.minimal_dynamics(robot, q, 0 * q, None).",
-            "w2 = np.linalg.eigvals(np.linalg.solve(G, A.T @ np.diag(K_P) @ A)).real; "
+            "w2 = np.real(np.linalg.eigvals(np.linalg.solve(G, A.T @ np.diag(K_P) @ A))); "
             "np.sqrt(np.sort(w2)) / (2 * np.pi)",
         ),
         unit="Hz",

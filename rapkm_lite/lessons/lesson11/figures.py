@@ -84,7 +84,7 @@ def plot_effective_gain(trajectory, K, ax=None):
     >>> ax = plot_effective_gain(path, np.diag([1, 1, 1, 0, 0, 0]))
     """
     ax = axes_or_new(ax)
-    values = np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)).real
+    values = np.real(np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)))
     low, high = np.sort(values, axis=-1).T
     ax.plot(trajectory.t, high, color=NEUTRAL, ls="--", label="fast direction")
     ax.plot(trajectory.t, low, color=AFTER, label="slow direction")

@@ -30,7 +30,7 @@ def pd_frequencies(robot, q, K_P) -> np.ndarray:
     """Natural frequencies (2,) in Hz, the lower one first, of the machine at rest on springs K_P (N,) in N m/rad."""
     A = control_matrix(robot, q)
     G, _, _ = minimal_dynamics(robot, q, 0 * q, None)
-    return np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(G, A.T @ (K_P[:, None] * A))).real)) / (2 * np.pi)
+    return np.sqrt(np.sort(np.real(np.linalg.eigvals(np.linalg.solve(G, A.T @ (K_P[:, None] * A)))))) / (2 * np.pi)
 
 
 def frequency_cases(rng) -> list[Case]:
