@@ -218,10 +218,14 @@ def test_importing_the_package_stays_light():
 def test_the_package_lists_what_people_call_and_no_modules():
     from types import ModuleType
 
+    from rapkm_lite import explore
+
     assert "at" in dir(rk) and "null_basis" in dir(rk) and "triangle" in dir(rk)
     assert set(dir(rk)) == {*rk.__all__, "__version__"}
-    things = [name for name, thing in vars(rk).items() if not isinstance(thing, ModuleType) and name[0] != "_"]
-    assert sorted(things) == sorted(rk.__all__)
+    assert dir(explore) == sorted(explore.__all__)
+    for room in (rk, explore):
+        things = [name for name, thing in vars(room).items() if not isinstance(thing, ModuleType) and name[0] != "_"]
+        assert sorted(things) == sorted(room.__all__)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.5, np.pi / 2, 2.5])

@@ -5,7 +5,7 @@
 '0 mN m'
 """
 
-from ..figures.arguments import guarded
+from ..figures.arguments import guarded as _guarded
 from ..figures.machine import plane_limits
 from ..figures.marks import Palette, Picture, bars, draw_machine, draw_workspace, drive_legend, pair_legend
 from .controls import choice, log_slider, offset_sliders, slider, switch
@@ -18,4 +18,16 @@ from .runs import animation, decentralized_run, via_points
 from .torque import computed_torque
 
 # `explorer` checks for itself: what a reader's own draw function raises stays what it is.
-globals().update({name: thing for name, thing in guarded(globals()).items() if name != "explorer"})
+globals().update({name: thing for name, thing in _guarded(globals()).items() if name != "explorer"})
+
+# Spelled out, because editors read it.
+__all__ = [
+    "Explorer", "Palette", "Picture", "actuation", "allocation", "animation", "bars", "calibration", "choice",
+    "computed_torque", "controller_choice", "decentralized_run", "draw_machine", "draw_workspace", "drive_legend",
+    "explorer", "imperfections", "landscape", "log_slider", "machine", "offset_sliders", "own_machine", "pair_legend",
+    "plane_limits", "prestress", "slider", "steady_state", "switch", "three_opinions", "via_points",
+]  # fmt: skip
+
+
+def __dir__():
+    return __all__
