@@ -53,6 +53,18 @@ class Part:
         counted = sum(getattr(self, what) / rate for what, rate in PER_MINUTE.items())
         return counted + sum(getattr(self, what) * each for what, each in MINUTES.items())
 
+    def count_words(self, text: str) -> None:
+        """Add the words and formulas of a text."""
+        prose = _FENCE.sub(" ", _DETAILS.sub(" ", text))
+        self.formulas += len(_FORMULA.findall(prose))
+        self.words += sum(any(map(str.isalnum, token)) for token in _FORMULA.sub(" ", prose).split())
+
+    def count_code(self, cell, number: str) -> None:
+        """Add the lines, figures and exercises of a code cell of the lesson with this number."""
+        self.lines += sum(bool(line.strip()) for line in cell.source.splitlines())
+        self.figures += figures(cell)
+        self.names |= {name for name in _CHECK.findall(cell.source) if name.startswith(number)}
+
 
 def figures(cell) -> int:
     """Pictures of a code cell: the stored ones, or before it has run those that metadata and source announce."""
@@ -70,9 +82,7 @@ def parts(notebook, number: str) -> list[Part]:
     level = 0
     for cell in notebook.cells:
         if cell.cell_type == "code":
-            part.lines += sum(bool(line.strip()) for line in cell.source.splitlines())
-            part.figures += figures(cell)
-            part.names |= {name for name in _CHECK.findall(cell.source) if name.startswith(number)}
+            part.count_code(cell, number)
             continue
         for block in _blocks(cell.source):
             heading = HEADING.match(block.partition("\n")[0])
@@ -86,9 +96,7 @@ def parts(notebook, number: str) -> list[Part]:
                 elif depth == 2:
                     section = part = Part(title, stated and int(stated))
                     found.append(part)
-            prose = _FENCE.sub(" ", _DETAILS.sub(" ", block))
-            part.formulas += len(_FORMULA.findall(prose))
-            part.words += sum(any(map(str.isalnum, token)) for token in _FORMULA.sub(" ", prose).split())
+            part.count_words(block)
     seen: set = set()
     for one in found:
         one.exercises = len(one.names - seen)

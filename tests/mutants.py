@@ -261,6 +261,25 @@ def equivalents() -> dict[str, str]:
     return {name.strip(): reason.strip() for name, reason in (line.rsplit(" | ", 1) for line in lines)}
 
 
+def copied(folder: Path) -> None:
+    """Copy what the tests need, and read once what every child needs: nothing of the package, which changes."""
+    for part in ("rapkm_lite", "tests", "data", "docs", "notebooks"):
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc"))
+    for part in filter(Path.is_file, ROOT.glob("*.*")):
+        shutil.copy2(part, folder / part.name)
+    os.environ["PYTHONPATH"] = str(folder)
+    import coverage  # noqa: F401
+    import hypothesis
+    import pytest
+    import scipy.integrate
+    import scipy.optimize  # noqa: F401
+
+    try:
+        import numba  # noqa: F401
+    except ImportError:
+        print(f"without Numba; pytest {pytest.__version__}, hypothesis {hypothesis.__version__}")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200)
@@ -276,23 +295,7 @@ def main() -> int:
     sys.path[:] = [part for part in sys.path if Path(part or ".").resolve() != ROOT]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for part in ("rapkm_lite", "tests", "data", "docs", "notebooks"):
-            shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc"))
-        for part in ROOT.glob("*.*"):
-            if part.is_file():
-                shutil.copy2(part, folder / part.name)
-        os.environ["PYTHONPATH"] = str(folder)
-        # What every child needs, read once; nothing of the package, which changes.
-        import coverage  # noqa: F401
-        import hypothesis
-        import pytest
-        import scipy.integrate
-        import scipy.optimize  # noqa: F401
-
-        try:
-            import numba  # noqa: F401
-        except ImportError:
-            print(f"without Numba; pytest {pytest.__version__}, hypothesis {hypothesis.__version__}")
+        copied(folder)
         mutants = draw(given.count, given.seed, given.modules)
         found = tests_by_line(folder, given.tests)
         print(f"{len(found['seconds'])} tests, {sum(found['seconds'].values()):.0f} s traced; failed and left out:")

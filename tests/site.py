@@ -160,6 +160,19 @@ def drawers(context, base: str) -> list[str]:
     return [f"{base.split(':')[0]} drawers: {what}" for what in wrong]
 
 
+def pictures(browser, base: str, shots: Path) -> list[str]:
+    """What is wrong with the pages that are shown most, at three widths, light and dark, while they are drawn."""
+    wrong = []
+    for width, dark in VIEWS:
+        size = {"width": width, "height": width * 3 // 4 + 300}
+        context = browser.new_context(viewport=size, color_scheme="dark" if dark else "light")
+        folder = shots / ("dark" if dark else "light")
+        folder.mkdir(parents=True, exist_ok=True)
+        wrong += [what for name in ("index", *SHOWN) for what in look(context, base, f"{name}.html", folder)]
+        context.close()
+    return wrong
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("site", type=Path)
@@ -184,14 +197,7 @@ def main() -> int:
             wrong += search(browser.new_context(viewport={"width": 1280, "height": 800}), base)
             wrong += drawers(context, base)
             context.close()
-        for width, dark in VIEWS if options.shots else ():
-            context = browser.new_context(
-                viewport={"width": width, "height": width * 3 // 4 + 300}, color_scheme="dark" if dark else "light"
-            )
-            folder = options.shots / ("dark" if dark else "light")
-            folder.mkdir(parents=True, exist_ok=True)
-            wrong += [what for name in ("index", *SHOWN) for what in look(context, bases[0], f"{name}.html", folder)]
-            context.close()
+        wrong += pictures(browser, bases[0], options.shots) if options.shots else []
         browser.close()
     print("\n".join(wrong) or f"{len(names)} pages, from disk and from a web server: well")
     return 1 if wrong or not names else 0

@@ -46,7 +46,7 @@ def wheel(tmp_path_factory):
     return zipfile.ZipFile(first)
 
 
-def test_wheel_holds_package_data_lessons_and_licences_and_nothing_else(wheel):
+def test_wheel_holds_package_data_and_licences_and_nothing_else(wheel):
     names = wheel.namelist()
     info = next(name.split("/")[0] for name in names if name.endswith(".dist-info/METADATA"))
     assert {name.split("/")[0] for name in names} == {"rapkm_lite", info}
@@ -56,6 +56,10 @@ def test_wheel_holds_package_data_lessons_and_licences_and_nothing_else(wheel):
     wanted = {p.relative_to(ROOT).as_posix() for p in code}
     wanted |= {f"rapkm_lite/{p.relative_to(ROOT).as_posix()}" for p in data}
     assert wanted <= set(names)
+
+
+def test_wheel_holds_the_lessons_without_solutions_and_outputs(wheel):
+    names = wheel.namelist()
     lessons = {name for name in names if name.startswith("rapkm_lite/notebooks/")}
     assert lessons == {f"rapkm_lite/notebooks/{path.name}" for path in shipped(ROOT / "notebooks")}
     for name in lessons:

@@ -31,6 +31,12 @@ def layout(rooms: list[str], arrows: list[tuple[str, str]]) -> tuple[dict[str, t
         between = [f"{a} {b} {k}" for k in range(level[a] - 1, level[b], -1)]
         level |= {name: int(name.split()[-1]) for name in between}
         ways.append([a, *between, b])
+    columns = ordered(level, ways)
+    return {name: (columns[name], level[name]) for name in level}, ways
+
+
+def ordered(level: dict[str, int], ways: list[list[str]]) -> dict[str, float]:
+    """The column of everything: on its floor near the mean of what it is tied to."""
     beside: dict[str, list[str]] = {name: [] for name in level}
     for way in ways:
         for a, b in pairwise(way):
@@ -38,14 +44,14 @@ def layout(rooms: list[str], arrows: list[tuple[str, str]]) -> tuple[dict[str, t
             beside[b].append(a)
     rows = [[name for name in level if level[name] == k] for k in range(max(level.values()) + 1)]
     column = {name: i - 0.5 * (len(row) - 1) for row in rows for i, name in enumerate(row)}
-    # Up and down the floors, everything goes to the mean of what it is tied to.
+    # Up and down the floors, again and again.
     for _ in range(12):
         for row in [*rows, *reversed(rows)]:
             row.sort(key=lambda name: sum(column[b] for b in beside[name]) / max(1, len(beside[name])))
             wide = [0.3 if " " in name else 1.0 for name in row]
             for i, name in enumerate(row):
                 column[name] = sum(wide[:i]) + 0.5 * wide[i] - 0.5 * sum(wide)
-    return {name: (column[name], level[name]) for name in level}, ways
+    return column
 
 
 def svg(text: str) -> str:

@@ -29,7 +29,7 @@ def readable(lines: list[str]) -> list[str]:
         made += [""] if goes_on else []
         item = ""
         if begins:
-            made += ["", "::", ""] if made else ["::", ""]
+            made += [""] * bool(made) + ["::", ""]
             example = True
         example = example and bool(line.strip())
         if argument:

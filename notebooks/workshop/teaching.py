@@ -142,26 +142,29 @@ def _printed(cells) -> str:
     return f"```\n{text.removeprefix(COVER).strip()}\n```" if text else "The cell that follows draws the answer."
 
 
+def _asked(cells) -> list[str]:
+    """Lines with the questions in the first one of these cells, and their answers."""
+    source, text = cells[0].source, []
+    blocks = re.split(r"\n\s*\n", source)
+    asked = [block for block in blocks if _QUESTION.match(block)]
+    behind = "\n".join(c.source for c in cells if c.cell_type == "markdown")
+    # Each question has the next answer behind it; questions in a row share theirs.
+    found = [_DETAILS.search(behind, source.find(block)) for block in asked]
+    for block, one, other in zip(asked, found, [*found[1:], None], strict=False):
+        text += [*_said_before(blocks, block), block]
+        if not (one and other and one.start() == other.start()):
+            answer = one[1].strip() if one else _printed(cells)
+            text += ["", "> " + answer.replace("\n", "\n> "), ""]
+    return text
+
+
 def predictions_page() -> str:
     """Every question of the lessons with the answer that stands folded behind it."""
     text = [WRITTEN, "# Questions inside the lessons, with their answers\n"]
     for notebook in lessons().values():
         text.append(f"## {title(notebook)}\n")
-        cells = notebook.cells
-        for k, cell in enumerate(cells):
-            blocks = re.split(r"\n\s*\n", cell.source) if cell.cell_type == "markdown" else []
-            asked = [block for block in blocks if _QUESTION.match(block)]
-            if not asked:
-                continue
-            behind = [c.source for c in cells[k : k + 5] if c.cell_type == "markdown"]
-            # Each question has the next answer behind it; questions in a row share theirs.
-            found = [_DETAILS.search("\n".join(behind), cell.source.find(block)) for block in asked]
-            for j, (block, one) in enumerate(zip(asked, found, strict=True)):
-                text += [*_said_before(blocks, block), block]
-                if j + 1 < len(asked) and one and found[j + 1] and one.start() == found[j + 1].start():
-                    continue
-                answer = one[1].strip() if one else _printed(cells[k : k + 5])
-                text += ["", "> " + answer.replace("\n", "\n> "), ""]
+        for k, cell in enumerate(notebook.cells):
+            text += _asked(notebook.cells[k : k + 5]) if cell.cell_type == "markdown" else []
     return re.sub(r"\]\((?![a-z]+:|#)", "](../../notebooks/", "\n".join(text))
 
 

@@ -50,12 +50,22 @@ def steps(name: str, **base) -> dict[str, list[float]]:
     return times
 
 
+def explorers() -> list[str]:
+    """The functions that make an explorer of a machine."""
+    made = {name: make for name, make in vars(explore).items() if inspect.isfunction(make)}
+    return [name for name, make in made.items() if list(inspect.signature(make).parameters) == ["robot"]]
+
+
+def bases(name: str) -> list[dict]:
+    """An explorer as it opens, and under every other law, filter and rule."""
+    controls = getattr(explore, name)().controls
+    laws = {word: settings(control) for word, control in controls.items() if word in ("law", "filter", "rule")}
+    return [{}, *({word: value} for word, values in laws.items() for value in values)]
+
+
 def main(names: list[str]) -> None:
-    makers = {n: f for n, f in vars(explore).items() if inspect.isfunction(f)}
-    for name in names or [n for n, f in makers.items() if list(inspect.signature(f).parameters) == ["robot"]]:
-        controls = getattr(explore, name)().controls
-        choices = {c: settings(w) for c, w in controls.items() if c in ("law", "filter", "rule")}
-        for base in [{}, *({c: value} for c, values in choices.items() for value in values)]:
+    for name in names or explorers():
+        for base in bases(name):
             times = steps(name, **base)
             medians = {control: statistics.median(values) for control, values in times.items()}
             whole = statistics.median(v for values in times.values() for v in values)
