@@ -8,6 +8,7 @@ from __future__ import annotations
 from types import BuiltinFunctionType
 from typing import ClassVar
 
+from llvmlite import binding as llvm
 from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -53,9 +54,26 @@ class Rules(Context):
         return self.operators[val]
 
 
-class Part(JITCodeLibrary):
+class Whole(JITCodeLibrary):
+    """Optimized once, with all that it calls.  Numba begins with each function alone, which takes time, and unrolls
+    loops over the runs that afterwards no longer become vectors."""
+
+    level = 3
+
+    def _optimize_functions(self, ll_module):
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self):
+        tuning = llvm.create_pipeline_tuning_options(speed_level=self.level)
+        tuning.loop_vectorization = True
+        builder = llvm.create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
+
+
+class Part(Whole):
     """What only kernels call: it is linked into them, and needs no machine code of its own."""
 
+    level = 2
     codegen = property(lambda self: self)
 
     def set_env(self, name, env):
@@ -85,8 +103,9 @@ class Wide(Compiler):
 
     def define_pipelines(self):
         state = self.state
-        if state.flags.no_cpython_wrapper:
-            state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        library = Part if state.flags.no_cpython_wrapper else Whole
+        state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
         pipelines = super().define_pipelines()
         for manager in pipelines:
             manager.passes = [step for step in manager.passes if step[0].name() not in IDLE]
