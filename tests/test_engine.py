@@ -2,6 +2,7 @@
 
 import math
 import os
+import platform
 import subprocess
 import sys
 
@@ -173,6 +174,27 @@ def test_the_pose_of_measured_angles_does_not_depend_on_where_its_search_begins(
 def test_without_numba_the_same_numbers():
     pytest.importorskip("numba")
     np.testing.assert_allclose(numbers(RAPKM_LITE_NUMBA="0"), numbers(), rtol=0, atol=1e-12)
+
+
+ROOTS = """if True:
+    import re, rapkm_lite as rk
+    from rapkm_lite.engine.loop import closed_loops
+    robot = rk.load().replace(friction=0.0)
+    path = rk.hold(robot, (0.0, 0.0), 0.01)
+    rk.simulate(robot, rk.PD(7.0, 0.2), path)
+    rk.sweep(robot, rk.PD(7.0, 0.2), path, [[0.0] * 3] * 2)
+    print(*(len(re.findall(r"\\tv?sqrtpd", code)) for code in closed_loops.inspect_asm().values()))
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="instructions of other processors")
+def test_kernels_take_the_roots_of_arms_and_of_runs_several_at_once(tmp_path):
+    """A Runge-Kutta step has four stages, each with a square root per arm: alone, a kernel would be slow in silence."""
+    pytest.importorskip("numba")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", ROOTS], env=environment, capture_output=True, text=True, check=True)
+    single, study = map(int, done.stdout.split())
+    assert single >= 4 and study >= 4
 
 
 def test_read_only_package_folder(tmp_path):
