@@ -67,8 +67,8 @@ On your own machine, in a clone of the repository, with Python 3.11 or newer:
     python -m pip install -r requirements.txt
     python -m jupyter lab notebooks/00_start_here.ipynb
 
-This takes 860 MB, with compiler and tests. `python -m pip install . jupyterlab` makes do with 570 MB,
-without SymPy, which lessons 01 and 12 need, and without Numba: a run takes 0.3 s instead of 2 ms.
+This takes 870 MB, with compiler and tests. `python -m pip install . jupyterlab` makes do with 570 MB,
+without SymPy, which lessons 01 and 12 need, and without Numba: a run takes 0.3 s instead of 1 ms.
 """
 SOLUTIONS = """\
 # Solutions

@@ -87,10 +87,10 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
 
 @functools.cache
 def _engine():
-    """Rows of the work table, and the loop: Numba is not imported before the first run."""
-    from ..engine import loop, rows
+    """Rows of the work table, the loop, and its ends: Numba is not imported before the first run."""
+    from ..engine import ends, loop, rows
 
-    return rows, loop
+    return rows, loop, ends
 
 
 def _sums(setup: Setup, w) -> tuple:
@@ -118,7 +118,7 @@ def _blank(robot, model, width: int, L: int, start: tuple = (), codes: tuple = (
 
     start : end-effector position and velocity, if given; with it the codes of the runs, one each.
     """
-    rows, _ = _engine()
+    rows = _engine()[0]
     N, work = robot.n_arms, np.zeros((rows.BLOCKS * width + rows.SINGLES) * L)
     blocks, runs = _parts(work, width, L)
     for i, arms in enumerate((robot, model)):
@@ -170,7 +170,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 
     history : None for a study; the `History` of a single run.
     """
-    rows, loop = _engine()
+    rows, loop, ends = _engine()
     robot, model, trajectory, sensors, code = setup.robot, setup.model, setup.trajectory, setup.sensors, codes[0]
     L, N, study = len(codes), robot.n_arms, () if history is None else None
     faulty, counted = setup.faults is not None, sensors.encoder is not None
@@ -193,7 +193,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             try:
                 loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, log, buffer)
             except (ArithmeticError, ValueError) as error:  # only without a compiler, where runs are alone
-                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = loop.stopped(error)
+                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = ends.stopped(error)
             finally:
                 if history is not None and log is not None and log is not history:
                     for column, values in zip(history[:-1], log, strict=False):
