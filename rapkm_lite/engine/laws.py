@@ -11,7 +11,7 @@ import math
 
 from .jit import leaf, outlined
 from .leaves import accelerations, inertia, small_angle, solve2, solve_regular, tanh, weight
-from .minimal import best_pair, minimal_feedback, reference
+from .minimal import best_pair, joint_feedback, reference, task_feedback
 from .pose import kept
 from .rows import *
 from .single import fetch
@@ -42,10 +42,11 @@ def arm_shares(w, p, P, extra, env, rates, links):
 
 
 @leaf
-def pose_of(w, j, W, L):
-    """Velocity of the pose of a run, and the environment of the model."""
+def at_pose(w, j, W, L):
+    """Velocity of the pose of a run, its reference rate, and the environment of the model."""
     gx, gy = w[of(ENVIRONMENT + GRAVITY_X, j, W, L)], w[of(ENVIRONMENT + GRAVITY_Y, j, W, L)]
-    return w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], (gx, gy, w[of(ENVIRONMENT + SHARPNESS, j, W, L)])
+    rates = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)], w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
+    return rates, (gx, gy, w[of(ENVIRONMENT + SHARPNESS, j, W, L)])
 
 
 @outlined
@@ -53,12 +54,12 @@ def look(lanes, drives, arms, extra, table, o, w):
     """The model at the pose: the errors of the elbows, and the shares of the arms at the rate of the pose."""
     L, N, W = len(lanes), len(drives), len(arms)
     # What the arms of a single run share is read once: read among what is written it would keep the loop from vectors.
-    alone = pose_of(w, 0, W, L)
+    alone = at_pose(w, 0, W, L)
     for i in range(N):
         cos, sin = desired(table, o, w, ELBOW_COS, i, W, L), desired(table, o, w, ELBOW_SIN, i, W, L)
         rate = desired(table, o, w, ELBOW_RATE, i, W, L)
         for j in range(L):
-            vx, vy, env = alone if L == 1 else pose_of(w, j, W, L)
+            (vx, vy, _, _), env = alone if L == 1 else at_pose(w, j, W, L)
             links = kept(w, i * L + j, W * L)
             bx, by, lx, ly, ad, _, den = links
             # a x d and a.d are the sine and cosine of the elbow angle times both lengths.
@@ -84,12 +85,12 @@ def look(lanes, drives, arms, extra, table, o, w):
 
 @outlined
 def shares(lanes, drives, arms, extra, w):
-    """The shares of the arms at a reference rate of its own, as in APD laws."""
+    """The shares of the arms at the reference rate of the law."""
     L, N, W = len(lanes), len(drives), len(arms)
+    alone = at_pose(w, 0, W, L)
     for i in range(N):
         for j in range(L):
-            vx, vy, env = pose_of(w, j, W, L)
-            rates = vx, vy, w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)]
+            rates, env = alone if L == 1 else at_pose(w, j, W, L)
             arm_shares(w, i * L + j, W * L, extra, env, rates, kept(w, i * L + j, W * L))
 
 
@@ -218,9 +219,9 @@ def distribute(lanes, drives, arms, w):
             w[at(C, i, j, W, L)] = w[at(EASE, i, j, W, L)] * (w[at(A1, i, j, W, L)] * gx + w[at(A2, i, j, W, L)] * gy)
 
 
-@outlined
-def computed_torque(lanes, drives, arms, extra, law, table, o, w):
-    """Drive torques C of the laws with a model, at the pose PX, PY, PVX, PVY."""
+@leaf
+def joint_coordinates(lanes, drives, arms, extra, law, table, o, w):
+    """Reference rate, shares, w and g of the laws in two or all joints."""
     if len(lanes) == 1:
         for block in (ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN):
             fetch(block, len(arms), table, o, w)
@@ -236,5 +237,15 @@ def computed_torque(lanes, drives, arms, extra, law, table, o, w):
     if redundant:
         redundant_feedback(lanes, drives, arms, law, table, o, w)
     else:
-        minimal_feedback(lanes, drives, arms, law, table, o, w)
+        joint_feedback(lanes, drives, arms, law, table, o, w)
+
+
+@outlined
+def computed_torque(lanes, drives, arms, extra, law, table, o, w):
+    """Drive torques C of the laws with a model, at the pose PX, PY, PVX, PVY."""
+    if law.task:
+        task_feedback(lanes, arms, law, table, o, w)
+        shares(lanes, drives, arms, extra, w)
+    else:
+        joint_coordinates(lanes, drives, arms, extra, law, table, o, w)
     distribute(lanes, drives, arms, w)

@@ -78,44 +78,42 @@ def reference(lanes, drives, arms, law, table, o, w):
         for j in range(L):
             a11, a12, _, _, _, r1, _ = joint(drives, arms, table, o, w, JOINT_J, j, L)
             a21, a22, _, _, _, r2, _ = joint(drives, arms, table, o, w, JOINT_K, j, L)
-            task = w[of(JOINT_J, j, W, L)] < 0.0
-            det = 1.0 if task else a11 * a22 - a12 * a21
-            w[of(REF_X, j, W, L)] = table[o + 2] if task else (a22 * r1 - a12 * r2) / det
-            w[of(REF_Y, j, W, L)] = table[o + 3] if task else (a11 * r2 - a21 * r1) / det
+            det = a11 * a22 - a12 * a21
+            w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = (a22 * r1 - a12 * r2) / det, (a11 * r2 - a21 * r1) / det
     else:
         for j in range(L):
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
 
 
-@leaf
-def goals(lanes, drives, arms, table, o, w, j):
-    """Of the two coordinates of a law: their rows of F, errors, errors of the rates, and desired accelerations less
-    those at zero xdd."""
-    L, W = len(lanes), len(arms)
-    a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
-    a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
-    task = w[of(JOINT_J, j, W, L)] < 0.0
-    a11, a12, a21, a22 = 1.0 if task else a11, 0.0 if task else a12, 0.0 if task else a21, 1.0 if task else a22
-    e1, e2 = w[of(PX, j, W, L)] - table[o] if task else e1, w[of(PY, j, W, L)] - table[o + 1] if task else e2
-    e1d = w[of(PVX, j, W, L)] - table[o + 2] if task else e1d
-    e2d = w[of(PVY, j, W, L)] - table[o + 3] if task else e2d
-    v1, v2 = table[o + 4] if task else v1 - acc1, table[o + 5] if task else v2 - acc2
-    return a11, a12, a21, a22, e1, e2, e1d, e2d, v1, v2
-
-
 @outlined
-def minimal_feedback(lanes, drives, arms, law, table, o, w):
-    """w and g of APD and CTC for two joints or, where JOINT_J is negative, the end-effector position."""
-    L, W = len(lanes), len(arms)
+def joint_feedback(lanes, drives, arms, law, table, o, w):
+    """w and g of APD and CTC for two joints."""
+    L, W, force = len(lanes), len(arms), law.form == APD
     for j in range(L):
-        a11, a12, a21, a22, e1, e2, e1d, e2d, v1, v2 = goals(lanes, drives, arms, table, o, w, j)
+        a11, a12, acc1, e1, e1d, _, v1 = joint(drives, arms, table, o, w, JOINT_J, j, L)
+        a21, a22, acc2, e2, e2d, _, v2 = joint(drives, arms, table, o, w, JOINT_K, j, L)
         s1 = w[of(PAIR_P1, j, W, L)] * e1 + w[of(PAIR_D1, j, W, L)] * e1d
         s2 = w[of(PAIR_P2, j, W, L)] * e2 + w[of(PAIR_D2, j, W, L)] * e2d
-        force = law.form == APD
-        v1, v2 = v1 if force else v1 - s1, v2 if force else v2 - s2
+        v1, v2 = v1 - acc1 - (0.0 if force else s1), v2 - acc2 - (0.0 if force else s2)
         det, size = a11 * a22 - a12 * a21, (a11 * a11 + a12 * a12) * (a21 * a21 + a22 * a22)
         # At a parameterization singularity nothing but rounding is left.
         det = det if det * det > 1e-24 * size else math.nan
         w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = (a22 * v1 - a12 * v2) / det, (a11 * v2 - a21 * v1) / det
         w[of(PUSH_X, j, W, L)] = -(a11 * s1 + a21 * s2) if force else 0.0
         w[of(PUSH_Y, j, W, L)] = -(a12 * s1 + a22 * s2) if force else 0.0
+
+
+@outlined
+def task_feedback(lanes, arms, law, table, o, w):
+    """Reference rate, w and g of APD and CTC in the end-effector position."""
+    L, W, force = len(lanes), len(arms), law.form == APD
+    for j in range(L):
+        vx, vy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
+        s1 = w[of(PAIR_P1, j, W, L)] * (w[of(PX, j, W, L)] - table[o]) + w[of(PAIR_D1, j, W, L)] * (vx - table[o + 2])
+        s2 = w[of(PAIR_P2, j, W, L)] * (w[of(PY, j, W, L)] - table[o + 1]) + w[of(PAIR_D2, j, W, L)] * (vy - table[o + 3])
+        w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = table[o + 2] if force else vx, table[o + 3] if force else vy
+        w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = (
+            table[o + 4] - (0.0 if force else s1),
+            table[o + 5] - (0.0 if force else s2),
+        )
+        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = -s1 if force else 0.0, -s2 if force else 0.0

@@ -28,7 +28,7 @@ Sensor = namedtuple("Sensor", "quantized quantum filtered blend")
 Clock = namedtuple("Clock", "first samples dt")
 # Flat columns of a single run, those of the drives with room for the rest of a row behind them; the number of drives.
 History = namedtuple("History", "x xd q qd c joints drives")
-Law = namedtuple("Law", "form filter pose same switched asks")
+Law = namedtuple("Law", "form filter pose same task switched asks")
 
 # Blocks of the motion table, one number per arm, after x, xd and xdd.
 # What decentralized laws need comes first.

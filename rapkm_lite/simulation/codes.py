@@ -23,6 +23,7 @@ class Code:
     form: str
     filter: str
     true_pose: bool
+    task: bool
     switched: bool
     drives: dict
     run: dict
@@ -31,7 +32,7 @@ class Code:
     @property
     def kind(self) -> tuple:
         """Codes of one kind can run side by side."""
-        return self.form, self.filter, self.true_pose, self.switched, self.user
+        return self.form, self.filter, self.true_pose, self.task, self.switched, self.user
 
 
 FORMS = {
@@ -65,7 +66,8 @@ def code_of(law: Any, model) -> Code | None:
     else:
         return None
     drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
-    return Code(code, form, pose == "true", isinstance(law, SwitchedCTC), drives, run, user)
+    task, switched = getattr(law, "independent", ()) is None, isinstance(law, SwitchedCTC)
+    return Code(code, form, pose == "true", task, switched, drives, run, user)
 
 
 def _gains(law: Any, N: int) -> tuple[str, dict, dict]:

@@ -153,7 +153,7 @@ def _shape(robot, model, code: Code, L: int, study: bool, faulty: bool, counted:
     at = None if code.user is None else code.user.at
     asks = tables.NOTHING if at is None else tables.DESIRED if at == "desired" else tables.POSED
     pose = tables.TRUE if code.true_pose else tables.COUNTED if counted else tables.MEASURED
-    law = tables.Law(form, filtered, pose, model.same_kinematics(robot), code.switched, asks)
+    law = tables.Law(form, filtered, pose, model.same_kinematics(robot), code.task, code.switched, asks)
     has_model = tables.PID < form < tables.USER
     posed = () if has_model or filtered != tables.NO_FILTER or asks == tables.POSED else None
     modelled = tables.sizes(int(tables.extra(model) is not None)) if has_model else None
