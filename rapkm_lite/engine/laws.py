@@ -221,7 +221,7 @@ def distribute(lanes, drives, arms, w):
 
 @leaf
 def joint_coordinates(lanes, drives, arms, extra, law, table, o, w):
-    """Reference rate, shares, w and g of the laws in two or all joints."""
+    """Shares of the arms, w and g of the laws in two or all joints."""
     if len(lanes) == 1:
         for block in (ACCELERATION, ELBOW_RATE, ELBOW_ACCELERATION, ELBOW_COS, ELBOW_SIN):
             fetch(block, len(arms), table, o, w)
@@ -231,8 +231,8 @@ def joint_coordinates(lanes, drives, arms, extra, law, table, o, w):
     redundant = law.form >= REDUNDANT_APD
     if redundant:
         gram(lanes, drives, arms, w)
-    reference(lanes, drives, arms, law, table, o, w)
     if law.form in (APD, REDUNDANT_APD, REDUNDANT_APD_LINE2):
+        reference(lanes, drives, arms, law, table, o, w)
         shares(lanes, drives, arms, extra, w)
     if redundant:
         redundant_feedback(lanes, drives, arms, law, table, o, w)

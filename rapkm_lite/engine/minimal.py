@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from .jit import index, leaf, outlined
+from .jit import index, outlined
 from .leaves import solve2
 from .rows import *
 from .tables import *
@@ -61,7 +61,7 @@ def joint(drives, arms, table, o, w, which, j, L):
 
 @outlined
 def reference(lanes, drives, arms, law, table, o, w):
-    """The reference rate u: the velocity of the pose, in APD laws what the desired rates of the coordinates mean."""
+    """The reference rate u of APD laws: what the desired rates of the joints mean at the end-effector."""
     L, N, W = len(lanes), len(drives), len(arms)
     if law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2:
         for j in range(L):
@@ -74,15 +74,12 @@ def reference(lanes, drives, arms, law, table, o, w):
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = solve2(
                 w[of(G11, j, W, L)], w[of(G12, j, W, L)], w[of(G22, j, W, L)], fx, fy
             )
-    elif law.form == APD:
+    else:
         for j in range(L):
             a11, a12, _, _, _, r1, _ = joint(drives, arms, table, o, w, JOINT_J, j, L)
             a21, a22, _, _, _, r2, _ = joint(drives, arms, table, o, w, JOINT_K, j, L)
             det = a11 * a22 - a12 * a21
             w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = (a22 * r1 - a12 * r2) / det, (a11 * r2 - a21 * r1) / det
-    else:
-        for j in range(L):
-            w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
 
 
 @outlined
@@ -107,13 +104,12 @@ def joint_feedback(lanes, drives, arms, law, table, o, w):
 def task_feedback(lanes, arms, law, table, o, w):
     """Reference rate, w and g of APD and CTC in the end-effector position."""
     L, W, force = len(lanes), len(arms), law.form == APD
+    xd, yd, xdd, ydd = table[o + 2], table[o + 3], table[o + 4], table[o + 5]
     for j in range(L):
+        ex, ey = w[of(PX, j, W, L)] - table[o], w[of(PY, j, W, L)] - table[o + 1]
         vx, vy = w[of(PVX, j, W, L)], w[of(PVY, j, W, L)]
-        s1 = w[of(PAIR_P1, j, W, L)] * (w[of(PX, j, W, L)] - table[o]) + w[of(PAIR_D1, j, W, L)] * (vx - table[o + 2])
-        s2 = w[of(PAIR_P2, j, W, L)] * (w[of(PY, j, W, L)] - table[o + 1]) + w[of(PAIR_D2, j, W, L)] * (vy - table[o + 3])
-        w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = table[o + 2] if force else vx, table[o + 3] if force else vy
-        w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = (
-            table[o + 4] - (0.0 if force else s1),
-            table[o + 5] - (0.0 if force else s2),
-        )
+        s1 = w[of(PAIR_P1, j, W, L)] * ex + w[of(PAIR_D1, j, W, L)] * (vx - xd)
+        s2 = w[of(PAIR_P2, j, W, L)] * ey + w[of(PAIR_D2, j, W, L)] * (vy - yd)
+        w[of(REF_X, j, W, L)], w[of(REF_Y, j, W, L)] = xd if force else vx, yd if force else vy
+        w[of(ACC_X, j, W, L)], w[of(ACC_Y, j, W, L)] = xdd if force else xdd - s1, ydd if force else ydd - s2
         w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = -s1 if force else 0.0, -s2 if force else 0.0
