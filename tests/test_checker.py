@@ -251,6 +251,14 @@ def test_secrets_are_not_handed_out(capsys):
         np.testing.assert_array_equal(check(name, own), own)
 
 
+@pytest.mark.parametrize("name", [n for n, e in exercises().items() if e.secret and not e.raw])
+def test_how_far_a_guess_is_off_does_not_tell_a_secret(name):
+    """Guesses at different distances, in one entry or in all, are told the same."""
+    guesses = [np.full(3, 50.0) + spread for spread in (0.0, 0.123, [0.0, 0.0, 1.7], [-3.1, 0.0, 0.0])]
+    assert len({examine(name, guess) for guess in guesses}) == 1
+    assert not set("123456789") & set(examine(name, guesses[1])[1])
+
+
 def test_strict_mode_raises_unless_solved(monkeypatch, capsys):
     monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
     with pytest.raises(AssertionError, match="opposite sign"):

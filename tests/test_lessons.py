@@ -1,5 +1,6 @@
 """The lessons as files: built from their sources, with clean outputs; solved ones right, wrong answers caught."""
 
+import ast
 import importlib.util
 import os
 import re
@@ -13,6 +14,7 @@ import stored
 
 from rapkm_lite.checks import Exercise, check, examine, exercises
 from rapkm_lite.lessons import checker
+from rapkm_lite.lessons.grading.submission import called
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -169,6 +171,15 @@ def test_every_lesson_has_its_room_and_its_exercises_bear_its_number():
     assert {f"lesson{n}" for n in numbers} == set(checker.lessons())
     for name, exercise in exercises().items():
         assert name.partition(".")[0] in numbers and all(exercise.hints)
+
+
+@pytest.mark.parametrize("path", NUMBERED, **NAMES)
+def test_the_lesson_itself_gives_no_answer_its_name(path):
+    """A loop variable of that name would be graded in place of an answer that is not there."""
+    names = {called(n, e): n for n, e in exercises().items() if n.startswith(path.stem[:2])}
+    for cell in code_cells(path):
+        made = {n.id for n in ast.walk(ast.parse(cell.source)) if isinstance(n, ast.Name) and type(n.ctx) is ast.Store}
+        assert not [n for n in made & set(names) if f'"{names[n]}"' not in cell.source]
 
 
 def test_blanking_keeps_the_signature_and_names():

@@ -132,7 +132,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         if path == "triangle":
             t = central_triangle(robot, size, dt=0.01)
         else:
-            t = circle(robot, 5e-4 * size, dt=0.01, centre=robot.base.mean(axis=0))
+            t = circle(robot, 5e-4 * size, dt=0.01, centre=marks.middle(robot))
         A = act.control_matrix(robot, t.q)
         if robot.n_arms == 3:
             null = null_vector(robot, t.q)

@@ -79,9 +79,8 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     '1.19 mm'
     """
     robot = frictionless(robot)
-    middle = robot.base.mean(axis=0)
     path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5)
-    q = inverse_kinematics(robot, middle)
+    q = inverse_kinematics(robot, marks.middle(robot))
     A, inertia = act.control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
     # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
     carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
@@ -123,21 +122,21 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     '3.58 J'
     """
     robot = frictionless(robot)
-    N, middle = robot.n_arms, robot.base.mean(axis=0)
-    along = robot.base - middle
+    N, centre = robot.n_arms, robot.base.mean(axis=0)
+    along = robot.base - centre
     out = along / np.linalg.norm(along, axis=1, keepdims=True)
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
-    offset, way = np.resize(OFFSET, N), middle + triangle(load(), dt=0.02).x
+    offset, way = np.resize(OFFSET, N), centre + triangle(load(), dt=0.02).x
 
     def draw(picture, radius, proximal, distal, load, mode):
         lengths = 1e-3 * np.array([proximal, distal])
-        base = middle + 1e-3 * radius * out
+        base = centre + 1e-3 * radius * out
         own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
         picture.line("machine", *way.T, color=NEUTRAL, linewidth=1.2, zorder=1)
-        if reachable(own, middle):
-            marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
+        if reachable(own, centre):
+            marks.draw_machine(picture, "machine", own, inverse_kinematics(own, centre))
         try:
-            path = triangle(own, dt=0.02, centre=middle)  # a sample for each pixel or two
+            path = triangle(own, dt=0.02, centre=centre)  # a sample for each pixel or two
         except ValueError:
             marks.draw_workspace(picture, "machine", own)
             raise
@@ -156,11 +155,11 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
             "smallest σ_min on the triangle": f"{act.singular_values(A)[:, 1].min():.2f} rad/m",
         }
 
-    (left, low), (right, high) = middle - 0.48, middle + 0.48
+    (left, low), (right, high) = centre - 0.48, centre + 0.48
     wide = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (left, right), "ylim": (low, high)}
     panels = {
-        "machine": wide,
-        "moving": over_time("torque in mN m", robot=robot, title="Moves"),
+        "machine": wide | {"legend": marks.drive_lines(robot)},
+        "moving": over_time("torque in mN m", title="Moves"),
         "pressing": over_time("torque in mN m", title="Only presses"),
     }
     controls = {

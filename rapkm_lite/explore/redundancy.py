@@ -62,7 +62,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.
     first = 0.0
     with suppress(ValueError):  # where the middle is out of reach, or the drives let go
-        A = control_matrix(robot, inverse_kinematics(robot, robot.base.mean(axis=0)))
+        A = control_matrix(robot, inverse_kinematics(robot, marks.middle(robot)))
         reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
         first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
@@ -89,21 +89,21 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
     '1.36'
     """
     robot = frictionless(robot)
-    N, middle = robot.n_arms, robot.base.mean(axis=0)
+    N, centre = robot.n_arms, marks.middle(robot)
     offset = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     degrees = np.arange(361)
 
     @lru_cache(maxsize=32)
     def around(radius: int):
         """The circle, and the length of each drive's row of the null basis of A^T, a degree apart."""
-        way = middle + ring(degrees, 1e-3 * radius)
+        way = centre + ring(degrees, 1e-3 * radius)
         A = control_matrix(robot, inverse_kinematics(robot, way))
         return way, np.sqrt(np.diagonal(prestress_projector(A), axis1=-2, axis2=-1))
 
     @lru_cache(maxsize=128)
     def found(radius: int, turn: int, places: int, counts: int):
         angles = turn + 360 * np.arange(places) / places
-        q_a = inverse_kinematics(robot, middle + ring(angles, 1e-3 * radius))[:, :N] + offset
+        q_a = inverse_kinematics(robot, centre + ring(angles, 1e-3 * radius))[:, :N] + offset
         try:
             return angles, calibrate(robot, counted(q_a, counts), noise=2 * np.pi / counts / np.sqrt(12))
         except CalibrationError as refused:
@@ -123,7 +123,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         if isinstance(result, CalibrationError):
             return {"combinations that are known": f"{result.rank} of {N}", "calibration": "refused"}
         error, spread = 1e3 * np.array([result.offset - offset, np.sqrt(np.diagonal(result.covariance))])
-        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=".3f")
+        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=".3f" if N < 4 else ".2f")
         picture.fit("error", 1.25 * error, 1.25 * spread, least=0.05)
         return {
             "condition": f"{result.condition:.2f}",

@@ -90,8 +90,6 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N = robot.n_arms
     path, times = central_triangle(robot), size(robot)
-    # Metres of arrow for 1 N, newtons of the arrow that shows it; forces of equal torques go with one over the length.
-    scale, unit, wide = 0.4 * times**2, 0.25 / times, 0.009 * times
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
 
     @lru_cache(maxsize=8)
@@ -99,6 +97,13 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, offsets * some)
         A = act.control_matrix(robot, run.q)
         return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
+
+    # Newtons of the arrow that shows the scale, metres of arrow for 1 N; forces of equal torques go with one over the
+    # length, and weight may need more.
+    unit, largest = 0.25 / times, np.linalg.norm(recorded("off", True)[1], axis=-1).max()
+    while largest > 4 * unit:
+        unit *= 2
+    scale, wide = 0.1 * times / unit, 0.009 * times
 
     def draw(picture, time, filter, offsets):
         run, force, error = recorded(filter, offsets)
@@ -155,8 +160,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     '0.0 mN m'
     """
     robot = frictionless(robot)
-    middle = robot.base.mean(axis=0)
-    ends = middle + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
+    ends = marks.middle(robot) + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)

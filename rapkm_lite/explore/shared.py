@@ -52,8 +52,8 @@ def length_slider(robot, label: str, low: float, high: float, step: float, value
 
 
 def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
-    """Sliders x and y in mm for the end-effector's place; the numbers are the testbed's, from the robot's middle on."""
-    right, up = robot.base.mean(axis=0)
+    """Sliders x and y in mm for the end-effector's place; the numbers are the testbed's, from `marks.middle` on."""
+    right, up = marks.middle(robot)
     return {
         "x": length_slider(robot, f"{which}x in mm", low, -low, step, x, right),
         "y": length_slider(robot, f"{which}y in mm", low, high, step, y, up),
@@ -61,9 +61,9 @@ def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step:
 
 
 def central_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
-    """The triangle of `side` in mm, 240 on the testbed, about the middle of the drives."""
-    side = 240 * size(robot) if side is None else side
-    return triangle(robot, 1e-3 * side, centre=robot.base.mean(axis=0), **times)
+    """The triangle of `side` in mm, 240 on the testbed and 160 on two of its arms, about the middle of the drives."""
+    side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
+    return triangle(robot, 1e-3 * side, centre=marks.middle(robot), **times)
 
 
 def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):

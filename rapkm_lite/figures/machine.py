@@ -84,7 +84,9 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     """
     margin = float(bounded("margin", exact_array("margin", margin), 0.0, strict=False))
     room = robot.lengths[:, 0].max() + margin * robot.lengths.max()
-    low, high = robot.base.min(axis=0) - room, robot.base.max(axis=0) + room
+    left, right, bottom, top = sampling_box(robot)
+    low = np.minimum(robot.base.min(axis=0) - room, [left, bottom])
+    high = np.maximum(robot.base.max(axis=0) + room, [right, top])
     frame = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     return {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal"} | frame
 

@@ -129,16 +129,18 @@ def another_frame(seen: Seen) -> str:
     return f"the vectors are all turned by {angle:.0f} degrees: they are given in another frame"
 
 
-DETECTORS: tuple[Callable[[Seen], str], ...] = (
-    *(nothing, sign, known_factor, transposed, from_argument, order, another_frame),
-    *(argument_factor, constant_factor, shifted, function_of, combination, mixture),
-)
+PLAIN: tuple[Callable[[Seen], str], ...] = nothing, sign, known_factor, transposed, from_argument, order, another_frame
+# These find a number, from which a right answer can be told.
+FITTED: tuple[Callable[[Seen], str], ...] = argument_factor, constant_factor, shifted, function_of, combination, mixture
 
 
-def named(seen: Seen) -> str:
-    """The first detector that explains all cases; an empty string when none does."""
+def named(seen: Seen, secret: bool = False) -> str:
+    """The first detector that explains all cases; an empty string when none does.
+
+    secret : the words must not tell the right answer.
+    """
     with np.errstate(all="ignore"):
-        return next(filter(None, (detect(seen) for detect in DETECTORS)), "")
+        return next(filter(None, (detect(seen) for detect in PLAIN + (() if secret else FITTED))), "")
 
 
 def where(seen: Seen, right: list[bool]) -> str:

@@ -74,7 +74,7 @@ class Exercise:
     judge : of a design: answer -> list of `Measured`, from runs in closed loop; cases, invariant and tolerance are
         not used.
     raw : True where `judge` reads the answer as it stands, words and NaN too, and returns a `Result`.
-    secret : True where `check` must not hand out the package's answer.
+    secret : True where `check` must not hand out the package's answer, nor say how far another one is off.
     points : what a right or close answer is worth.
     called : the name of the answer in the lesson, where it is not the last part of the exercise's name.
     """

@@ -58,7 +58,8 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
         kinds = sorted({case.label for case in far})
         said = {kind: _failure(exercise, answer, [case for case in far if case.label == kind]) for kind in kinds}
         said = {kind: words for kind, words in said.items() if words} or dict.fromkeys(kinds, end.result.sentence)
-        short = f"it is right, but not for {', '.join(said)}, where {next(iter(said.values()))}"
+        right = "it is right" if result.word == "ok" else "the method is right"
+        short = f"{right}, but not for {', '.join(said)}, where {next(iter(said.values()))}"
         return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
     return all_of_them if result.word == "ok" else result
 
@@ -115,14 +116,21 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
         if exercise.close:
             return Result("close", f"the method is right, {said}. To improve: {exercise.improve}")
         raise Ended("wrong", said, sentence)
-    off = f"off by up to {max(worst):.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
-    share = _share(worst, want, right)
+    off, share = _off(exercise, seen), _share(worst, want, right)
     if share <= exercise.close and not _by_a_factor(seen):
-        near = f"the method is right, {off}, that is {100 * share:.2g} %"
-        return Result("close", f"{near}. To improve: {exercise.improve}")
-    _explained(exercise, seen, right, off)
-    law = f"; {sentence}: {lawful:.3g}" if exercise.invariant and lawful > exercise.tolerance else ""
-    raise Ended("wrong", f"it is {off}{law}", "no name found")
+        near = f", {off}, that is {100 * share:.2g} %" if off else ""
+        return Result("close", f"the method is right{near}. To improve: {exercise.improve}")
+    _explained(exercise, seen, right)
+    law = f"; {sentence}" + f": {lawful:.3g}" * (not exercise.secret) if lawful > exercise.tolerance else ""
+    raise Ended("wrong", f"it is {off or 'off'}{law}", "no name found")
+
+
+def _off(exercise: Exercise, seen: Seen) -> str:
+    """How far the answer is off; nothing where shapes differ, or where a few tries would then tell a secret answer."""
+    if exercise.secret or any(g.shape != w.shape for g, w, _ in seen):
+        return ""
+    worst = max(_deviation(g, w) for g, w, _ in seen)
+    return f"off by up to {worst:.3g} {exercise.unit} (allowed {exercise.tolerance:.0e})"
 
 
 def _by_a_factor(seen: Seen) -> bool:
@@ -179,22 +187,20 @@ def _known_mistake(exercise: Exercise, seen: Seen) -> None:
         # What explains the answer as it is goes before what explains its opposite.
         sentence = max(signs, key=lambda words: signs[words])
         turned = ", and the sign is opposite" * (signs[sentence] < 0)
-        off = ""
-        if all(g.shape == w.shape for g, w, _ in seen):
-            off = f"; off by up to {max(_deviation(g, w) for g, w, _ in seen):.3g} {exercise.unit}"
-        raise Ended("wrong", f"{sentence}{turned}{off}", sentence)
+        raise Ended("wrong", "; ".join(filter(None, [sentence + turned, _off(exercise, seen)])), sentence)
 
 
-def _explained(exercise: Exercise, seen: Seen, right: list[bool], off: str) -> None:
+def _explained(exercise: Exercise, seen: Seen, right: list[bool]) -> None:
     """End the examination with the name of the mistake, or with the place where it was made, if either is found."""
     scale = max(map(largest, seen.want), default=0.0) or 1.0
     loose = min(0.2, max(1e-6, exercise.close, 1.5 * exercise.tolerance / scale))
     rough = replace(seen, slack=loose)
-    words = named(seen)
+    words = named(seen, exercise.secret)
     if not words and loose > 1e-6:
         _known_mistake(exercise, rough)
-    if words := words or named(rough) or where(seen, right):
-        raise Ended("wrong", f"{words}; {off}", words)
+    words = words or named(rough, exercise.secret) or ("" if exercise.secret else where(seen, right))
+    if words:
+        raise Ended("wrong", "; ".join(filter(None, [words, _off(exercise, seen)])), words)
 
 
 def _behaviour(exercise: Exercise, answer: Any) -> Result:

@@ -35,6 +35,15 @@ def by_a_solver(robot, model, x, K_P):
     return K_P * (wanted - rk.inverse_kinematics(robot, gap.x)[: robot.n_arms])
 
 
+def by_simulation(robot, model, x, K_P):
+    """What PD drives hold 6 s after they were told to go there, in steps of 1 ms."""
+    wanted = rk.inverse_kinematics(model, x)[: model.n_arms]
+    path = rk.hold(robot, x, 6.0)
+    told = path.with_set_points(np.tile(wanted, (len(path), 1)))
+    damping = 0.225 * np.sqrt(K_P / 7.05)
+    return rk.simulate(robot.replace(friction=0.0), rk.PD(K_P, damping), told).c[-1]
+
+
 def scaled(factor):
     return lambda robot, model, x, K_P: factor * tasks.geometry_fight(robot, model, x, K_P)
 
@@ -73,6 +82,7 @@ def with_feed_forward(drawing):
 ANSWERS = {
     "10.geometry_fight": [
         ("right", "reference", tasks.geometry_fight),
+        ("right", "by simulation", by_simulation),
         ("right", "Gauss-Newton by hand, a list", by_gauss_newton),
         (
             "right",

@@ -16,6 +16,10 @@ def terms(robot, q, K_P):
     return rk.minimal_dynamics(robot, q, 0 * q, None)[0], A.T @ np.diag(K_P) @ A
 
 
+def singular_values(robot, q, K_P):
+    return np.sort(np.sqrt(np.linalg.svd(np.linalg.solve(*terms(robot, q, K_P)))[1])) / (2 * np.pi)
+
+
 def uncoupled(robot, q, K_P):
     inertia, stiffness = terms(robot, q, K_P)
     return np.sort(np.sqrt(np.diag(stiffness) / np.diag(inertia))) / (2 * np.pi)
@@ -195,6 +199,7 @@ ANSWERS = {
         ("wrong", "squares", lambda *case: (2 * np.pi * right(*case)) ** 2, "root"),
         ("wrong", "squares in Hz", lambda *case: right(*case) ** 2, "root"),
         ("wrong", "x and y apart", uncoupled, "diagonals"),
+        ("wrong", "singular values", singular_values, "eigenvalues"),
         ("wrong", "descending", lambda *case: right(*case)[::-1], "order"),
         ("wrong", "mean gain", lambda r, q, K: right(r, q, np.full(len(K), K.mean())), "averaged"),
         ("wrong", "first gain", lambda r, q, K: right(r, q, np.full(len(K), K[0])), ""),

@@ -27,6 +27,18 @@ def workspace_outline(robot) -> np.ndarray:
     return np.concatenate([*parts, np.empty((0, 2))])[:-1]
 
 
+def middle(robot: Manipulator) -> np.ndarray:
+    """The place (2,) in m about which pictures are made: the middle of the drives.
+
+    Two drives are singular between them; their place is where that of the testbed is, a third drive at its side.
+    """
+    centre = robot.base.mean(axis=0)
+    if robot.n_arms > 2:
+        return centre
+    along = robot.base[1] - robot.base[0]
+    return centre + np.array([-along[1], along[0]]) / np.sqrt(12)
+
+
 def clamped(robot: Manipulator, point) -> np.ndarray:
     """The point (2,) in m, or the last one that all arms reach on the way to it from the middle of the drives."""
     if reachable(robot, point):
@@ -34,9 +46,9 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
     start = robot.base.mean(axis=0)
     low, high = 0.0, 1.0
     for _ in range(40):
-        middle = (low + high) / 2
-        inside = reachable(robot, start + middle * (point - start))
-        low, high = (middle, high) if inside else (low, middle)
+        half = (low + high) / 2
+        inside = reachable(robot, start + half * (point - start))
+        low, high = (half, high) if inside else (low, half)
     # A millimetre inside, where no arm is quite stretched.
     return start + max(low - 1e-3 / max(np.linalg.norm(point - start), 1e-300), 0.0) * (point - start)
 

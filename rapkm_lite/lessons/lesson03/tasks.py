@@ -156,7 +156,7 @@ def unexplained_error(name: str):
 
     def law(offset):
         n, errors, _ = rests(name)
-        return np.max(np.abs(contradictions(n, errors) - n @ offset)), "contradictions left unexplained, in rad"
+        return np.max(np.abs(contradictions(n, errors) - n @ offset)), "contradictions left unexplained (rad)"
 
     return law
 
@@ -166,7 +166,7 @@ def unexplained_gain(gains):
     _, errors, torques = rests("gain")
     left = torques + errors * gains
     worst = np.max(np.abs(left).max(axis=0) / np.abs(errors).max(axis=0))
-    return worst, "rest torques of the log that the gains leave unexplained, over the error, in N m/rad"
+    return worst, "rest torques left unexplained, over the error (N m/rad)"
 
 
 def refusal(answer) -> Result:

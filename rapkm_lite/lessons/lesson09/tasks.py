@@ -60,7 +60,7 @@ def one_sign(A, f, least) -> np.ndarray:
     A, f = np.asarray(A, dtype=float), np.asarray(f, dtype=float)
     found = linprog(np.ones(len(A)), A_eq=A.T, b_eq=f, bounds=(least, None))
     if found.status != 0:
-        raise ValueError(f"f = {f.tolist()} has no torques of one sign here; allowed: poses where common_sign holds")
+        raise ValueError(f"f = {f.tolist()} has no torques of one sign here; where common_sign holds, every force has")
     return found.x
 
 

@@ -24,6 +24,11 @@ def _taken_for_symmetric(robot, q, K_P) -> np.ndarray:
     return np.sqrt(np.abs(values)) / (2 * np.pi)
 
 
+def _singular(robot, q, K_P) -> np.ndarray:
+    G, A = _terms(robot, q)
+    return np.sqrt(np.linalg.svd(np.linalg.solve(G, A.T @ (K_P[:, None] * A)))[1][::-1]) / (2 * np.pi)
+
+
 def _uncoupled(robot, q, K_P) -> np.ndarray:
     G, A = _terms(robot, q)
     return np.sqrt(np.sort(np.diag(A.T @ (K_P[:, None] * A)) / np.diag(G))) / (2 * np.pi)
@@ -95,6 +100,7 @@ EXERCISES = {
             "eigvalsh takes the matrix for symmetric, which G^-1 A^T K_P A is not: np.linalg.eigvals": (
                 _taken_for_symmetric
             ),
+            "singular values are taken for eigenvalues: G^-1 A^T K_P A is not symmetric": _singular,
             "only the diagonals are kept: stiffness and inertia couple x and y": _uncoupled,
             "A is missing: each drive moves only its own proximal link then": (
                 lambda robot, q, K_P: (

@@ -39,7 +39,9 @@ def frequency_cases(rng) -> list[Case]:
         for x in rng.uniform(-0.06, 0.06, (3, 2)):
             cases.append(Case(label, robot, inverse_kinematics(robot, x), rng.uniform(3.0, 14.0, robot.n_arms)))
     robot = load()
-    return [*cases, Case("equal gains", robot, inverse_kinematics(robot, [0.02, 0.03]), np.full(3, 7.05))]
+    far, stiff = inverse_kinematics(robot, [0.1, 0.06]), np.array([14.0, 3.0, 3.0])
+    equal = Case("equal gains", robot, inverse_kinematics(robot, [0.02, 0.03]), np.full(3, 7.05))
+    return [*cases, Case("gains that differ much", robot, far, stiff), equal]
 
 
 def no_determinant(got, robot, q, K_P) -> tuple[float, str]:
