@@ -204,7 +204,7 @@ def test_what_is_no_experiment_at_all(said, words):
 )  # fmt: skip
 def test_a_name_stays_in_the_data_folder(name):
     for read in (rk.load, rk.experiment):
-        with pytest.raises(ValueError, match=r"source = .*there is no data file .*; allowed: a file name") as caught:
+        with pytest.raises(ValueError, match=r"source = .*there is no data file .*; allowed: a name from") as caught:
             read(name)
         assert len(str(caught.value)) < 700
     with pytest.raises(ValueError, match=r"name = .*there is no data file .*; allowed: a file name"):

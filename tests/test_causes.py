@@ -61,6 +61,9 @@ def fault(*faults):
     return {"faults": list(faults)}
 
 
+# One elbow the other way: the distal links are parallel in the middle between two drives.
+MIXED = ROBOT.replace(mode=[1, 1, -1])
+BETWEEN = rk.hold(MIXED, ROBOT.base[:2].mean(axis=0), 0.5)
 LONGER = ROBOT.replace(lengths=0.28)
 FIRST_TWO = ROBOT.replace(lengths=[[0.28, 0.28], [0.28, 0.28], [0.2, 0.2]])
 SETS = [
@@ -112,6 +115,9 @@ SETS = [
     ("drives 2 and 3", ROBOT, rk.CTC(900.0, 60.0, (1, 2)), TRIANGLE, {"offset": OFFSET}),
     ("drives 1 and 2", ROBOT, rk.CTC(900.0, 60.0, (0, 1)), TRIANGLE, {"offset": OFFSET}),
     ("drives 2 and 3", ROBOT, rk.APD(7.0, 0.2, (1, 2)), TRIANGLE, {"offset": OFFSET}),
+    ("input singularity", MIXED, REDUNDANT, BETWEEN, {}),
+    ("input singularity", MIXED, FILTER, BETWEEN, {}),
+    ("input singularity", MIXED, CTC, BETWEEN, {}),
     ("the gains do not hold it", HANGING, rk.PD(0.1, 0.01), HOLD, {}),
     ("s law returned None; allowed", ROBOT, silent, CIRCLE, {}),
     (r"KeyError: 'the gain table' \(line \d+ of test_causes.py: return gains", ROBOT, raising, CIRCLE, {}),

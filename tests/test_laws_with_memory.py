@@ -388,6 +388,11 @@ def test_a_step_must_answer_with_the_torques_and_the_memory():
         rk.simulate(ROBOT, Half(), PATH)
     with pytest.raises(NotImplementedError, match="no torque without its memory"):
         rk.PID(7.0, 1.0, 0.2).torque(ROBOT, None, None, None, None, None)
+    with pytest.raises(NotImplementedError, match="neither torque nor step"):
+        rk.simulate(ROBOT, rk.Law(), PATH)
+    elsewhere = type("Elsewhere", (rk.Law,), {"pose": "desired", "torque": lambda self, *known: np.zeros(3)})
+    with pytest.raises(ValueError, match=r"pose = 'desired'; allowed: 'measured', 'true', None"):
+        rk.simulate(ROBOT, elsewhere(), PATH)
     here = PATH.q[0], PATH.qd[0], PATH.q_a[0], PATH.qd_a[0], PATH[0]
     with pytest.raises(NotImplementedError, match=r"law = <function .* is a function of time, which torque"):
         rk.AntagonismFilter(lambda t, q_a, qd_a, desired: 0.0 * q_a).torque(ROBOT, *here)

@@ -360,8 +360,62 @@ def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
 
 
 def test_a_bad_first_answer_is_no_failed_row():
-    with pytest.raises(ValueError, match="law returned None"):
-        rk.sweep(ROBOT, [pd, lambda *sample: None], PATH, OFFSET, failed="mask")
+    """Rows that ended otherwise are there, and the run is named."""
+    laws = [FailsAt(0.0, boom), pd, lambda *sample: None]
+    for chunk in (1, 64):
+        with pytest.raises(ValueError, match="law returned None") as caught:
+            rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", chunk=chunk)
+        assert "first sample of run 2" in caught.value.__notes__[-1]
+        assert caught.value.partial.failed.tolist() == [True, False, True]
+
+
+def no_number_at_zero(t, q_a, qd_a, desired):
+    e = q_a - desired.q_a
+    return (-7.05 * e - 0.225 * (qd_a - desired.qd_a)) * (np.nan if abs(e[0]) < 1e-9 else 1.0)
+
+
+@pytest.mark.parametrize("law", [no_number_at_zero, rk.compiled(no_number_at_zero)], ids=["Python", "compiled"])
+def test_torques_that_are_not_finite_mask_their_row_from_the_first_sample_on(law):
+    offsets = np.array([[1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [2e-3, 0.0, 0.0]])
+    study = rk.sweep(ROBOT, law, PATH, offsets, failed="mask")
+    assert study.failed.tolist() == [False, True, False] and "[0] = nan" in study.reasons[1]
+    with pytest.raises(ValueError, match="nan; allowed: finite") as caught:
+        rk.sweep(ROBOT, law, PATH, offsets)
+    assert caught.value.partial.failed.tolist() == [False, True, False]
+    assert_array_equal(caught.value.partial.energies[[0, 2]], study.energies[[0, 2]])
+
+
+class Unreadable(Exception):
+    """It can be pickled, but not read again."""
+
+    def __init__(self, first, second):
+        super().__init__(first)
+
+
+def unreadable():
+    raise Unreadable("gain table", 2)
+
+
+@pytest.mark.parametrize("failed", ["mask", "raise"])
+def test_an_exception_that_cannot_travel_costs_no_rows(failed):
+    laws = [pd, FailsAt(0.0, unreadable), pd]
+    with ProcessPoolExecutor(1) as pool:
+        if failed == "mask":
+            study = rk.sweep(ROBOT, laws, PATH, OFFSET, executor=pool, chunk=1, failed=failed)
+        else:
+            with pytest.raises(RuntimeError, match="the law raised Unreadable: gain table") as caught:
+                rk.sweep(ROBOT, laws, PATH, OFFSET, executor=pool, chunk=1, failed=failed)
+            study = caught.value.partial
+        assert study.failed.tolist() == [False, True, False]
+    with pytest.raises(Unreadable):
+        rk.sweep(ROBOT, laws, PATH, OFFSET)
+
+
+def test_an_interrupted_sweep_tells_of_one_partial():
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.sweep(ROBOT, [pd, FailsAt(0.1, interrupt)], PATH, OFFSET)
+    assert isinstance(caught.value.partial, rk.Sweep) and caught.value.partial.failed.tolist() == [False, True]
+    assert len([note for note in caught.value.__notes__ if "partial" in note]) == 1
 
 
 class Pool(Executor):

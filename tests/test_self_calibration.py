@@ -196,8 +196,12 @@ def test_places_close_together_end_at_the_rounding_that_their_condition_leaves(s
 def test_what_is_known_of_too_few_places_are_orthonormal_combinations(unknowns):
     x = np.random.default_rng(0).uniform(-0.05, 0.05, (1 if unknowns == "offsets" else 4, 2))
     offset = np.array([1e-4, -2e-4, 3e-4])
-    with pytest.raises(rk.CalibrationError, match=r"= \S+ ± \S+") as refused:
-        rk.calibrate(TESTBED, rk.inverse_kinematics(TESTBED, x)[:, :3] + offset, unknowns)
+    readings = rk.inverse_kinematics(TESTBED, x)[:, :3] + offset
+    with pytest.raises(rk.CalibrationError, match=r"= \S+ ± \S+"):
+        rk.calibrate(TESTBED, readings, unknowns, noise=1e-5)
+    # As many readings as unknown combinations say nothing of their noise.
+    with pytest.raises(rk.CalibrationError, match=r"= [^±]*: pass noise$") as refused:
+        rk.calibrate(TESTBED, readings, unknowns)
     known = refused.value.known
     assert_allclose(known @ known.T, np.eye(refused.value.rank), atol=1e-12)
     assert_allclose(refused.value.value, known[:, :3] @ offset, atol=2e-6)

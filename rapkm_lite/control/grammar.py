@@ -73,7 +73,10 @@ class Law:
 
     def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
         """Drive torques c (..., N) in N m."""
-        raise NotImplementedError(f"{self!r} has no torque without its memory; needed: start and step, as in simulate")
+        alone = type(self).start is Law.start and type(self).step is Law.step
+        no = "gives neither torque nor step; needed: one of them"
+        unasked = "has no torque without its memory; needed: start and step, as in simulate"
+        raise NotImplementedError(f"{self!r} {no if alone else unasked}")
 
     def coordinates(self, memory) -> tuple[int, int] | None:
         """The two independent joints that the law works in, given its memory; None where it has none."""
@@ -124,6 +127,8 @@ def begin(law, model: Manipulator, dt: float):
     """
     law = as_law(law)
     _check_asked(type(law))
+    if type(law).step is Law.step:
+        one_of("pose", law.pose, ("measured", "true", None))
     for name, given in _METHODS.items():
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
             in_order(f"law.{name}", getattr(law, name), *given)
@@ -182,6 +187,18 @@ class BadAnswer(ValueError):
     """What a law answered is not what a law should answer."""
 
 
+class NotFinite(BadAnswer):
+    """One torque per drive, but not all of them finite."""
+
+
+def _fits(c, shape: tuple) -> bool:
+    try:
+        c = np.asarray(c)
+    except (TypeError, ValueError):
+        return False
+    return c.shape == shape and c.dtype.kind in "biuf"
+
+
 def ask(law, memory, sample) -> tuple[np.ndarray, object]:
     """`step` of a law or callable, with an answer that fits: N finite torques, and the memory.
 
@@ -199,7 +216,7 @@ def ask(law, memory, sample) -> tuple[np.ndarray, object]:
     try:
         c = real_array(f"law(t = {sample.t:.4f} s, ...)", c)
     except ValueError as error:
-        raise BadAnswer(str(error)) from None
+        raise (NotFinite if _fits(c, sample.q_a.shape) else BadAnswer)(str(error)) from None
     if c.shape != sample.q_a.shape:
         raise BadAnswer(f"law returned the shape {c.shape}; allowed: {sample.q_a.shape}, one torque in N m per drive")
     return c, memory

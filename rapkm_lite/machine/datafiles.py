@@ -66,10 +66,12 @@ def _data_file(argument: str, value, name) -> Path:
         files |= {p.relative_to(folder).as_posix(): p for p in folder.rglob("*.*") if p.is_file()}
     if isinstance(name, str) and name in files:
         return files[name]
-    raise ValueError(
-        f"{argument} = {short(value)}: there is no data file {short(name)}; allowed: a file name from the folder data: "
-        f"{', '.join(sorted(k for k in files if k.endswith(('.toml', '.csv')) and '/' not in k))}"
-    )
+    ours = sorted(k for k in files if k.endswith((".toml", ".csv")) and "/" not in k)
+    allowed = f"a file name from the folder data: {', '.join(ours)}"
+    if argument == "source":
+        tables = ", ".join(k.removesuffix(".toml") for k in ours if k.endswith(".toml"))
+        allowed = f"a name from the folder data: {tables}; or a path that ends in .toml"
+    raise ValueError(f"{argument} = {short(value)}: there is no data file {short(name)}; allowed: {allowed}")
 
 
 def read_toml(source: str | Path) -> dict:

@@ -270,9 +270,11 @@ def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
     sign = np.where(Q.max(axis=0) < -Q.min(axis=0), -1.0, 1.0)
     known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value), unknown_names(robot.n_arms)
     spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
+    within = (f" ± {s:.2g}" if s > 0.0 else "" for s in spread)
     terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])
     words = (
         f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so more places and "
         f"further apart, or fewer unknowns. Known to first order, in rad and m: "
-    ) + "; ".join(f"{sum_} = {number:.4g} ± {s:.2g}" for sum_, number, s in zip(terms, value, spread, strict=False))
-    return CalibrationError(words, rank, needed, known, value)
+    ) + "; ".join(f"{sum_} = {number:.4g}{s}" for sum_, number, s in zip(terms, value, within, strict=False))
+    unsure = "" if spread.any() else "; no reading is left over to show the noise: pass noise"
+    return CalibrationError(words + unsure, rank, needed, known, value)

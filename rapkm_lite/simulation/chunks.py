@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..control.grammar import BadAnswer
+from ..control.grammar import BadAnswer, NotFinite
 from .compiled import DONE, LAW_FAILED, SINGULAR, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import explain
+from .pools import Stop
 from .runs import SimulationError, complete
 from .setup import Setup
 
@@ -48,8 +49,13 @@ class Columns(NamedTuple):
         return {first + i: error for i, error in errors.items()}
 
 
+def blunder(error: Exception) -> bool:
+    """Is it the caller's: a first answer that is no array of torques at all?"""
+    return isinstance(error, BadAnswer) and not isinstance(error, NotFinite)
+
+
 def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, dict]:
-    """The columns of some runs, and what stopped the first one of those in Python that failed, by its row.
+    """The columns of some runs, and what stopped the first one of those in Python that failed, or a `blunder`, by row.
 
     A function of values only, so that any executor can send it to another process.
     """
@@ -57,14 +63,12 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
     for i in _alone(setup, laws, offsets, rows):
         try:
             run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
-        except BadAnswer:
-            raise
         except Exception as error:
             rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
             known = isinstance(error, SimulationError)
             rows.reason[i] = error.reason if known else explain(setup, laws[i], LAW_FAILED, 0, error)
-            if not errors:
-                errors[i] = error
+            if not errors or blunder(error):
+                errors[i] = Stop(error, rows.reason[i])
         else:
             off = run.path_error
             torques = run.energy, root_mean_square_torque(run), antagonistic_energy(run)

@@ -175,10 +175,17 @@ def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
 
 
 def _singular(setup: Setup, law, rows: slice, least: float) -> Iterator[str]:
-    """Independent drives whose angles are nearly no coordinates at a desired pose among some samples."""
-    pair, pairs = coordinates(law, None), drive_pairs(setup.model)
-    if pair is not None and (min(pair), max(pair)) in pairs and len(setup.trajectory.q[rows]):
-        crossed = np.abs(distal_cross_products(setup.model, setup.trajectory.q[rows]))
+    """A desired pose among some samples at which all drives, or the angles of independent ones, nearly fail."""
+    pair, pairs, q = coordinates(law, None), drive_pairs(setup.model), setup.trajectory.q[rows]
+    if not len(q):
+        return
+    crossed = np.abs(distal_cross_products(setup.model, q))
+    if (most := crossed.max(axis=1).min()) < 0.03 * least:
+        yield (
+            "near an input singularity, where the distal links are parallel and no drive pushes across them: "
+            f"|d_j x d_k| = {most:.2g} at most at the desired pose"
+        )
+    if pair is not None and (min(pair), max(pair)) in pairs:
         measure = crossed[:, pairs.index((min(pair), max(pair)))].min()
         if measure < least:
             yield (

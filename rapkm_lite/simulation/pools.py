@@ -62,6 +62,16 @@ def kept_here(value) -> str:
             return type(error).__name__
 
 
+class Stop:
+    """What stopped a run; an exception that cannot be sent to another process becomes its words there."""
+
+    def __init__(self, error: Exception, words: str):
+        self.error, self.words = error, words
+
+    def __reduce__(self):
+        return Stop, (RuntimeError(self.words) if kept_here(self.error) else self.error, self.words)
+
+
 def _threads() -> bool:
     """Can a thread be started here?"""
     try:

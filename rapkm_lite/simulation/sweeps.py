@@ -13,7 +13,7 @@ from ..control.grammar import LawLike, as_law
 from ..machine.arguments import having, one_of, real_array, switch, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.trajectory import Trajectory
-from .chunks import NOT_RUN, Columns, run_chunk
+from .chunks import NOT_RUN, Columns, blunder, run_chunk
 from .compiled import DONE, compiled, encode
 from .explain import REASONS
 from .faults import FaultsLike
@@ -50,9 +50,10 @@ def sweep(
         the result knows.
     progress : show a bar.
     The numbers do not depend on executor, chunk or the order of the rows, to the last bit.
-    Raises ValueError for bad arguments; SimulationError naming the run and the time, with the run up to there as
-    `partial` and all rows as `sweep`.  When the executor dies or you press Ctrl-C, what waits is cancelled, and the
-    exception carries what is finished: its `partial` is a `Sweep` in which the other rows are masked.
+    Raises ValueError for bad arguments and, in the end, for a first answer that is no array of torques;
+    SimulationError naming the run and the time, with the run up to there as `partial` and all rows as `sweep`.  When
+    the executor dies or you press Ctrl-C, what waits is cancelled, and the exception carries what is finished: its
+    `partial` is a `Sweep` in which the other rows are masked.
 
     >>> import rapkm_lite as rk
     >>> path = rk.hold(rk.load(), [0.0, 0.0])
@@ -77,12 +78,12 @@ def sweep(
         except BaseException as error:
             _hand_over_rows(error, table, setup, given, offsets)
             raise
-    broken = bool(table.failed.any())
+    broken, wrong = bool(table.failed.any()), [i for i, stop in errors.items() if blunder(stop.error)]
     result = _result(table, setup, given, offsets, mask=failed == "mask" or broken)
-    if failed == "raise" and broken:
-        i = int(np.argmax(result.failed))
+    if broken and (wrong or failed == "raise"):
+        i = wrong[0] if wrong else int(np.argmax(result.failed))
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
-        _raise(i, errors.get(i), own, laws[i], result)
+        _raise(i, errors[i].error if i in errors else None, own, laws[i], result)
     return result
 
 
