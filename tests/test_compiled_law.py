@@ -117,7 +117,7 @@ def test_every_matrix_of_at(name):
                 for j in range(M.shape[1]):
                     k += 1
                     total += M[i, j] * np.cos(0.37 * k)
-        poses = (at.x, at.xd, at.Q, at.minimal[2], at.redundant[2])
+        poses = (at.x, at.xd, at.q, at.qd, at.Q, at.minimal[2], at.redundant[2])
         for v in (*poses, d.x, d.xd, d.xdd, d.q, d.qd, d.qdd, d.q_a, d.qd_a, d.qdd_a):
             for i in range(v.shape[0]):
                 k += 1
@@ -127,6 +127,21 @@ def test_every_matrix_of_at(name):
     fast, slow = (rk.simulate(robot, law, path, model=model) for law in (weigh, InPython(weigh)))
     assert np.abs(fast.c).max() > 1e-4
     assert_allclose(fast.c, slow.c, rtol=0, atol=1e-13)
+
+
+@rk.compiled(at="measured")
+def redundant(t, q_a, qd_a, d, at):
+    """(32), as it is printed."""
+    G, C, Q = at.redundant
+    return at.A_tilde_T_pinv @ (G @ (d.qdd - 400.0 * (at.q - d.q) - 40.0 * (at.qd - d.qd)) + C @ at.qd + Q)
+
+
+@pytest.mark.parametrize("name", ["testbed", "asymmetric", "four_arms"])
+def test_a_compiled_law_in_redundant_coordinates_is_that_of_the_package(name):
+    robot = rk.load(name)
+    path, offset = rk.circle(robot, 0.06, 0.5), np.linspace(2e-3, -3e-3, robot.n_arms)
+    own, ours = (rk.simulate(robot, law, path, offset) for law in (redundant, rk.RedundantCTC(400.0, 40.0)))
+    assert_allclose(own.c, ours.c, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["five_bar", "asymmetric", "four_arms"])
@@ -163,7 +178,7 @@ def test_what_a_compiled_pose_has_not_is_told_with_what_it_has():
     law = rk.compiled(lambda t, q_a, qd_a, d, at: at.tip_columns[0], at="desired")
     if COMPILED:
         with pytest.raises(
-            ValueError, match=r"at has no tip_columns here, but x, xd, F, .*a rk\.Law whose step calls it, which"
+            ValueError, match=r"at has no tip_columns here, but x, xd, q, qd, F, .*a rk\.Law whose step calls it, which"
         ):
             rk.simulate(ROBOT, law, PATH)
 
@@ -393,8 +408,10 @@ def test_the_first_answer_is_checked_as_that_of_any_law(kind):
     for law in (function, rk.compiled(function), rk.AntagonismFilter(rk.compiled(function))):
         with pytest.raises(ValueError, match=message):
             rk.simulate(ROBOT, law, PATH)
-        with pytest.raises(ValueError, match=message):
-            rk.sweep(ROBOT, [rk.PD(7.05, 0.225), law], PATH, OFFSET, failed="mask")
+        laws = [rk.PD(7.05, 0.225), law]
+        with pytest.raises(ValueError, match=message) as caught:
+            rk.sweep(ROBOT, laws, PATH, OFFSET, failed="raise" if kind == "not finite" else "mask")
+        assert caught.value.partial.failed.tolist() == [False, True]
 
 
 def test_what_it_raises_at_the_first_sample_belongs_to_the_caller():

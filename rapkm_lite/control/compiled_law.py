@@ -120,7 +120,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     The function takes t in s, the measured base angles q_a and rates qd_a (N,), and d, the desired motion with
     x, xd, xdd (2,), q, qd, qdd (2N,) and q_a, qd_a, qdd_a (N,); it returns the torques c (N,) in N m.
 
-    at : "desired", "measured" or "true" adds an argument: the matrices of `rapkm_lite.at` at that pose of the model.
+    at : "desired", "measured" or "true" adds an argument: pose, rates and matrices of `rapkm_lite.at` at that pose of
+        the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
     q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
     read only: Python refuses writes into them, compiled code lets them through, for that sample.

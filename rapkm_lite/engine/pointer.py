@@ -18,7 +18,7 @@ Matrices = namedtuple("Matrices", MATRICES)
 def matrix_room(N: int) -> int:
     """How many numbers the matrices of `engine.user` take, and the intermediate ones after them."""
     n, r = 2 * N, 2 * N - 2
-    return 4 + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 10 * n
+    return 4 + 2 * n + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 10 * n
 
 
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
@@ -66,7 +66,9 @@ def pointer(function, N: int, matrices: bool, memory: int):
     def matrices_of(buffer):
         o = 7 + 2 * N + 3 * n
         x, xd = buffer[o : o + 2], buffer[o + 2 : o + 4]
-        F, o = take(buffer, o + 4, n, 2)
+        o += 4
+        q, qd = buffer[o : o + n], buffer[o + n : o + 2 * n]
+        F, o = take(buffer, o + 2 * n, n, 2)
         F_dot, o = take(buffer, o, n, 2)
         A, o = take(buffer, o, N, 2)
         A_T_pinv, o = take(buffer, o, N, 2)
@@ -86,7 +88,7 @@ def pointer(function, N: int, matrices: bool, memory: int):
         A_tilde, o = take(buffer, o + n, N, n)
         pinv, o = take(buffer, o, N, n)
         return Matrices(
-            x, xd, F, F_dot, A, A_T_pinv, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv
+            x, xd, q, qd, F, F_dot, A, A_T_pinv, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv
         )
 
     @inner

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 # What a compiled law finds in `at`.
-MATRICES = "x xd F F_dot A A_T_pinv J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv".split()
+MATRICES = "x xd q qd F F_dot A A_T_pinv J J_dot N N_dot G C Q minimal redundant A_tilde A_tilde_T_pinv".split()
 
 # What Numba says, what is said instead; the first that fits.
 _WORDS = (

@@ -84,6 +84,17 @@ def links(law, table, o, w, W, i):
 
 
 @leaf
+def angles(law, table, o, w, W, i, ax, ay, cross, dot):
+    """Base and elbow angle of arm i at the pose that the law asks for, on the turn of the measured or desired ones."""
+    near = want(table, o, ANGLE, i, W)
+    if law.asks == DESIRED:
+        return near, want(table, o, ELBOW, i, W)
+    near += 0.0 if law.pose == TRUE else w[E * W + i]
+    angle = math.atan2(ay, ax)
+    return angle + 2.0 * math.pi * math.floor((near - angle) / (2.0 * math.pi) + 0.5), math.atan2(cross, dot)
+
+
+@leaf
 def fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link):
     """What arm i adds to the loop constraints: every arm is cut from the second one."""
     for row in range(N - 1):
@@ -99,10 +110,11 @@ def fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link):
 
 @view
 def fill_matrices(drives, arms, law, table, o, w, room):
-    """All matrices of `rapkm_lite.at` at the desired, measured or true pose."""
+    """Pose, rates and all matrices of `rapkm_lite.at` at the desired, measured or true pose."""
     N, W = len(drives), len(arms)
     n, r = 2 * N, 2 * N - 2
     x, p = matrix(room, 0, 2, 2)
+    q, p = matrix(room, p, 2, n)
     F, p = matrix(room, p, n, 2)
     F_dot, p = matrix(room, p, n, 2)
     A, p = matrix(room, p, N, 2)
@@ -135,6 +147,8 @@ def fill_matrices(drives, arms, law, table, o, w, room):
             x[0, 0], x[0, 1] = w[m + BX * W] + ax + dx, w[m + BY * W] + ay + dy
             x[1, 0], x[1, 1] = -(base * ay + link * dy), base * ax + link * dx
         ad, tip = ax * dx + ay * dy, w[m + TIP * W]
+        q[0, i], q[0, N + i] = angles(law, table, o, w, W, i, ax, ay, den, ad)
+        q[1, i], q[1, N + i] = base, link - base
         den_dot = (link - base) * ad
         F[i, 0], F[i, 1], F[N + i, 0], F[N + i, 1] = dx / den, dy / den, -(ax + dx) / den, -(ay + dy) / den
         bx, by = (-link * dy - dx * den_dot / den) / den, (link * dx - dy * den_dot / den) / den
