@@ -267,7 +267,7 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
 
 def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so instead of one that did."""
-    if hasattr(error, "partial"):
+    if isinstance(getattr(error, "partial", None), Run):
         error.__notes__ = [text for text in error.__notes__ if "`partial`" not in text]
     error.partial = partial
     error.add_note(note)

@@ -30,7 +30,8 @@ def workspace_outline(robot) -> np.ndarray:
 def middle(robot: Manipulator) -> np.ndarray:
     """The place (2,) in m about which pictures are made: the middle of the drives.
 
-    Two drives are singular between them; their place is where that of the testbed is, a third drive at its side.
+    Just between two drives a machine of two arms is singular: for it, the middle that a third drive would make at the
+    same distances.
     """
     centre = robot.base.mean(axis=0)
     if robot.n_arms > 2:
