@@ -10,7 +10,7 @@ from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.laws import PD, AntagonismFilter
 from ..figures import marks
 from ..figures.maps import mode_name
-from ..figures.style import NEUTRAL
+from ..figures.style import ALARM, NEUTRAL
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
@@ -54,6 +54,8 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
                 raise
             run, lost = error.partial, f", lost at {error.time:.2f} s"
         off, torque = draw_distance(picture, run, (1.0, 20.0))
+        if lost:
+            picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
             "farthest from the path": f"{off.max():.2f} mm{lost}",
             "largest torque": f"{np.abs(torque).max():.0f} of {limit:.0f} mN m",
