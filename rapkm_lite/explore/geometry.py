@@ -229,7 +229,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
     panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
-        "side": length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240),
+        "side": length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
     }
     return explorer(draw, controls, panels, live=True)
 

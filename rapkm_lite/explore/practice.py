@@ -128,26 +128,29 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     along = robot.base - centre
     out = along / np.linalg.norm(along, axis=1, keepdims=True)
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
-    offset, way = np.resize(OFFSET, N), centre + triangle(load(), dt=0.02).x
+    offset, side = np.resize(OFFSET, N), 0.24 if N > 2 else 0.16
+    way = triangle(load(), side, dt=0.02).x
 
     def draw(picture, radius, proximal, distal, load, mode):
         lengths = 1e-3 * np.array([proximal, distal])
         base = centre + 1e-3 * radius * out
         own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
-        picture.line("machine", *way.T, color=NEUTRAL, linewidth=1.2, zorder=1)
-        if reachable(own, centre):
-            marks.draw_machine(picture, "machine", own, inverse_kinematics(own, centre))
+        middle = marks.middle(own)
+        picture.line("machine", *(middle + way).T, color=NEUTRAL, linewidth=1.2, zorder=1)
+        if reachable(own, middle):
+            marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
         try:
-            path = triangle(own, dt=0.02, centre=centre)  # a sample for each pixel or two
+            path = triangle(own, side, dt=0.02, centre=middle)  # a sample for each pixel or two
         except ValueError:
             marks.draw_workspace(picture, "machine", own)
             raise
         A = act.control_matrix(own, path.q)
         moving = act.inverse_dynamics(own, path.q, path.qd, path.qdd)
         pressing = -GAIN * matvec(act.prestress_projector(A), offset)
+        most = max(400.0, 3e3 * float(np.median(np.abs(moving).max(axis=1))))
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
-            picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=400.0)
+            picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=most)
             beyond(picture, panel, 1e3 * torque)
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {

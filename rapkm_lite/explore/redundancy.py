@@ -42,7 +42,8 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     def draw(picture, x, y, f_x, f_y, limit, rule):
         _, q, stop = held_machine(picture, "machine", robot, x, y)
         A, f = control_matrix(robot, q), np.array([f_x, f_y])
-        draw_forces(picture, A, limit)
+        picture.fit("force", draw_forces(picture, A, limit), f, least=1.7 / times)
+        picture.limits("force", x=picture.ylim("force"))
         inner = shortest_reach(A, 1e-3 * limit, 181)
         picture.line("force", *np.vstack([inner, inner[:1]]).T, color=AFTER, linewidth=1.2, linestyle="--")
         picture.line("force", f_x, f_y, marker="o", markersize=7, color=ALARM, zorder=4)
@@ -121,6 +122,8 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         for i in range(N):
             picture.line("seen", seen, share[seen, i], color=arm_colour(i), **dots)
         if isinstance(result, CalibrationError):
+            words = f"refused: {result.rank} of {N} known"
+            picture.text("error", 0.5, 0.5, words, inside=True, ha="center", va="center", fontsize=9, color=ALARM)
             return {"combinations that are known": f"{result.rank} of {N}", "calibration": "refused"}
         error, spread = 1e3 * np.array([result.offset - offset, np.sqrt(np.diagonal(result.covariance))])
         marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=".3f" if N < 4 else ".2f")

@@ -45,6 +45,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error, held = 1e3 * run.error, 1e3 * run.c[-1]
+        moves = bool(np.abs(error[-1] - error[-100]).max() > 0.02 * np.abs(error).max())
         curves(picture, "error", run.t, error, 1.0)
         for i in range(N):
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
@@ -55,7 +56,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         picture.fit("torque", 1.25 * torque, 1.25 * held, least=10.0)
         return {
             "error at rest, theory": marks.per_drive(theory, 2) + " mrad",
-            "simulated": marks.per_drive(error[-1], 2) + " mrad",
+            "simulated": marks.per_drive(error[-1], 2) + " mrad" + ", not at rest yet" * moves,
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
             "rest torque": marks.per_drive(held, 1) + " mN m",
             "heat at rest": f"{copper_loss(robot, 1e-3 * held[None], 1.0).sum():.3f} W",
@@ -122,6 +123,9 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         picture.line("opinions", 0, 0, color=NEUTRAL, marker="+", markersize=13, markeredgewidth=2, zorder=5)
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}
         picture.line("opinions", *rest, color=NEUTRAL, zorder=6, **tip)
+        if np.abs(rest).max() > half:
+            words = f"at rest outside, {np.hypot(*rest):.1f} mm away"
+            picture.text("opinions", 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
         marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
         picture.fit("torque", 1.25 * torque, least=10.0)
         return {
@@ -193,10 +197,11 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
             picture.text("shares", k + 1, share, f"{share:.2f}", ha="center", va="bottom", fontsize=9)
         picture.fit("shares", 1.2 * shares, symmetric=False, least=0.5)
+        step = min(0.22, 0.88 / robot.n_arms)
         directions *= np.where(directions.sum(axis=0) < 0, -1, 1)
         for (i, k), component in np.ndenumerate(directions):
-            at = k + 1 + 0.22 * (i - (robot.n_arms - 1) / 2)
-            picture.bar("directions", at, component, 0.2, facecolor=arm_colour(i))
+            at = k + 1 + step * (i - (robot.n_arms - 1) / 2)
+            picture.bar("directions", at, component, step / 1.1, facecolor=arm_colour(i))
             va = "bottom" if component >= 0 else "top"
             picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")

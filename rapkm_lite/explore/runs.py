@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..mechanics import actuation as act
 from ..mechanics.trajectory import polygon
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
-from ..simulation.runs import simulate
+from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
 from .shared import central_triangle, curves, frictionless, over_time, ready_made, size
@@ -36,7 +37,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     friction = robot.friction if np.any(robot.friction) else load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
     paths, table = {"centred triangle": central_triangle(robot)}, None
-    if robot.same_kinematics(load()):
+    if robot.replace(friction=0.0) == load().replace(friction=0.0):
         paths["reading of Table 1"], table = experiment("table1_reading").trajectory, measured_energies()
 
     def draw(picture, K_P, K_D, filter, friction, encoder, path, **offsets):
@@ -91,6 +92,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     N = robot.n_arms
     path, times = central_triangle(robot), size(robot)
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
+    said = ", ".join(f"{v:.0f}" for v in 1e3 * some).replace("-", "−")
 
     @lru_cache(maxsize=8)
     def recorded(filter: str, offsets: bool):
@@ -100,7 +102,9 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
     # Newtons of the arrow that shows the scale, metres of arrow for 1 N; forces of equal torques go with one over the
     # length, and weight may need more.
-    unit, largest = 0.25 / times, np.linalg.norm(recorded("off", True)[1], axis=-1).max()
+    unit, largest = 0.25 / times, 0.0
+    with suppress(SimulationError):
+        largest = np.linalg.norm(recorded("off", True)[1], axis=-1).max()
     while largest > 4 * unit:
         unit *= 2
     scale, wide = 0.1 * times / unit, 0.009 * times
@@ -146,7 +150,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
         "filter": choice("antagonism filter", LAWS.keys()),
-        "offsets": switch("calibration offsets 4, −2, 5 mrad", True),
+        "offsets": switch(f"calibration offsets {said} mrad", True),
     }
     layout = [["plane", "torque"], ["plane", "error"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 4.8), setup=setup, play="time")
@@ -160,7 +164,9 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     '0.0 mN m'
     """
     robot = frictionless(robot)
-    ends = marks.middle(robot) + np.array([[-0.12, -0.07], [0.12, -0.07]]) * np.ptp(robot.base[:, 0]) / 0.4
+    # The lower edge of the triangle of `central_triangle`.
+    wide = np.ptp(robot.base[:, 0]) / (0.4 if robot.n_arms > 2 else 0.6)
+    ends = marks.middle(robot) + np.array([[-0.12, -0.07], [0.12, -0.07]]) * wide
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)

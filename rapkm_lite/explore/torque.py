@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
 from ..figures.maps import curve_crossings, pair_line, pair_name
-from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves
+from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves, workspace_outline
 from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
@@ -63,6 +63,12 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
     norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side)))
 
+    @lru_cache(maxsize=64)
+    def needed(side: int) -> float:
+        """Largest torque in mN m that the path takes."""
+        t = coarse(side)
+        return 1e3 * float(np.abs(act.inverse_dynamics(robot, t.q, t.qd, t.qdd)).max())
+
     def draw(picture, law, side, rate, **offsets):
         t = coarse(side)
         picture.line("plane", *t.x.T, color=AFTER, linewidth=2, zorder=3)
@@ -80,7 +86,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         # What a failing law does leaves the picture, so that what a working one does stays seen.
-        curves(picture, "torque", run.t, torque, 50.0, most=1000.0)
+        curves(picture, "torque", run.t, torque, 50.0, most=max(1000.0, 1.5 * needed(side)))
         curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
@@ -97,6 +103,8 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
                 picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
 
     low, high = robot.base.min(axis=0) - [0, 0.06 * size(robot)], robot.base.max(axis=0) + [0, 0.02 * size(robot)]
+    reach = workspace_outline(robot)
+    low, high = (f(np.vstack([end, reach]), axis=0) for f, end in ((np.nanmin, low), (np.nanmax, high)))
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
     both = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
     feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": both}

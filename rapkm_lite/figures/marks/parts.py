@@ -98,12 +98,13 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
     """
     width = positive_number("width", width)
     zero_line(picture, panel)
+    size = 9 if sum(len(values) for values, _ in groups) < 8 else 7
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
             at = i + 1 + (k - (len(groups) - 1) / 2) * width
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
             words = re.sub("^−(?=[0.]+$)", "", format(value, form).replace("-", "−"))
-            picture.text(panel, at, value, words, ha="center", fontsize=9, va="top" if words[0] == "−" else "bottom")
+            picture.text(panel, at, value, words, ha="center", fontsize=size, va="top" if words[0] == "−" else "bottom")
 
 
 def per_drive(values, digits: int) -> str:

@@ -112,8 +112,13 @@ def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
     # Rings close together at the rim, where the angles change like a square root; the last one stays just inside.
     ring = np.sin(np.linspace(0, np.pi / 2, n)) * (1 - 1e-10)
     q = inverse_kinematics(robot, centre + ring[:, None, None] * low[:, None] * way, mode)
-    start = np.arctan2(*(centre - robot.base).T[::-1])
-    return start + wrap(q[..., : robot.n_arms] - start)
+    return on_sheet(robot, q[..., : robot.n_arms])
+
+
+def on_sheet(robot, q_a) -> np.ndarray:
+    """Base angles (..., N) in rad on the turn that `configuration_sheet` shows."""
+    start = np.arctan2(*(robot.base.mean(axis=0) - robot.base).T[::-1])
+    return start + wrap(q_a - start)
 
 
 def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=None):
@@ -139,9 +144,9 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
         seam = np.where((np.abs(rims[0] - rims[1]) < 0.1).all(axis=-1, keepdims=True), rims[0], np.nan)
         ax.plot(*seam[:, :3].T, color=ALARM, lw=2.5, label="common rim", zorder=8)
     if trajectory is not None:
-        ax.plot(*np.rad2deg(trajectory.q[:, :3]).T, color="black", lw=1.6, label="path", zorder=8)
+        ax.plot(*np.rad2deg(on_sheet(robot, trajectory.q_a)[:, :3]).T, color="black", lw=1.6, label="path", zorder=8)
     if q is not None:
-        point = np.rad2deg(q[:3])
+        point = np.rad2deg(on_sheet(robot, np.asarray(q)[: robot.n_arms])[:3])
         ax.plot(*point[:, None], "o", color=ALARM, ms=6, zorder=9)
         if F is not None:
             # An orthonormal basis of the plane keeps the patch a square, whatever the independent coordinates.

@@ -75,7 +75,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
         axes[1].plot(*trajectory.x[at].T, "o", **look)
     axes[0].set(**scaled_frame(robot, -0.32, 0.32, -0.25, 0.36))
     axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
-    axes[1].set_title("all three pairs and the path")
+    axes[1].set_title("all pairs and the path")
     axes[1].set(**scaled_frame(robot, -0.24, 0.24, -0.2, 0.26))
     axes[1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return axes
@@ -222,7 +222,7 @@ def plot_pair_measures(trajectory, ax=None):
     ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]))
     ax.set_ylim(2e-3 / robot.lengths.max(), 2.0 / robot.lengths.max())  # A goes with one over the lengths
     ax.set_ylabel(r"$\sigma_\mathrm{min}(A)$, $\sigma_\mathrm{min}(A_{jk})$ in rad/m")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(ax.lines))
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(len(ax.lines), 5))
     return ax
 
 

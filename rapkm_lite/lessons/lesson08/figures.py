@@ -122,7 +122,8 @@ def plot_bias(residual, bias, names, ax=None):
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.6))
     residual, bias = np.asarray(residual), np.asarray(bias)
-    for left, off, name, look in zip(residual, bias, names, _LOOKS, strict=False):
+    groups = dict(zip(names, zip(residual, bias, strict=True), strict=True))
+    for (name, (left, off)), look in with_looks("names", groups, _LOOKS):
         ax.loglog(1e3 * left, 1e3 * off, linestyle="none", ms=5, mfc="none", label=name, **look)
     low, high = 1e3 * np.min(residual) / 2, 1e3 * np.max(bias) * 2
     ax.plot([low, high], [low, high], ":", color=NEUTRAL, label="as large as the residual")
