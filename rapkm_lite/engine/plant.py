@@ -78,8 +78,8 @@ def mend(lanes, arms, table, o, w):
 
 
 @outlined
-def pull(lanes, arms, extra, w):
-    """Shares of all arms at the state of a stage, under the torques C."""
+def pull(lanes, arms, extra, row, w):
+    """Shares of all arms at the state of a stage, under the torques in a row."""
     L, W = len(lanes), len(arms)
     for i in range(W):
         for j in range(L):
@@ -87,10 +87,14 @@ def pull(lanes, arms, extra, w):
             m11, m12, m22, fx, fy, bx, by, rate, _, _ = moving(
                 extra, w, i, j, W, L, links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
             )
-            c = acting(extra, w, i * L + j, W * L, C, rate, w[of(SHARPNESS, j, W, L)])
+            c = acting(extra, w, i * L + j, W * L, row, rate, w[of(BEND, j, W, L)])
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx + bx * c, fy + by * c
-            w[at(LOW, i, j, W, L)] = min(w[at(LOW, i, j, W, L)], area2)
+            low = min(w[at(LOW, i, j, W, L)], area2)
+            if extra is not None:
+                # A run that waits for others has ended its hold, and is not looked at there before its next sample.
+                low = low if w[of(STEP, j, W, L)] > 0.0 else w[at(LOW, i, j, W, L)]
+            w[at(LOW, i, j, W, L)] = low
 
 
 @leaf
@@ -104,9 +108,9 @@ def joined(arms, w, j, W, L):
 
 
 @outlined
-def count_steps(lanes, arms, w, dt):
-    """Steps of equal length that each run needs in a hold because of friction; returns the largest number, or 0.0 where
-    all drives of all runs move so fast that friction is constant in it."""
+def count_steps(lanes, arms, extra, w, dt):
+    """Steps of equal length that each run needs in a hold because of friction, and BEND, 0.0 where all its drives move
+    so fast that friction is constant in it; returns the largest number, or 0.0 where that is so in all runs."""
     L, W = len(lanes), len(arms)
     most = 0.0
     for j in range(L):
@@ -121,6 +125,7 @@ def count_steps(lanes, arms, w, dt):
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
         n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = max(1.0, n)
+        w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else sharpness
         w[of(STEP, j, W, L)] = dt / max(1.0, n) if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.
         most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else min(n, 1.0))
@@ -156,30 +161,35 @@ def stage(lanes, arms, w, part):
 
 
 @outlined
-def last_stage(lanes, arms, w):
-    """The state at the end of the step."""
+def last_stage(lanes, arms, extra, w):
+    """The state at the end of the step; no step leads nowhere, also where accelerations are endless."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         h = w[of(STEP, j, W, L)] / 6.0
         kx, ky = joined(arms, w, j, W, L)
-        w[of(X, j, W, L)] += h * (w[of(TX, j, W, L)] + w[of(SVX, j, W, L)])
-        w[of(Y, j, W, L)] += h * (w[of(TY, j, W, L)] + w[of(SVY, j, W, L)])
-        w[of(VX, j, W, L)] += h * (w[of(TVX, j, W, L)] + kx)
-        w[of(VY, j, W, L)] += h * (w[of(TVY, j, W, L)] + ky)
+        x = w[of(X, j, W, L)] + h * (w[of(TX, j, W, L)] + w[of(SVX, j, W, L)])
+        y = w[of(Y, j, W, L)] + h * (w[of(TY, j, W, L)] + w[of(SVY, j, W, L)])
+        vx = w[of(VX, j, W, L)] + h * (w[of(TVX, j, W, L)] + kx)
+        vy = w[of(VY, j, W, L)] + h * (w[of(TVY, j, W, L)] + ky)
+        if extra is not None:
+            x, y = x if h > 0.0 else w[of(X, j, W, L)], y if h > 0.0 else w[of(Y, j, W, L)]
+            vx, vy = vx if h > 0.0 else w[of(VX, j, W, L)], vy if h > 0.0 else w[of(VY, j, W, L)]
+        w[of(X, j, W, L)], w[of(Y, j, W, L)], w[of(VX, j, W, L)], w[of(VY, j, W, L)] = x, y, vx, vy
 
 
 @leaf
-def step(lanes, arms, extra, w):
-    """A Runge-Kutta step (order 4) of length STEP after the accelerations KX, KY of its first stage.
+def step(lanes, arms, extra, row, w):
+    """A Runge-Kutta step (order 4) of length STEP after the accelerations KX, KY of its first stage, under the torques
+    in a row.
 
     Few and long loops over the runs: short ones would be unrolled before they could become vector instructions.
     """
     first_stage(lanes, arms, w)
     for part in (0.5, 1.0):
-        pull(lanes, arms, extra, w)
+        pull(lanes, arms, extra, row, w)
         stage(lanes, arms, w, part)
-    pull(lanes, arms, extra, w)
-    last_stage(lanes, arms, w)
+    pull(lanes, arms, extra, row, w)
+    last_stage(lanes, arms, extra, w)
 
 
 @outlined
@@ -197,32 +207,34 @@ def begin_hold(lanes, arms, extra, w, dt):
         w[of(STEP, j, W, L)], w[of(STEPS, j, W, L)] = dt, 1.0
 
 
-@leaf
+@outlined
 def constant_friction(lanes, arms, w):
-    """A hold in which all drives move so fast that friction is one more torque; meanwhile PUSH keeps C."""
-    P = len(arms) * len(lanes)
-    for p in range(P):
-        c = w[C * P + p]
-        w[PUSH * P + p], w[C * P + p] = c, c - math.copysign(w[FRICTION * P + p], w[QD * P + p])
-    step(lanes, arms, None, w)
-    for p in range(P):
-        w[C * P + p] = w[PUSH * P + p]
+    """The torques PUSH: C, less friction in runs all of whose drives move so fast that it is constant in the hold.
+
+    Whether it is must not hang on the neighbours of a run: small steps round otherwise.
+    """
+    L, W = len(lanes), len(arms)
+    for i in range(W):
+        for j in range(L):
+            c, constant = w[at(C, i, j, W, L)], w[of(BEND, j, W, L)] == 0.0
+            f = math.copysign(w[at(FRICTION, i, j, W, L)], w[at(QD, i, j, W, L)])
+            w[at(PUSH, i, j, W, L)] = c - f if constant else c
 
 
 @leaf
 def small_steps(lanes, arms, extra, w, most):
     """A hold in as many steps as friction asks for; a run that needs fewer stands still while others go on."""
     L, W = len(lanes), len(arms)
-    step(lanes, arms, extra, w)
+    step(lanes, arms, extra, PUSH, w)
     for s in range(1, int(most)):
         for j in range(L):
             w[of(STEP, j, W, L)] = w[of(STEP, j, W, L)] if s < w[of(STEPS, j, W, L)] else 0.0
             w[of(SX, j, W, L)], w[of(SY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
             w[of(SVX, j, W, L)], w[of(SVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-        pull(lanes, arms, extra, w)
+        pull(lanes, arms, extra, PUSH, w)
         for j in range(L):
             w[of(KX, j, W, L)], w[of(KY, j, W, L)] = joined(arms, w, j, W, L)
-        step(lanes, arms, extra, w)
+        step(lanes, arms, extra, PUSH, w)
 
 
 @leaf
@@ -230,11 +242,12 @@ def hold(lanes, arms, extra, w, dt):
     """Hold the torques C for dt."""
     begin_hold(lanes, arms, extra, w, dt)
     if extra is None:
-        step(lanes, arms, extra, w)
+        step(lanes, arms, extra, C, w)
     if extra is not None:
-        most = count_steps(lanes, arms, w, dt)
+        most = count_steps(lanes, arms, extra, w, dt)
+        constant_friction(lanes, arms, w)
         if most == 0.0 and len(extra) == 0:
-            constant_friction(lanes, arms, w)
+            step(lanes, arms, None, PUSH, w)
         else:
             small_steps(lanes, arms, extra, w, most)
 

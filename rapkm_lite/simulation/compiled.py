@@ -98,10 +98,10 @@ def _sums(setup: Setup, w) -> tuple:
     robot, t = setup.robot, setup.trajectory.t
     status, sample = w("STATUS").astype(int), w("SAMPLE").astype(int)
     done, dt, holds = status == DONE, setup.trajectory.dt, len(t) - 1
-    energies = w("COPPER").T * (robot.resistance / robot.torque_constant**2) * dt + w("WORK").T
+    copper, work = (np.where(done[:, None], w(name).T, 0.0) for name in ("COPPER", "WORK"))
     final = np.stack([w("X"), w("Y")], axis=-1)
     return (
-        np.where(done[:, None], energies, 0.0),
+        copper * (robot.resistance / robot.torque_constant**2) * dt + work,
         np.sqrt(np.where(done, w("TORQUE2"), 0.0) / holds),
         np.where(done, w("ANTAGONISM") * dt, 0.0),
         np.where(done[:, None], final, 0.0),
