@@ -28,6 +28,29 @@ MODEL = MACHINE.replace(
 COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_path_error", "largest_path_error")
 
 
+def neighbours():
+    """Calm and wild gains on a path with friction, with what makes runs fly apart."""
+    gains = [rk.PD(a, b) for a in (7.0, 40.0, 300.0) for b in (0.05, 0.27, 2.0)]
+    dropout = {"encoder": 2000, "faults": [rk.EncoderDropout(0, 0.5, 1.0)]}
+    return [(gains, options) for options in ({}, {"encoder": 2000}, dropout)]
+
+
+@pytest.mark.parametrize(("gains", "options"), neighbours(), ids=["ideal", "counts", "dropout"])
+@pytest.mark.parametrize("gravity", [(0.0, 0.0), (0.0, -2.0)], ids=["flat", "hanging"])
+def test_a_run_with_friction_does_not_feel_its_neighbours(gains, options, gravity):
+    """A neighbour that needs small steps changes neither rounding nor the sample at which a run is lost."""
+    robot = rk.load().replace(gravity=gravity)
+    path = rk.triangle(robot, duration=2.0, dt=2e-3)
+    beside, alone = (
+        rk.sweep(robot, gains, path, OFFSET[:3], failed="mask", chunk=chunk, **options) for chunk in (64, 1)
+    )
+    assert beside.failed.any()
+    assert_array_equal(beside.failed, alone.failed)
+    assert_array_equal(beside.failure_time.filled(-1.0), alone.failure_time.filled(-1.0))
+    for name in COLUMNS:
+        assert_array_equal(getattr(beside, name).filled(0.0), getattr(alone, name).filled(0.0))
+
+
 class Textbook(rk.Law):
     """A law of the package that the engine does not know: it runs through the formulas of `control`."""
 

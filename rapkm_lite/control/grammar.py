@@ -46,7 +46,8 @@ class Law:
     """Base of all laws, also of those that users write.
 
     pose : from where `step` takes the configuration: "measured", the least-squares pose of the measured base angles
-        (`estimate_pose`); "true", the true one, for study; None for a law that needs no pose.
+        (`estimate_pose`); "true", the true one, for study; None for a law that needs no pose.  The laws of this package
+        compare driven joints as they are measured, whatever the pose, and elbows and end-effector of the pose.
 
     A law of your own gives `torque`, or `start` and `step` when it remembers something:
 

@@ -144,7 +144,7 @@ class Run(Value):
 
     @property
     def path_error(self) -> np.ndarray:
-        """Distance (k,) of the end-effector from the path at each sample, m."""
+        """Distance (k,) in m of the end-effector from its desired place at each sample, along the path, too."""
         return np.linalg.norm(self.x - self.trajectory.x[: len(self)], axis=-1)
 
     @property

@@ -175,7 +175,7 @@ def plot_complement_size(trajectory, pairs, ax=None):
     ax = axes_or_new(ax)
     for pair in pairs:
         size = np.linalg.norm(orthogonal_complement(trajectory.robot, trajectory.q, pair), ord=2, axis=(-2, -1))
-        (out, *_) = [i for i in range(trajectory.robot.n_arms) if i not in pair]
+        out = next((i for i in range(trajectory.robot.n_arms) if i not in pair), pair[0])
         names = f"$q^{{{pair[0] + 1}}}$, $q^{{{pair[1] + 1}}}$ independent"
         ax.semilogy(trajectory.t, size, label=names, **arm_line(out))
     ax.axhline(1.0, color=NEUTRAL, lw=1.0, label="$N_J$: size 1 everywhere")

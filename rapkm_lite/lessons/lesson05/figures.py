@@ -43,7 +43,10 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     >>> ax = plot_singular_poses(rk.triangle(rk.load()))
     """
     robot = trajectory.robot
-    poses = [(pair, k) for pair in pairs for k in curve_crossings(trajectory)[drive_pairs(robot).index(pair)]]
+    crossings = dict(zip(drive_pairs(robot), curve_crossings(trajectory), strict=True))
+    poses = [(pair, k) for pair in pairs if pair in crossings for k in crossings[pair]]
+    if not poses:
+        raise ValueError(f"pairs = {pairs}: the path crosses no curve of theirs; allowed: a path that does")
     axes = plt.subplots(1, len(poses), figsize=(2.75 * len(poses), 3.3), sharey=True)[1] if axes is None else axes
     for ax, (pair, k) in zip(np.ravel(axes), poses, strict=True):
         q, x = trajectory.q[k], trajectory.x[k]
