@@ -30,7 +30,9 @@ COLUMNS = ("energies", "torque_norm", "antagonistic_energy", "x_final", "rms_pat
 
 def neighbours():
     """Calm and wild gains on a path with friction, with what makes runs fly apart."""
-    gains = [rk.PD(a, b) for a in (7.0, 40.0, 300.0) for b in (0.05, 0.27, 2.0)]
+    grid = [rk.PD(a, b) for a in np.geomspace(0.5, 300.0, 25) for b in np.geomspace(0.02, 10.0, 20)]
+    # Runs that pass the bend of the friction law though no hold began near it, or fly apart.
+    gains = [grid[i] for i in (200, 274, 402, 446, 450, 463, 467, 471, 477, 482, 483, 486, 488, 490)]
     dropout = {"encoder": 2000, "faults": [rk.EncoderDropout(0, 0.5, 1.0)]}
     return [(gains, options) for options in ({}, {"encoder": 2000}, dropout)]
 
