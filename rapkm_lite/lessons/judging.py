@@ -55,13 +55,18 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
     try:
         all_of_them = _numbers(exercise, answer, cases)
     except Ended as end:
-        kinds = sorted({case.label for case in far})
-        said = {kind: _failure(exercise, answer, [case for case in far if case.label == kind]) for kind in kinds}
-        said = {kind: words for kind, words in said.items() if words} or dict.fromkeys(kinds, end.result.sentence)
+        said = _failures(exercise, answer, far, end.result.sentence)
         right = "it is right" if result.word == "ok" else "the method is right"
         short = f"{right}, but not for {', '.join(said)}, where {next(iter(said.values()))}"
         return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
     return all_of_them if result.word == "ok" else result
+
+
+def _failures(exercise: Exercise, answer: Any, cases: list[Case], sentence: str) -> dict[str, str]:
+    """What is wrong with the answer for each kind of cases that it fails; where none fails alone, for all of them."""
+    kinds = sorted({case.label for case in cases})
+    said = {kind: _failure(exercise, answer, [case for case in cases if case.label == kind]) for kind in kinds}
+    return {kind: words for kind, words in said.items() if words} or dict.fromkeys(kinds, sentence)
 
 
 def _failure(exercise: Exercise, answer: Any, cases: list[tuple]) -> str:

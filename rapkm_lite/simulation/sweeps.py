@@ -78,13 +78,20 @@ def sweep(
         except BaseException as error:
             _hand_over_rows(error, table, setup, given, offsets)
             raise
-    broken, wrong = bool(table.failed.any()), [i for i, stop in errors.items() if blunder(stop.error)]
-    result = _result(table, setup, given, offsets, mask=failed == "mask" or broken)
-    if broken and (wrong or failed == "raise"):
-        i = wrong[0] if wrong else int(np.argmax(result.failed))
+    result = _result(table, setup, given, offsets, mask=failed == "mask" or bool(table.failed.any()))
+    i = _blamed(errors, result.failed, failed == "mask")
+    if i is not None:
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
         _raise(i, errors[i].error if i in errors else None, own, laws[i], result)
     return result
+
+
+def _blamed(errors: dict, failed: np.ndarray, mask: bool) -> int | None:
+    """The run whose error is raised: the first that is a `blunder`, else the first of all, unless they are masked."""
+    wrong = [i for i, stop in errors.items() if blunder(stop.error)]
+    if wrong:
+        return wrong[0]
+    return None if mask or not failed.any() else int(np.argmax(failed))
 
 
 def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
