@@ -40,7 +40,7 @@ def first_order(robot, model, x, K_P, part=prestress_projector) -> np.ndarray:
 def wrong_models(rng) -> list[tuple]:
     cases = []
     for name, label in (("testbed", "the testbed"), ("asymmetric", "three different arms"), ("four_arms", "four arms")):
-        # In the plane of the machines gravity would hold torques of its own.
+        # A machine that hangs holds torques against its weight, too.
         robot = load(name).replace(gravity=(0.0, 0.0))
         stretched = robot.replace(lengths=robot.lengths * (1 + rng.normal(0, 3e-3, robot.lengths.shape)))
         shifted = robot.replace(base=robot.base + rng.normal(0, 5e-4, robot.base.shape))
