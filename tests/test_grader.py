@@ -11,7 +11,7 @@ import pytest
 from rapkm_lite.__main__ import main
 from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.grading.grader import Grade, grade
-from rapkm_lite.lessons.grading.submission import called, found, needed, statements
+from rapkm_lite.lessons.grading.submission import called, found, hides_check, needed, sources, statements
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
 
 SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
@@ -26,6 +26,7 @@ CHECKS = ['filtered_torques = check("04.filtered_torques", filtered_torques)']
 CHECKS += [f'{name} = check("04.{name}", {name})' for name in ("filtered_command", "saved_energy")]
 RIGHT = [TORQUES, HELPER + COMMAND, ENERGY]
 NAMES = ["04.filtered_torques", "04.filtered_command", "04.saved_energy"]
+LESSONS = sorted((Path(__file__).parents[1] / "notebooks").glob("[0-9]*.ipynb"))[1:]  # lesson 00 has no exercises
 ENDLESS = """def filtered_torques(A, c):
     while True:
         try:
@@ -83,8 +84,8 @@ def write(path, sources):
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("class")
-    for student, sources in SUBMISSIONS.items():
-        write(folder / student / "04_antagonism_filter_energy.ipynb", sources)
+    for student, cells in SUBMISSIONS.items():
+        write(folder / student / "04_antagonism_filter_energy.ipynb", cells)
     (folder / "leo").mkdir()
     (folder / "leo" / "04_antagonism_filter_energy.ipynb").write_text("no notebook")
     return grade(folder, seconds=15.0)
@@ -242,6 +243,34 @@ def test_all_that_an_answer_needs_is_run(tmp_path, before):
     body = TORQUES.replace("return A", "return one[0] * A")
     write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [SETUP, before, *checked([body, *RIGHT[1:]])[1:]])
     assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
+INDIRECT = [
+    "def test():\n    check(NAME, mine)\n\ntest()\n",
+    "def test(f):\n    return check(NAME, f)\n\nresult = test(mine)\n",
+    "class Exercise:\n    def run(self):\n        check(NAME, mine)\n\nExercise().run()\n",
+    "from functools import partial\ntry_it = partial(check, NAME)\ntry_it(mine)\n",
+    "def checked(f):\n    check(NAME, f)\n    return f\n\n@checked\ndef again(A, c):\n    return mine(A, c)\n",
+    "def main():\n    global filtered_torques\n    filtered_torques = mine\n    check(NAME, mine)\n\nmain()\n",
+    "from rapkm_lite.checks import check as judge\nask = lambda f: judge(NAME, f)\nask(mine)\n",
+    "exec('check(NAME, mine)')\n",
+]
+
+
+def test_a_check_counts_whatever_calls_it(tmp_path):
+    """An answer of another name, checked in a function, a class, a decorator: where nothing is found, all is run."""
+    mine = TORQUES.replace("filtered_torques", "mine") + f'NAME = "{NAMES[0]}"\n'
+    for number, words in enumerate(INDIRECT):
+        write(tmp_path / f"{number}" / "04_antagonism_filter_energy.ipynb", [SETUP, mine + words])
+    verdicts = {(one.student, one.exercise): one.verdict for one in grade(tmp_path)}
+    for number, words in enumerate(INDIRECT):
+        assert [verdicts[f"{number}", name] for name in NAMES] == ["ok", "todo", "todo"], words
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_no_lesson_hides_its_checks(path):
+    """So a lesson that is handed in as it was handed out is not run twice."""
+    assert not hides_check(statements(sources(path))[0])
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links and such names need another file system")

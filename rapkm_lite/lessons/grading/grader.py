@@ -77,10 +77,11 @@ def _age(path: Path) -> float:
 
 def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     """Grades of one notebook, for every exercise of its lesson."""
-    results = _results(submission, seconds, whole=False)
-    if any(word == "wrong" and mistake != "cannot be read" for word, _, mistake in results.values()):
-        # Something that an answer uses may not have been among the statements chosen for it.
-        for name, one in _results(submission, seconds, whole=True).items():
+    results, hidden = _results(submission, seconds, whole=False)
+    again = [word for word, _, mistake in results.values() if mistake != "cannot be read"]
+    if "wrong" in again or (hidden and "todo" in again):
+        # Something that an answer uses, or what checks it, may not have been among the statements chosen for it.
+        for name, one in _results(submission, seconds, whole=True)[0].items():
             results[name] = min(results.get(name, one), one, key=lambda result: _ORDER.index(result[0]))
     grades = []
     for name, exercise in exercises().items():
@@ -92,9 +93,10 @@ def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     return grades
 
 
-def _results(submission: Submission, seconds: float, whole: bool) -> dict[str, tuple[str, str, str]]:
-    """Verdict, sentence and mistake by exercise, from as many starts as it takes."""
+def _results(submission: Submission, seconds: float, whole: bool) -> tuple[dict[str, tuple[str, str, str]], bool]:
+    """Verdict, sentence and mistake by exercise, from as many starts as it takes; True where a check may be hidden."""
     skip: list[str] = []
+    hidden = False
     results: dict[str, tuple[str, str, str]] = {}
     ends = time.monotonic() + 10 * seconds
     for _ in range(_STARTS):
@@ -104,17 +106,15 @@ def _results(submission: Submission, seconds: float, whole: bool) -> dict[str, t
                 if "result" in event:
                     name, word, sentence, mistake = event["result"]
                     results[name] = word, sentence, mistake
+                hidden = event.get("hidden", hidden)
                 stopped = event.get("begin", "" if "done" in event else stopped)
                 if "trouble" in event:
-                    return results | {
-                        name: ("wrong", event["trouble"], "cannot be read")
-                        for name in exercises()
-                        if name.startswith(f"{submission.lesson}.") and name not in results
-                    }
+                    lost = [n for n in exercises() if n.startswith(f"{submission.lesson}.") and n not in results]
+                    return results | dict.fromkeys(lost, ("wrong", event["trouble"], "cannot be read")), hidden
         if not stopped or time.monotonic() > ends:
             break
         skip.append(stopped)
-    return results
+    return results, hidden
 
 
 def _events(

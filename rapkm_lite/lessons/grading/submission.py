@@ -203,6 +203,23 @@ def _asks(node: ast.stmt) -> bool:
     return not shown and any(_EXERCISE.fullmatch(text) for text in texts)
 
 
+def hides_check(all_of_them: list[Statement]) -> bool:
+    """True when `check` stands elsewhere than in a plain call: what calls it then, `needed` cannot tell."""
+    for statement in (s for s in all_of_them if not _plain_check(s.node)):
+        fields = (value for part in ast.walk(statement.node) for _, value in ast.iter_fields(part))
+        if any(isinstance(value, str) and re.search(r"\bcheck\b", value) for value in fields):
+            return True
+    return False
+
+
+def _plain_check(node: ast.stmt) -> bool:
+    """True for an import of `check` under its own name, and for check(...) with or without a name for what it gives."""
+    if isinstance(node, ast.ImportFrom):
+        return all(alias.name != "check" or alias.asname in (None, "check") for alias in node.names)
+    call = node.value if isinstance(node, ast.Expr | ast.Assign | ast.AnnAssign) else None
+    return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "check"
+
+
 def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
     """The statements on which the wanted names and all calls of `check` depend, in their order; imports always.
 

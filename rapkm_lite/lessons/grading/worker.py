@@ -2,9 +2,9 @@
 
     python -m rapkm_lite.lessons.grading.worker NOTEBOOK LESSON LOG [--whole] [--skip KEY ...]
 
-Written to LOG: {"begin": key} before a statement or a check, {"end": key} after a check, {"result": [name, word,
-sentence, mistake]}, and {"done": true}.  What hangs or dies is the last thing begun; the caller starts again and lets
-it be skipped.
+Written to LOG: {"hidden": whether `check` is called in ways that `needed` cannot follow}, {"begin": key} before a
+statement or a check, {"end": key} after a check, {"result": [name, word, sentence, mistake]}, and {"done": true}.
+What hangs or dies is the last thing begun; the caller starts again and lets it be skipped.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 
 from rapkm_lite.lessons import checker
 from rapkm_lite.lessons.answers import Answer, Ended, Result, guarded
-from rapkm_lite.lessons.grading.submission import Statement, called, needed, sources, statements
+from rapkm_lite.lessons.grading.submission import Statement, called, hides_check, needed, sources, statements
 
 
 class Bench:
@@ -147,6 +147,7 @@ def main(arguments: list[str]) -> None:
     # The door that the lessons import, rapkm_lite.checks, has not been opened yet: it will show this one.
     door: Any = checker
     door.check = bench.check
+    bench.tell(hidden=hides_check(read))
     bench.run(read if given.whole else needed(read, wanted), texts)
     bench.conclude(texts)
 
