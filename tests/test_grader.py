@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.grading.grader import Grade, grade
 from rapkm_lite.lessons.grading.submission import called, found, hides_check, needed, sources, statements
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
+from rapkm_lite.lessons.grading.worker import nowhere
 
 SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
 TORQUES = "def filtered_torques(A, c):\n    return A @ np.linalg.solve(A.T @ A, A.T @ c)\n"
@@ -265,6 +267,34 @@ def test_a_check_counts_whatever_calls_it(tmp_path):
     verdicts = {(one.student, one.exercise): one.verdict for one in grade(tmp_path)}
     for number, words in enumerate(INDIRECT):
         assert [verdicts[f"{number}", name] for name in NAMES] == ["ok", "todo", "todo"], words
+
+
+def test_what_a_student_prints_is_not_kept():
+    stream = nowhere()
+    tracemalloc.start()
+    for _ in range(1000):
+        print("x" * 10_000, file=stream)
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert kept < 1e6, "of 1e7 characters"
+
+
+def test_a_student_may_treat_the_output_as_a_stream(tmp_path):
+    """Written to in all ways, asked what it is, closed: the next statement finds a new one."""
+    before = """import sys
+factor = 0.0
+for stream in (sys.stdout, sys.stderr):
+    stream.writelines(["one\\n", "\\udcff"])
+    factor += stream.write("four") / 8
+    assert not stream.isatty() and stream.encoding.lower() == "utf-8"
+    stream.buffer.write(b"bytes")
+    print("now", file=stream, flush=True)
+closed = [sys.stdout.close(), 1.0][1]
+written = [print("here"), 1.0][1]
+"""
+    body = before + TORQUES.replace("return A", "return factor * closed * written * A")
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", checked([body, *RIGHT[1:]]))
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)

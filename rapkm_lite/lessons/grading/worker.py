@@ -123,10 +123,25 @@ class NoNotebook:
         return lambda *arguments, **named: None
 
 
+class Nowhere(io.RawIOBase):
+    """Takes bytes and keeps none."""
+
+    def writable(self):
+        return True
+
+    def write(self, given):
+        return memoryview(given).nbytes
+
+
+def nowhere() -> io.TextIOWrapper:
+    """A stream for text, with all that one has, that keeps nothing; any text can be written, as into a notebook."""
+    return io.TextIOWrapper(io.BufferedWriter(Nowhere()), encoding="utf-8", errors="backslashreplace")
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Nothing that the student's code prints is kept."""
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+    """Nothing that the student's code prints is kept; both streams are new each time, since code may close them."""
+    with redirect_stdout(nowhere()), redirect_stderr(nowhere()):
         yield
 
 
