@@ -17,11 +17,16 @@ from rapkm_lite.checks import exercises
 from .layout import NOTEBOOKS, SOLUTIONS
 from .storing import HIDDEN, unchecked
 
-# Comes back when nbgrader grades: a wrong answer raises, and the check is the package's own.
-_HIDDEN = """### BEGIN HIDDEN TESTS
-import os
-os.environ["RAPKM_LITE_STRICT"] = "1"
+# Come back when nbgrader grades: the check is the package's own, and a wrong answer raises, but only after the check
+# has bound what the lesson goes on with, for an exercise that builds on this one.
+_BEFORE = """### BEGIN HIDDEN TESTS
 from rapkm_lite.checks import check
+### END HIDDEN TESTS
+"""
+_BEHIND = """
+### BEGIN HIDDEN TESTS
+from rapkm_lite.lessons.checker import own_answer
+assert own_answer("{name}")[0] in ("ok", "close"), "{name} is not right yet; the line above says why"
 ### END HIDDEN TESTS
 """
 _REGION = re.compile(r"^### BEGIN SOLUTION *\n(.*?)^### END SOLUTION", re.M | re.S)
@@ -107,7 +112,8 @@ def assignment(lesson: nbformat.NotebookNode) -> nbformat.NotebookNode:
         if body:
             cells.append(marked(cell, f"{checks[0][0]}.answer" if checks else f"solution.{len(cells)}"))
         for name, text in checks:
-            cells.append(marked(nbformat.v4.new_code_cell(_HIDDEN + text), name, points[name]))
+            tested = _BEFORE + text.rstrip() + _BEHIND.format(name=name)
+            cells.append(marked(nbformat.v4.new_code_cell(tested), name, points[name]))
         if rest:
             cells.append(nbformat.v4.new_code_cell(rest))
     for number, cell in enumerate(cells):
