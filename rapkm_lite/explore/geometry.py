@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ..figures import marks
 from ..figures.machine import arm_points, plane_limits
-from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name
+from ..figures.maps import grid_points, mode_name, on_grid, pair_line, pair_measures, pair_name, touching_arcs
 from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator
@@ -76,7 +76,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     @lru_cache(maxsize=64)
     def curves(mode: str, pair: tuple) -> list[np.ndarray]:
         one, other = (matrices(mode)[:, i] for i in pair)
-        return marks.zero_lines(gx, gy, inside, cross(one, other))
+        return marks.zero_lines(gx, gy, inside, cross(one, other)) + touching_arcs(robot, pair, modes[mode])
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, palette, clip=outline)
@@ -92,13 +92,14 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             "σ_min of all drives": f"{act.singular_values(A)[1]:.2f} rad/m",
         }
         chains = arm_points(robot, q)
-        for pair, name, value in zip(pairs, "abc", pair_measures(robot, q), strict=False):
+        from_parallel = np.degrees(np.arcsin(np.minimum(np.abs(act.distal_cross_products(robot, q)), 1.0)))
+        for pair, name, value, angle in zip(pairs, "abc", pair_measures(robot, q), from_parallel, strict=False):
             weak = value < WEAK / times
             # The distal links that lie almost along each other are what makes a pair weak.
             for i in pair if weak else ():
                 picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
             marks.draw_machine(picture, name, robot, q, arms=pair, names=False)
-            words = f"{pair_name(pair)}: {value:.2f} rad/m" + ",\nparallel" * bool(weak)
+            words = f"{pair_name(pair)}: {value:.2f} rad/m" + f",\n{angle:.0f}° from parallel" * bool(weak)
             look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
             picture.title(name, words, fontsize=10, **look)
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"

@@ -42,6 +42,8 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     """
     robot = load() if robot is None else robot
     path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
+    needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
+    strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
@@ -66,7 +68,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
         "K_P": log_slider("K_P in N m/rad", 2.0, 50.0, 7.05),
-        "limit": slider("torque limit in mN m", 40, 400, 10, 150),
+        "limit": slider("torque limit in mN m", 40 * strong, 400 * strong, 10 * strong, 150 * strong),
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),
     }

@@ -161,7 +161,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=marks.middle(robot) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    levels = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # J
+    cost = 7.05**2 * np.trace(form(120 * size(robot), 40 * size(robot)))  # J/mrad^2, where the controls start
+    levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
@@ -188,7 +189,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 if away[k] > 0:
                     taken.append(ring[:, k])
                     look = {"color": min(shade, "0.45"), "ha": "center", "va": "center"}
-                    picture.text("map", *ring[:, k], f"{level:g}", fontsize=9, **look)
+                    picture.text("map", *ring[:, k], f"{level:.2g}", fontsize=9, **look)
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)

@@ -10,7 +10,7 @@ from matplotlib import patheffects
 from ..machine.arguments import short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
-from ..mechanics.kinematics import inverse_kinematics
+from ..mechanics.kinematics import inverse_kinematics, reachable
 from ..mechanics.maps import workspace_grid
 from .style import arm_line, axes_or_new
 
@@ -118,11 +118,36 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
         look: dict[str, Any] = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
         style = {"colors": [look["color"]], "linestyles": [look["linestyle"]], "linewidths": look.get("linewidth", 1.6)}
         drawn = ax.contour(x, y, cross[..., k], levels=[0.0], zorder=3, **style)
+        arcs = [ax.plot(*arc.T, zorder=3, **{"linewidth": 1.6} | look)[0] for arc in touching_arcs(robot, pair, mode)]
         if on_map:
-            drawn.set_path_effects(_OUTLINED)
+            for curve in (drawn, *arcs):
+                curve.set_path_effects(_OUTLINED)
         else:
             ax.plot([], [], **look, label=f"links {pair[0] + 1} and {pair[1] + 1} parallel")
     return ax
+
+
+def touching_arcs(robot, pair, mode=None) -> list[np.ndarray]:
+    """The part of a pair's curve that no change of sign gives away: arcs, each (k, 2) in m.
+
+    Where the proximal links of two arms with equal distal links just reach each other, both elbows can stand in one
+    point.  About it the end-effector runs on a circle on which the distal links are parallel, and the cross product of
+    `distal_cross_products` keeps its sign on both sides.
+
+    >>> import rapkm_lite as rk
+    >>> [len(arc) for arc in touching_arcs(rk.load(), (1, 2), (1, 1, -1))]
+    [179]
+    """
+    base, (l1, l2) = robot.base[list(pair)], robot.lengths[list(pair)].T
+    between = base[1] - base[0]
+    if not np.isclose(np.linalg.norm(between), l1.sum(), rtol=1e-9) or not np.isclose(*l2, rtol=1e-9):
+        return []
+    turn = np.linspace(0, 2 * np.pi, 361)
+    circle = base[0] + l1[0] / l1.sum() * between + l2[0] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    on = reachable(robot, circle)
+    crossed = distal_cross_products(robot, inverse_kinematics(robot, circle[on], mode))
+    on[on] = np.abs(crossed[:, drive_pairs(robot).index(tuple(pair))]) < 1e-6
+    return [circle[part] for part in np.ma.clump_unmasked(np.ma.array(turn, mask=~on)) if part.stop - part.start > 1]
 
 
 def curve_crossings(trajectory) -> list[np.ndarray]:

@@ -9,7 +9,7 @@ from ...machine.manipulator import Manipulator
 from ...mechanics.actuation import distal_cross_products, drive_pairs
 from ...mechanics.kinematics import inverse_kinematics, reachable
 from ...mechanics.maps import sampling_box
-from ..maps import grid_points, on_grid
+from ..maps import grid_points, on_grid, touching_arcs
 
 
 def workspace_outline(robot) -> np.ndarray:
@@ -58,7 +58,10 @@ def singular_curves(robot: Manipulator) -> dict:
     """For each pair the lines, each (j, 2) in m, on which its distal links are parallel."""
     x, y, inside, points = grid_points(robot, 161)
     values = distal_cross_products(robot, inverse_kinematics(robot, points))
-    return {pair: zero_lines(x, y, inside, values[:, i]) for i, pair in enumerate(drive_pairs(robot))}
+    return {
+        pair: zero_lines(x, y, inside, values[:, i]) + touching_arcs(robot, pair)
+        for i, pair in enumerate(drive_pairs(robot))
+    }
 
 
 def zero_lines(x, y, inside, values) -> list:
