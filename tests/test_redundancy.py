@@ -134,6 +134,21 @@ def test_minimax_reaches_the_edge_of_the_force_polygon():
         assert_allclose(CENTRE.T @ c, wrench, atol=1e-12)
 
 
+@pytest.mark.parametrize("limit", [(1, 1e9, 1), (1e9, 1, 1), (1, 1e-9, 1e-10), (1, 1e12, 1), (1e6, 1, 1e-6)])
+def test_a_drive_without_practical_limit(limit):
+    """Force right to rounding, peak from the dual: motions under which one drive stands still."""
+    A = rk.control_matrix(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, [0.02, 0.05]))
+    wrench, still = A.T @ [0.1, 0.1, 0.1], np.stack([-A[:, 1], A[:, 0]])
+    c = rk.minimax_torques(A, wrench, limit)
+    assert_allclose(A.T @ c, wrench, rtol=1e-10)
+    peak = np.max(np.abs(wrench @ still) / (limit @ np.abs(A @ still)))
+    assert_allclose(np.max(np.abs(c) / limit), peak, rtol=max(1e-9, 1e-16 * max(limit) / min(limit)) * 10)
+    inside = rk.allocate_torques(A, A.T @ [5.0, 0.99, -0.99], [1e9, 1.0, 1.0])
+    assert_allclose(inside[2], -1.0, rtol=1e-9)
+    with pytest.raises(ValueError, match="at most 1e12 times"):
+        rk.minimax_torques(A, wrench, [1.0, 1e13, 1.0])
+
+
 @pytest.mark.parametrize(("x", "gain"), [((0.0, 0.0), 4 / 3), ((-0.05, 0.0), 1.3013), ((-0.1, 0.0), 1.1437)])
 def test_the_force_polygon_is_larger_than_what_the_pseudoinverse_reaches(x, gain):
     """Areas: zonotope of the box against {w : |(A^T)^+ w| <= 1}; reference values, exactly 4/3 at the centroid."""

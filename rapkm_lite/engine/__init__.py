@@ -14,7 +14,9 @@ import os
 import warnings
 
 _WANTED = os.environ.get("RAPKM_LITE_NUMBA", "1").strip().lower() not in ("0", "false", "no", "off")
-COMPILED = _WANTED and importlib.util.find_spec("numba") is not None
+# Numba's own switch, for debuggers and coverage: its functions are then plain ones, and no kernels.
+_FREE = os.environ.get("NUMBA_DISABLE_JIT", "").strip() in ("", "0")
+COMPILED = _WANTED and _FREE and importlib.util.find_spec("numba") is not None
 """Is Numba wanted and installed?  Whether it works, `compiled` says."""
 
 

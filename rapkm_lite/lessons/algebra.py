@@ -57,7 +57,9 @@ def _whole_factor(seen: Seen) -> str:
                 continue
             if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]):
                 word = "is missing" if p < 0 else "is one too many"
-                more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else f", beside a factor of {rest[0]:.4g}"
+                fixed = f": as if a fixed {abs(rest[0]) ** (-1 / p):.4g} stood for it" if rest[0] > 0 else ""
+                more = f", beside a factor of {rest[0]:.4g}{fixed}"
+                more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else more
                 return f"the factor {name}{_power(p)} {word}{more}"
     return ""
 

@@ -23,7 +23,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
     W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
     Raises ValueError at input singularities, for a wrench beyond the limits, with the factor by which they fall
-    short, and for a prestress so far beyond them that rounding hides the nearest torques.
+    short, for limits of more than 1e12 times one another, and for a prestress so far beyond them that rounding hides
+    the nearest torques.
 
     >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
     >>> rk.allocate_torques(A, [1.0, 1.0], limit=1.0).round(3), rk.allocate_torques(A, [1.0, 1.0], limit=0.6).round(3)
@@ -69,7 +70,8 @@ def minimax_torques(A, wrench, limit=1.0) -> np.ndarray:
     """Torques c (m,) in N m with A^T c = wrench whose largest share |c_i| / limit_i is least, by linear programming.
 
     A : (m, delta).  wrench : (delta,).  limit : number or (m,), N m, positive: which drive counts for how much.
-    Raises ValueError at input singularities.
+    The force is right to rounding; the peak is least to rounding times the ratio of the limits.
+    Raises ValueError at input singularities and for limits of more than 1e12 times one another.
 
     >>> import rapkm_lite as rk
     >>> rk.minimax_torques([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [1.0, 1.0]).round(3)
@@ -93,16 +95,28 @@ def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[n
     from scipy.optimize import linprog
 
     m, delta = A.shape
-    # Unknowns: the shares c_i / limit_i of one unit of wrench, and their largest size t.
-    force = max(float(np.abs(wrench).max(initial=0.0)), 1e-300)
+    if limit.max() > 1e12 * limit.min():
+        raise ValueError(f"limit = {limit.tolist()}; allowed: limits of at most 1e12 times one another")
+    # In shares c_i / limit_i: those of least squares, and a basis of what makes no force.  So the force is right to
+    # rounding whatever the programme's own tolerance, and far limits do not fall below it.
     scale = np.abs(limit[:, None] * A).max()
-    cost = np.append(np.zeros(m), 1.0)
-    below = np.block([[np.eye(m), -np.ones((m, 1))], [-np.eye(m), -np.ones((m, 1))]])
-    equal = np.hstack([(limit[:, None] * A).T / scale, np.zeros((delta, 1))])
-    found = linprog(cost, below, np.zeros(2 * m), equal, wrench / force, bounds=[(None, None)] * m + [(0, None)])
+    Q, R = np.linalg.qr(limit[:, None] * A / scale, mode="complete")
+    span, free = Q[:, :delta], Q[:, delta:]
+
+    def shares(force):
+        return span @ np.linalg.solve(R[:delta].T, force)
+
+    unit = max(float(np.abs(wrench).max(initial=0.0)), 1e-300)
+    least = shares(wrench / unit)
+    size, one = max(np.abs(least).max(), 1e-300), np.ones((m, 1))
+    below, cost = np.block([[free, -one], [-free, -one]]), np.append(np.zeros(m - delta), 1.0)
+    bounds = [(None, None)] * (m - delta) + [(0, None)]
+    found = linprog(cost, below, np.concatenate([-least, least]) / size, bounds=bounds)
     if found.status != 0:
         raise ValueError(f"wrench = {wrench.tolist()} has no torques ({found.message}); allowed: a regular A")
-    return found.x[:m] * limit * force / scale, found.x[m] * force / scale
+    share = least + free @ found.x[:-1] * size
+    share += shares(wrench / unit - A.T @ (limit / scale * share))
+    return share * limit * unit / scale, float(np.abs(share).max() * unit / scale)
 
 
 def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:

@@ -102,7 +102,8 @@ ANSWERS = {
         ("wrong", "half", scaled(0.5), "factor"),
         ("wrong", "mN m", scaled(1e3), "1000"),
         ("wrong", "degrees", scaled(180 / np.pi), "180"),
-        ("wrong", "machines exchanged", lambda r, m, x, K: tasks.geometry_fight(m, r, x, K), "change places"),
+        ("wrong", "machines exchanged", lambda r, m, x, K: tasks.geometry_fight(m, r, x, K), "changed places"),
+        ("wrong", "first order, sign turned", lambda *case: -by_projection(*case), "the sign is turned"),
         ("wrong", "no gain", lambda r, m, x, K: tasks.geometry_fight(r, m, x, 1.0), "K_P"),
         (
             "wrong",
