@@ -16,6 +16,7 @@ from .figures.maps import (
     pair_name,
     plot_map,
     plot_pair_curves,
+    touching_arcs,
 )
 from .figures.runs import lines_per_drive, plot_errors, plot_torques
 from .figures.style import (
@@ -218,6 +219,7 @@ __all__ = [
     "plot_working_modes",
     "plot_workspace",
     "table",
+    "touching_arcs",
     "use_style",
 ]
 

@@ -18,7 +18,7 @@ import pytest
 from matplotlib.text import Text
 
 import rapkm_lite as rk
-from rapkm_lite import explore
+from rapkm_lite import explore, plotting
 from rapkm_lite.explore.controls import moved, snap
 from rapkm_lite.figures.marks import encode, figure, workspace_outline
 
@@ -217,6 +217,19 @@ def test_singular_curves_keep_the_distance_from_the_centroid_that_the_reference_
     curves = explore.torque.singular_curves(rk.load())
     gaps = [min(np.linalg.norm(line, axis=-1).min() for line in lines) for lines in curves.values()]
     np.testing.assert_allclose(gaps, 0.1012, atol=2e-4)
+
+
+@pytest.mark.parametrize("mode", [m for m in rk.working_modes(rk.load()) if abs(m.sum()) == 1], ids=str)
+def test_in_mixed_modes_all_three_curves_pass_the_middle_of_a_side(mode):
+    """Also the one that touches zero: three parallel links, an input singularity, between the arms that bend alike."""
+    robot = rk.load()
+    alike = [i for i in range(3) if mode[i] * mode.sum() > 0]
+    middle = robot.base[alike].mean(axis=0)
+    explorer = explore.machine().set(mode=plotting.mode_name(mode))
+    for pair in ("(1,2)", "(1,3)", "(2,3)"):
+        explorer.set(drives=f"pair {pair}")
+        lines = [m.data for m in marks(explorer) if m.kind == "line" and m.style.get("linewidth") == 2.2]
+        assert min(np.linalg.norm(line - middle, axis=-1).min() for line in lines) < 3e-3
 
 
 def test_curve_on_the_map_lies_between_poses_that_bend_the_pair_to_either_side():

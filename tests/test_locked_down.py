@@ -71,6 +71,10 @@ def test_all_words_for_off_mean_off(plain, off):
     assert result(RAPKM_LITE_NUMBA=off)[0] == plain and plain[-1] == "False"
 
 
+def test_the_switch_of_numba_itself_is_heard(plain):
+    assert result(NUMBA_DISABLE_JIT="1")[0] == plain
+
+
 def close(one, other):
     return all(abs(float(a) / float(b) - 1) < 1e-10 for a, b in zip(one[:2], other[:2], strict=True))
 

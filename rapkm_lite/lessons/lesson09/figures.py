@@ -132,7 +132,7 @@ def plot_one_sign(trajectory, ax=None, n: int = 201):
     plot_pair_curves(robot, ax, n=max(n, 81))
     plot_path(trajectory, ax)
     ax.fill([], [], color="#B9CDE0", label="one sign possible")
-    ax.fill([], [], color="#E8E4DC", label="impossible")
+    ax.fill([], [], color="#E8E4DC", label="impossible without a force")
     ax.set(aspect="equal", xlabel="x in m", ylabel="y in m", xlim=x[[0, -1]], ylim=y[[0, -1]])
     ax.grid(False)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
