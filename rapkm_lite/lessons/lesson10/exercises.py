@@ -27,7 +27,7 @@ EXERCISES = {
         close=0.1,
         improve="take the pose that fits best, rk.estimate_pose, instead of a first-order step from x",
         mistakes={
-            "the sign is turned, as if robot and model changed places: the model demands, the machine closes its loops": (
+            "the sign is turned, as if robot and model changed places: the model demands, the machine closes loops": (
                 lambda robot, model, x, K_P: tasks.geometry_fight(model, robot, x, K_P)
             ),
             "nothing is projected: this is the difference of the angles at x, part of which only shifts the machine": (
