@@ -118,7 +118,8 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
         look: dict[str, Any] = pair_line(robot, pair) | ({"color": "white"} if on_map else {}) | line
         style = {"colors": [look["color"]], "linestyles": [look["linestyle"]], "linewidths": look.get("linewidth", 1.6)}
         drawn = ax.contour(x, y, cross[..., k], levels=[0.0], zorder=3, **style)
-        arcs = [ax.plot(*arc.T, zorder=3, **{"linewidth": 1.6} | look)[0] for arc in touching_arcs(robot, pair, mode)]
+        arc_look: dict[str, Any] = {"linewidth": 1.6, "zorder": 3} | look
+        arcs = [ax.plot(*arc.T, **arc_look)[0] for arc in touching_arcs(robot, pair, mode)]
         if on_map:
             for curve in (drawn, *arcs):
                 curve.set_path_effects(_OUTLINED)
