@@ -349,16 +349,38 @@ def test_bands_of_samples_that_are_not_positive_have_a_linear_axis():
     assert all(ax.get_xlim()[0] <= min(ax.lines[0].get_xdata()) for ax in axes)
 
 
-@pytest.mark.parametrize("times", [0.1, 3.0])
-def test_a_machine_of_another_size_is_in_the_same_frame(world, times):
+@pytest.mark.parametrize("times, shift", [(0.1, (0.0, 0.0)), (3.0, (40.0, -7.0))])
+def test_a_machine_of_another_size_and_place_is_in_the_same_frame(world, times, shift):
     robot = world["robot"]
-    other = robot.replace(base=times * robot.base, lengths=times * robot.lengths, masses=0.1)
+    other = robot.replace(base=times * robot.base + shift, lengths=times * robot.lengths, masses=0.1)
+
+    def there(x):
+        return times * np.array(x) + shift
+
+    def at_rest(r, x):
+        path = rk.hold(r, x, 0.005)
+        return rk.simulate(r, world["law"], path)
+
     for plot in (
-        lambda r: plotting.plot_feedback_map(r, (0, 1), n=21),
-        lambda r: plotting.plot_partition_rules(r, n=21)[0],
+        lambda r, place: plotting.plot_feedback_map(r, (0, 1), n=21),
+        lambda r, place: plotting.plot_partition_rules(r, n=21)[0],
+        lambda r, place: plotting.plot_modes_and_forces(r, place([0.0, 0.0]), [(1, 1, 1), (1, 1, -1)])[0],
+        lambda r, place: plotting.plot_synchronization(r, place([0.0, 0.0]), OFFSET)[0],
+        lambda r, place: plotting.plot_ee_paths({"PD": at_rest(r, place([0.0, 0.0]))}, pair=(0, 1))[1],
+        lambda r, place: plotting.plot_mirror(at_rest(r, place([0.0, 0.0])), 0, (0, 1))[0],
+        lambda r, place: plotting.plot_mirror(at_rest(r, place([0.0, 0.0])), 0, (0, 1))[1],
     ):
-        np.testing.assert_allclose(plot(other).get_xlim(), times * np.array(plot(robot).get_xlim()))
-    ax = plotting.plot_pair_measures(rk.triangle(other, 0.12 * times))
+        ax, own = plot(other, there), plot(robot, np.array)
+        corners = there(np.transpose([own.get_xlim(), own.get_ylim()]))
+        np.testing.assert_allclose(np.transpose([ax.get_xlim(), ax.get_ylim()]), corners, atol=1e-12)
+        plt.close("all")
+    move = [there([-0.05, 0.0]), there([0.05, 0.0]), times * np.array([0.015, 0.03]), [2e-3, 7e-3], 5e-3]
+    line = plotting.plot_joint_moves(other, *move)[0]
+    assert all(abs(np.subtract(line.get_ylim(), 1e3 * there([0.0, 0.0])[1])) < 40.0 * times)
+    tree = plotting.plot_cut_tree(other, rk.inverse_kinematics(other, there([0.02, -0.03])) + 2e-2 * np.eye(6)[0])
+    assert len(tree.texts) == 1, "one gap, of 2 % of a length, in either size"
+    path = rk.triangle(other, 0.12 * times, centre=there([0.0, 0.0]))
+    ax = plotting.plot_pair_measures(path)
     assert ax.get_ylim()[0] < ax.lines[-1].get_ydata().min() < ax.lines[-1].get_ydata().max() < ax.get_ylim()[1]
 
 

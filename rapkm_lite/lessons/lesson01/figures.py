@@ -8,6 +8,7 @@ import matplotlib.style
 import numpy as np
 from matplotlib.ticker import MultipleLocator
 
+from ...figures._shared import scaled_frame
 from ...figures.film import film
 from ...figures.machine import plot_machine
 from ...figures.maps import mode_name
@@ -56,7 +57,7 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
     p = tips(robot, q)
     for i in range(robot.n_arms):
         gap = np.hypot(*(p[i] - p[1]))
-        if gap > 1e-3:
+        if gap > 5e-3 * robot.lengths.max():
             arrow = {"arrowstyle": "-|>", "color": ALARM, "lw": 1.8, "shrinkA": 4, "shrinkB": 4}
             ax.annotate("", p[i], p[1], arrowprops=arrow, zorder=7)
         if i != 1:
@@ -229,8 +230,8 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
     def draw(axes, k):
         for ax, (name, q) in zip(axes, poses.items(), strict=False):
             plot_cut_tree(robot, q[k], ax).legend().remove()
-            ax.text(-0.26, 0.29, f"{name}, {t[k]:.1f} s", fontweight="bold")
-            ax.set(xlim=(-0.27, 0.36), ylim=(-0.32, 0.32))
+            ax.text(0.016, 0.953, f"{name}, {t[k]:.1f} s", fontweight="bold", transform=ax.transAxes)
+            ax.set(**scaled_frame(robot, -0.27, 0.36, -0.32, 0.32))
             ax.set_axis_off()
         for (name, gap), (colour, dash) in zip(gaps.items(), ((ALARM, "-"), (AFTER, "--")), strict=True):
             axes[-1].plot(t[: k + 1], 1e3 * np.asarray(gap[: k + 1]), color=colour, ls=dash, label=name)

@@ -136,7 +136,8 @@ def plot_modes_and_forces(robot, x, modes, axes=None):
     poses = [inverse_kinematics(robot, x, mode) for mode in modes]
     size = 1.12 * max(np.abs(force_polygon(control_matrix(robot, q), 0.1)).max() for q in poses)
     corners = np.concatenate([arm_points(robot, q).reshape(-1, 2) for q in poses])
-    low_high = np.array([corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05])
+    room = 0.25 * robot.lengths.max()
+    low_high = np.array([corners.min(axis=0) - room, corners.max(axis=0) + room])
     for q, mode, (left, right) in zip(poses, modes, np.reshape(axes, (-1, 2)), strict=True):
         plot_machine(robot, q, left, labels=False)
         plot_available_forces(robot, q, right)

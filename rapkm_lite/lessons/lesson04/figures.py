@@ -52,8 +52,9 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
         axes[0].plot(*points[2], "s", mfc=face, mec=NEUTRAL, mew=1.8, ms=9, zorder=5, label=label)
     axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
     plane_axes(robot, axes[0])
-    low, high = robot.base.min(axis=0) - 0.11, robot.base.max(axis=0) + 0.08
-    axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1] + 0.13), title=f"offsets magnified {magnify:g} times")
+    long = robot.lengths.max()
+    low, high = robot.base.min(axis=0) - 0.55 * long, robot.base.max(axis=0) + np.array([0.4, 1.05]) * long
+    axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=f"offsets magnified {magnify:g} times")
     axes[0].legend(loc="upper left")
 
     seen = _pair_poses(robot, true + offset, x)
@@ -104,7 +105,7 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
             x.append(forward_kinematics(five_bar, estimate_pose(five_bar, angles, x[-1])))
         axes[0].plot(*(1e3 * np.array(x).T), label=f"drives {pair[0] + 1} and {pair[1] + 1}", **pair_line(robot, pair))
     axes[0].set(xlabel="x in mm", ylabel="y in mm", title="one straight move in joint space", aspect="equal")
-    axes[0].set(ylim=np.array([-30, 45]) + 1e3 * line[:, 1].mean())
+    axes[0].set(ylim=1e3 * (line[:, 1].mean() + np.array([-1 / 6, 1 / 4]) * np.hypot(*(line[-1] - line[0]))))
     axes[0].legend(loc="upper center", ncols=3)
     axes[1].loglog(1e3 * spacing, 1e3 * gap, "o", color=AFTER, label="straight lines in joint space")
     axes[1].loglog(1e3 * spacing, 1e3 * gap[-1] * (spacing / spacing[-1]) ** 2, "--", color=NEUTRAL, label="slope two")

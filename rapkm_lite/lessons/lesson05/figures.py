@@ -34,6 +34,11 @@ def _frame(robot, ax):
     return ax
 
 
+def _box(robot, zoom, *testbed: float) -> dict:
+    """Limits of a box (left, right, low, high) in m, or of the one that shows the testbed's corner on this machine."""
+    return scaled_frame(robot, *testbed) if zoom is None else {"xlim": tuple(zoom[:2]), "ylim": tuple(zoom[2:])}
+
+
 def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     """Fig. 8 with the poses of a path: the five-bar of a pair, in colour, where the path crosses the pair's curve.
 
@@ -113,8 +118,8 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     return axes
 
 
-def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -0.045)):
-    """True end-effector paths of several runs and the curve of a pair: the workspace, and the box `zoom` in m.
+def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
+    """True end-effector paths of several runs and the curve of a pair: the workspace, and the box `zoom` (4,) in m.
 
     runs : label -> run; a cross marks where a run shorter than the longest one ends.
 
@@ -132,16 +137,17 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=(-0.13, 0.14, -0.105, -
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(longest.robot, ax)
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], aspect="auto", title="enlarged, axes unequal")
+    axes[1].set(**_box(longest.robot, zoom, -0.13, 0.14, -0.105, -0.045), aspect="auto", title="enlarged, axes unequal")
     axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
 
 
-def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054)):
+def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     """Sample k of a run that a law in the angles of `pair` drives, beside the desired point and its mirror line.
 
-    Left the machine, the third arm pale; right the box `zoom` in m: the wanted point and the run up to here, the pair's
-    curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both axes.
+    Left the machine, the third arm pale; right the box `zoom` (4,) in m: the wanted point and the run up to here, the
+    pair's curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both
+    axes.
 
     >>> import rapkm_lite as rk; robot = rk.load()
     >>> ax = plot_mirror(rk.simulate(robot, rk.PD(7.05, 0.225), rk.triangle(robot)), 1400, (0, 1))
@@ -161,8 +167,8 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=(0.088, 0.13, -0.09, -0.054))
     axes[1].plot(*run.x[k], "s", color=ALARM, ms=8, zorder=6, label="end-effector")
     axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="wanted")
     axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
-    axes[0].set(xlim=(-0.31, 0.31), ylim=(-0.31, 0.31), title=f"{run.t[k]:.2f} s")
-    axes[1].set(xlim=zoom[:2], ylim=zoom[2:], title="enlarged")
+    axes[0].set(**scaled_frame(robot, -0.31, 0.31, -0.31, 0.31), title=f"{run.t[k]:.2f} s")
+    axes[1].set(**_box(robot, zoom, 0.088, 0.13, -0.09, -0.054), title="enlarged")
     axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
     return axes
 
