@@ -75,9 +75,10 @@ def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mo
     q = inverse_kinematics(robot, point, mode)
     marks.draw_machine(picture, panel, robot, q)
     picture.handle(panel, *point, x=(1e3, 0), y=(0, 1e3))
-    there = 1e3 * point
-    short = np.abs(there - [x, y]).max() > 0.5
-    words = {"end-effector": f"({there[0]:z.0f}, {there[1]:z.0f}) mm: an arm reaches no further"} if short else {}
+    there, step = 1e3 * point, size(robot)
+    short, digits = np.abs(there - [x, y]).max() > 0.5 * step, max(0, -math.floor(math.log10(step)))
+    place = f"({there[0]:z.{digits}f}, {there[1]:z.{digits}f}) mm"
+    words = {"end-effector": f"{place}: an arm reaches no further"} if short else {}
     return point, q, words
 
 

@@ -50,8 +50,9 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
         half = (low + high) / 2
         inside = reachable(robot, start + half * (point - start))
         low, high = (half, high) if inside else (low, half)
-    # A millimetre inside, where no arm is quite stretched.
-    return start + max(low - 1e-3 / max(np.linalg.norm(point - start), 1e-300), 0.0) * (point - start)
+    # A little inside (a millimetre of the testbed), where no arm is quite stretched.
+    room = 5e-3 * robot.lengths.max() / max(np.linalg.norm(point - start), 1e-300)
+    return start + max(low - room, 0.0) * (point - start)
 
 
 def singular_curves(robot: Manipulator) -> dict:
