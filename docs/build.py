@@ -145,7 +145,7 @@ def pages(folder: Path, name: str) -> list[str]:
 
 def drawn(diagram: re.Match[str]) -> str:
     """The block of a diagram as a picture in the page."""
-    return f"```{{raw}} html\n{drawing.svg(diagram[1])}\n```"
+    return f'```{{raw}} html\n<div class="wide-picture">{drawing.svg(diagram[1])}</div>\n```'
 
 
 def mathjax() -> Path:

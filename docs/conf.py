@@ -31,7 +31,8 @@ copybutton_prompt_text = ">>> "
 # Widgets are left to a kernel, and a part of a lesson may begin with a heading of any level.
 suppress_warnings = ["mystnb.unknown_mime_type", "myst.header"]
 mathjax_path = "tex-svg.js"
-mathjax3_config = {"tex": {"tags": "none"}, "svg": {"fontCache": "local"}}
+# With its menu every formula would be a stop of the tab key.
+mathjax3_config = {"tex": {"tags": "none"}, "svg": {"fontCache": "local"}, "options": {"enableMenu": False}}
 html_theme = "furo"
 html_title = "rapkm_lite"
 html_static_path = ["pages/static"]

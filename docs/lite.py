@@ -21,7 +21,9 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path.insert(0, str(HERE.parent))
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+
+from pages.lessons import STILL  # noqa: E402
 
 from rapkm_lite.lessons.copies import shipped, student_text  # noqa: E402
 
@@ -120,7 +122,7 @@ def link(lite: Path) -> None:
         what = "dashboard" if notebook.stem == "dashboard" else "lesson"
         here = ways(f"../{lite.name}", notebook.stem, f"Run this {what} in the browser")
         still = f"<p>{here}; {MINUTE}. On this page pictures are still, there they answer.</p>"
-        places[site / f"lessons/{notebook.stem}.html"] = "<!-- here -->", still
+        places[site / f"lessons/{notebook.stem}.html"] = STILL, still
     for page, (old, new) in places.items():
         if page.exists():
             page.write_text(page.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")

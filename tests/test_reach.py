@@ -148,6 +148,7 @@ def test_pages_of_a_site_lead_to_lessons_that_run_in_it_as_wide_as_the_screen(tm
         assert f'<a class="on-wide" href="{lite}/lab/index.html?path={first}.ipynb">Run ' in made
         assert f'<a class="on-narrow" href="{lite}/notebooks/index.html?path={first}.ipynb">Run ' in made
         assert "the first start takes a minute" in made and "<!-- here -->" not in made
+        assert "pictures are still:" not in made
 
 
 def test_every_public_name_has_its_place_in_the_reference(tmp_path):

@@ -72,7 +72,7 @@ def _fold(app, doctree, docname):
 
 
 def _widen(app, doctree, docname):
-    """Pictures of several panels side by side in a box of their own, which a narrow screen moves sideways."""
+    """Wide pictures, of several panels mostly, in a box of their own, which a narrow screen moves sideways."""
     from docutils import nodes
     from PIL import Image
 
@@ -82,7 +82,7 @@ def _widen(app, doctree, docname):
             continue
         with Image.open(path) as picture:
             width, height = picture.size
-        if width > 1.8 * height:
+        if width > 1.8 * height or width > 1100:
             box = nodes.container(classes=["wide-picture"])
             image.replace_self(box)
             box.append(image)

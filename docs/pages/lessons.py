@@ -118,6 +118,13 @@ def _first(cells, pattern: str) -> int | None:
     return next((k for k, text in markdown if re.search(pattern, text)), None)
 
 
+# Below the title of a lesson; a link to the lesson in the browser takes its place, if the site gets them.
+STILL = (
+    '<p>On this page pictures are still: <a href="../run.html">run the lessons</a> to move them, or take the machine '
+    'on the <a href="../index.html">start page</a>.</p>'
+)
+
+
 def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
     """A notebook for the site.
 
@@ -139,12 +146,17 @@ def lesson_page(path: Path, anchors: list[str], depth: str = "") -> str:
             # A heading stays the first line of its cell.
             head, rest = re.match(r"(#[^\n]*\n?)?(.*)", text, re.DOTALL).groups()
             below = f'<div class="to-index">\n{marks}</div>\n\n' if marks else ""
-            # Where a link to the lesson in the browser goes, if the site gets them.
-            below = f"<!-- here -->\n\n{below}" if k == 0 and not depth else below
+            below = f"{STILL}\n\n{below}" if k == 0 and not depth else below
             cell["source"] = f"{head or ''}\n{below}{rest}" if below else text
         else:
             _outputs(cell, _next_words(cells, k))
     return json.dumps(notebook, ensure_ascii=False)
+
+
+def _wide(film: str) -> bool:
+    """Has a film several panels side by side?"""
+    size = re.search(r' width="(\d+)" height="(\d+)"', film)
+    return size is not None and int(size[1]) > 1.8 * int(size[2])
 
 
 def _label(anchor: str) -> str:
@@ -172,7 +184,7 @@ def _outputs(cell: dict, words: str) -> None:
             alt = re.search(r'<img[^>]* alt="([^"]*)"', page)
             if "<picture>" in page:
                 # A film moves, and stands still where motion is to be reduced.
-                output["data"] = {"text/html": page}
+                output["data"] = {"text/html": f'<div class="wide-picture">{page}</div>' if _wide(page) else page}
             cell["metadata"]["mystnb"] = {"image": {"alt": html.unescape(alt[1]) if alt else words}}
         kept.append(output)
     cell["outputs"] = kept

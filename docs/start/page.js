@@ -343,12 +343,16 @@ function play() {
   playing = requestAnimationFrame(tick);
 }
 
+let before = {};
 for (const [name, c] of Object.entries(controls)) {
   const row = document.createElement("label");
   row.innerHTML = `<span>${c.words}: <b id="${name}-value"></b></span>`;
   const input = Object.assign(document.createElement("input"), { type: "range", id: name, min: c.low, max: c.high, step: name === "x" || name === "y" ? 1 : c.step });
   input.setAttribute("aria-label", c.words);
   input.oninput = () => (change({ [name]: input.valueAsNumber }), update({}, true));
+  // A finger that scrolls the page puts down on a slider first: what it moved there goes back.
+  input.onpointerdown = () => (before = { ...state });
+  input.onpointercancel = () => (Object.assign(state, before), update());
   row.append(input);
   $("controls").append(row);
 }
@@ -380,12 +384,14 @@ mount($("stage"), {
 // On a narrow page, where panels stand below each other, a slider stands below what it moves.
 const narrow = matchMedia("(max-width: 640px)"), movers = [["machine", /^[xy]$/], ["offset", /^offset/], ["run", /^time$/]];
 function arrange() {
+  const held = document.activeElement;
   const panels = Object.fromEntries(Array.from(document.querySelectorAll(".rapkm-panel"), (el) => [el.style.gridArea.split(" ")[0], el]));
   for (const [panel, names] of movers) {
     const rows = Object.keys(controls).filter((name) => names.test(name)).map((name) => $(name).parentElement);
     if (narrow.matches) panels[panel].after(...rows);
     else $("controls").append(...rows);
   }
+  held.focus({ preventScroll: true }); // what is moved in the document loses it
 }
 narrow.addEventListener("change", arrange);
 arrange();

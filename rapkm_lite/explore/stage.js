@@ -312,12 +312,12 @@ export function wish({ along, set }, x, y) {
   return remade(set, (v) => v[k] + (place - k) * (v[k + 1] - v[k]));
 }
 
-/** Steps of its controls for an arrow key, ten with shift, or to either end; null for another key. */
-export function steps({ along, set, at }, key, shift) {
+/** Steps of its controls for an arrow key (one alone takes all four), ten with shift, or to either end; else null. */
+export function steps({ along, set }, key, shift) {
   const [dx, dy] = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key] ?? [];
-  const end = { Home: -1e9, End: 1e9 }[key]; // further than any slider goes
+  const end = { Home: -1e9, End: 1e9 }[key], alone = Object.keys(set).length === 1; // further than any slider goes
   if (dx === undefined && !end) return null;
-  const count = (v) => end ?? (along || at[1] === null ? dx + dy : Math.sign(v[0]) * dx + Math.sign(v[1]) * dy);
+  const count = ([a, b]) => end ?? (along ? dx + dy : Math.sign(a || alone * b) * dx + Math.sign(b || alone * a) * dy);
   return Object.fromEntries(Object.entries(remade(set, (v) => (shift ? 10 : 1) * count(v))).filter(([, n]) => n));
 }
 

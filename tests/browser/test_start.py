@@ -510,3 +510,32 @@ def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address):
     # Chromium lays out a page of paper without painting anew; then a canvas must not be stretched.
     fits = "[...document.querySelectorAll('canvas')].map(e => getComputedStyle(e).objectFit)"
     assert set(seen.page.evaluate(fits)) == {"contain"}
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_button_that_plays_is_called_what_it_does(browser, address, width):
+    seen = Page(browser, address, width)
+    assert seen.page.get_by_role("button", name="Play the run", exact=True).count() == 1
+
+
+def test_a_finger_that_scrolls_the_page_sets_nothing(browser, address):
+    seen = Page(browser, address, 390, has_touch=True, is_mobile=True)
+    touch, before = seen.page.context.new_cdp_session(seen.page), seen.places()
+    for name in ("x", "offset_1", "time"):
+        seen.page.locator(f"#{name}").scroll_into_view_if_needed()
+        box, top = seen.page.locator(f"#{name}").bounding_box(), seen.page.evaluate("scrollY")
+        x, y = box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2
+        for kind, up in [("Start", 0), *(("Move", 15 * k) for k in range(1, 13))]:
+            touch.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": [{"x": x, "y": y - up}]})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        seen.page.wait_for_function("top => scrollY > top + 50", arg=top)
+        seen.page.wait_for_timeout(300)
+        assert seen.places() == before
+
+
+def test_a_phone_that_is_turned_keeps_the_focus(browser, address):
+    seen = Page(browser, address, 390)
+    seen.page.focus("#offset_2")
+    seen.page.set_viewport_size({"width": 844, "height": 390})
+    seen.page.wait_for_function("document.querySelectorAll('#controls input').length === 6")
+    assert seen.page.evaluate("document.activeElement.id") == "offset_2"

@@ -96,6 +96,9 @@ test("arrow keys are steps of the controls that a direction moves", () => {
   assert.ok(home.x === home.y && home.x < -1e6); // further than any slider goes
   assert.equal(steps(plane, "Enter", false), null);
   assert.deepEqual(steps({ set: { offset: [-4, 2, 0] }, at: [0, 0] }, "ArrowRight", false), { offset: -1 });
+  const ring = { set: { offset: [0, 2, 0] }, at: [1, 0] };
+  for (const [key, count] of Object.entries({ ArrowUp: 1, ArrowRight: 1, ArrowLeft: -1, ArrowDown: -1 }))
+    assert.deepEqual(steps(ring, key, false), { offset: count });
   assert.deepEqual(steps({ set: { time: [1e3, 0, 0] }, at: [1, null] }, "ArrowDown", false), { time: -1 });
 });
 

@@ -3,8 +3,13 @@ function names() {
   for (const heading of document.querySelectorAll('[role="heading"]')) heading.setAttribute("aria-level", "2");
   document.querySelector(".sidebar-drawer")?.setAttribute("aria-label", "All pages");
   document.querySelector(".toc-drawer")?.setAttribute("aria-label", "On this page");
-  const found = document.getElementById("search-results");
-  found?.before(Object.assign(document.createElement("h1"), { textContent: "Search" }));
+  // What is written on a fold says more than one name for all of them.
+  for (const fold of document.querySelectorAll("summary[aria-label]")) fold.removeAttribute("aria-label");
+  const found = document.getElementById("search-results"), make = (tag) => document.createElement(tag);
+  const index = Object.assign(make("a"), { href: "lessons/equations.html", textContent: "the equation index" });
+  const way = Object.assign(make("p"), { textContent: "By its number an equation is found in " });
+  way.append(index, ".");
+  found?.before(Object.assign(make("h1"), { textContent: "Search" }), way);
 }
 
 // On a narrow screen the lists at the sides are drawers: their icons are buttons, and Escape closes them.
@@ -33,7 +38,8 @@ function drawers() {
 
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
 function reach() {
-  for (const box of document.querySelectorAll("article :is(pre, table, .table-wrapper, .wide-picture, .formula)"))
+  const wide = "pre, table, .table-wrapper, .wide-picture, .formula, mjx-container[display=true]";
+  for (const box of document.querySelectorAll(`article :is(${wide})`))
     if (box.clientWidth && box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
 }
@@ -41,5 +47,6 @@ function reach() {
 addEventListener("DOMContentLoaded", names);
 addEventListener("DOMContentLoaded", drawers);
 for (const event of ["load", "resize"]) addEventListener(event, reach);
+addEventListener("load", () => window.MathJax?.startup?.promise?.then(reach));
 // What was folded has its width once it is open.
 addEventListener("toggle", reach, true);
