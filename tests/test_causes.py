@@ -265,11 +265,14 @@ def test_a_law_that_fails_beside_a_lost_machine_is_kept_as_the_cause():
     def picky(t, q_a, qd_a, desired):
         if np.abs(qd_a).max() > 1e9:
             raise KeyError("no such rate")
-        return -14772.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
+        return np.array([1e19, 0.0, 0.0, 0.0]) * (t > 4.5e-12)
 
+    path = rk.hold(FOUR, HOLD_FOUR.x[0], 20e-12, dt=1e-12)
     with pytest.raises(rk.SimulationError, match="the machine left the workspace") as caught:
-        rk.simulate(FOUR, picky, HOLD_FOUR, [0.0001, 0.0047, -0.0014, 0.0038])
+        rk.simulate(FOUR, picky, path)
     assert isinstance(caught.value.__cause__, KeyError)
+    # The sample at which it was lost is not one.
+    assert np.abs(caught.value.partial.x - path.x[0]).max() < 1e-2 and caught.value.partial.c[-1, 0] == 1e19
 
 
 @pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])

@@ -99,8 +99,7 @@ def test_torques_that_stay_the_same_lose_the_machine_at_one_time_however_often_t
 
     instant = end(1e-4)
     for dt in (2e-3, 4e-3):
-        # The hold in which it is, or the one before, of whose end nothing is known.
-        assert end(dt) <= instant < end(dt) + 2 * dt
+        assert end(dt) <= instant < end(dt) + dt
 
 
 def test_a_run_keeps_what_repeats_it():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from . import plant, single
+from . import edge, plant, single
 from .decentralized import command_filter, force_filter, integral, proportional
 from .ends import last_torque, over
 from .jit import kernel, leaf, outlined
@@ -36,7 +36,7 @@ def start(lanes, arms, history, clock, table, w):
 
 @leaf
 def sense(lanes, arms, extra, study, history, table, o, w, dt):
-    """The machine at a sample, in the layout of a study or of a single run."""
+    """The machine at a sample, in the layout of a study or of a single run: is one far off or near the edge?"""
     far = 0
     if study is not None:
         far = plant.sense(lanes, arms, extra, table, o, w, dt)
@@ -44,15 +44,19 @@ def sense(lanes, arms, extra, study, history, table, o, w, dt):
         far = single.sense(arms, extra, table, o, w, dt)
     if far > 0:
         plant.mend(lanes, arms, table, o, w)
+        edge.watch(lanes, arms, extra, w, dt)
+    return far > 0
 
 
 @leaf
-def hold(lanes, arms, extra, study, history, w, dt):
+def hold(lanes, arms, extra, study, history, w, dt, far):
     """The machine until the next sample, in either layout."""
     if study is not None:
         plant.hold(lanes, arms, extra, w, dt)
+        if far:
+            edge.hold(lanes, arms, extra, w, dt)
     if history is not None:
-        single.hold(arms, extra, w, dt)
+        single.hold(arms, extra, w, dt, far)
 
 
 @leaf
@@ -213,7 +217,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         k, o = counted(clock.first + row), counted(row * columns)
 
         # Sense: the machine as it is, and what the hold will start from.
-        sense(lanes, arms, extra, study, history, table, o, w, dt)
+        far = sense(lanes, arms, extra, study, history, table, o, w, dt)
         if study is not None:
             add_work(lanes, arms, w)
             add_miss(lanes, arms, table, o, w)
@@ -241,6 +245,6 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
             add_up(lanes, drives, arms, w)
 
         # Hold.
-        hold(lanes, arms, extra, study, history, w, dt)
+        hold(lanes, arms, extra, study, history, w, dt, far)
         if over(lanes, arms, extra, history, w, k):
             return

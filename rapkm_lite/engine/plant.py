@@ -16,11 +16,14 @@ from .tables import *
 
 # Largest lambda h of a Runge-Kutta step across the bend of the friction law, and the most steps.
 STIFF, MOST_STEPS = 1.0, 4000.0
+# Largest decay of an elbow's sine in a step, as a share, at the rate with which the step begins; beyond it goes `edge`.
+SHARE = 0.05
 
 
 @outlined
 def sense(lanes, arms, extra, table, o, w, dt):
-    """Base angles and rates, geometry and shares of all arms; returns 0 where no arm is far from the desired motion."""
+    """Base angles and rates, geometry and shares of all arms; returns 0 where no arm is far from the desired motion, or
+    near the edge."""
     L, W = len(lanes), len(arms)
     count = 0
     for i in range(W):
@@ -34,7 +37,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
             s, t = turned(links, scale * ux, scale * uy)
-            w[at(NEAR, i, j, W, L)] = min(0.1 - abs(s), t)
+            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), t), SHARE - dt * decay)
             angle = small_angle(s)
             w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
             w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
@@ -44,9 +47,7 @@ def sense(lanes, arms, extra, table, o, w, dt):
             w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx, fy
             if extra is not None:
                 w[at(ACC, i, j, W, L)] = acc
-            # An arm that its present elbow rate would stretch or fold before the hold ends is lost: in end-effector
-            # coordinates a Runge-Kutta step could jump over that instant.
-            w[at(LOW, i, j, W, L)] = min(area2, 1.0 - dt * decay)
+            w[at(LOW, i, j, W, L)] = area2
     for p in range(W * L):
         count += 1 if w[NEAR * W * L + p] < 0.0 else 0
     for j in range(L):
@@ -107,25 +108,32 @@ def joined(arms, w, j, W, L):
     return solve2(m11, m12, m22, fx, fy)
 
 
+@leaf
+def asked(arms, w, j, W, L, kx, ky, dt):
+    """Steps of equal length that friction asks of a run that accelerates with (kx, ky) in a hold; 0.0 where all its
+    drives move so fast that friction is constant."""
+    sharpness, m11, m12, m22 = w[of(SHARPNESS, j, W, L)], -0.0, -0.0, -0.0
+    for i in range(W):
+        m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
+    stiff, fast, near = 0.0, 0.0, 0.0
+    for i in range(W):
+        f, row = w[at(FRICTION, i, j, W, L)], (w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)])
+        rate, acc = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)]
+        a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, (kx, ky), dt)
+        stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
+    return near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
+
+
 @outlined
 def count_steps(lanes, arms, extra, w, dt):
-    """Steps of equal length that each run needs in a hold because of friction, and BEND, 0.0 where all its drives move
-    so fast that friction is constant in it; returns the largest number, or 0.0 where that is so in all runs."""
+    """Steps that each run needs in a hold because of friction, and BEND, 0.0 where it is constant in it; returns the
+    largest number, or 0.0 where that is so in all runs."""
     L, W = len(lanes), len(arms)
     most = 0.0
     for j in range(L):
-        sharpness, m11, m12, m22 = w[of(SHARPNESS, j, W, L)], -0.0, -0.0, -0.0
-        for i in range(W):
-            m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
-        stiff, fast, near, k = 0.0, 0.0, 0.0, (w[of(KX, j, W, L)], w[of(KY, j, W, L)])
-        for i in range(W):
-            f, row = w[at(FRICTION, i, j, W, L)], (w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)])
-            rate, acc = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)]
-            a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, k, dt)
-            stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
+        n = asked(arms, w, j, W, L, w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
         w[of(STEPS, j, W, L)] = max(1.0, n)
-        w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else sharpness
+        w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else w[of(SHARPNESS, j, W, L)]
         w[of(STEP, j, W, L)] = dt / max(1.0, n) if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.
         most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else min(n, 1.0))

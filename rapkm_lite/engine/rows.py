@@ -33,10 +33,9 @@ PLACE, OTHER = MOTION + 9, MOTION + 17
 BLOCKS = OTHER + 8
 
 # Run rows: the state, its acceleration, that of a stage, the sums of a step, its length, how many there are, the
-# sharpness of the friction law in them; the pose,
-# the two before it, its velocity, what its search needs; the joints of a law, their gains; reference rate, acceleration
-# and force of a law, F^T F; sums of a study, turns that a drive is away from its path, how it ended; the environment as
-# in `tables.environment`.
+# sharpness of the friction law in them; the pose, the two before it, its velocity, what its search needs; the joints of
+# a law, their gains; reference rate, acceleration and force of a law, F^T F; sums of a study, turns that a drive is
+# away from its path, how it ended; what `edge` keeps of a sample; the environment as in `tables.environment`.
 (
     X, Y, VX, VY, KX, KY,
     SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS, BEND,
@@ -44,10 +43,11 @@ BLOCKS = OTHER + 8
     JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS,
     REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
     TORQUE2, ANTAGONISM, MISS2, FARTHEST, AROUND, STATUS, SAMPLE,
+    NEAR_EDGE, WAS_X, WAS_Y, WAS_VX, WAS_VY,
     GRAVITY_X, GRAVITY_Y, SHARPNESS,
-) = range(53)  # fmt: skip
+) = range(58)  # fmt: skip
 # After the environment of the machine stands that of the model.
-ENVIRONMENT, SINGLES = 3, 56
+ENVIRONMENT, SINGLES = 3, 61
 
 
 @index

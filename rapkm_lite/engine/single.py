@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 
 from .arms import acting, moving, placed, slow
+from .edge import walk, watch
 from .jit import index, kernel, leaf, outlined
 from .leaves import small_angle, solve2, stiffness, turned
-from .plant import MOST_STEPS, STIFF, judge, mend
+from .plant import MOST_STEPS, SHARE, STIFF, judge, mend
 from .rows import *
 from .tables import *
 
@@ -64,7 +65,7 @@ def sense(arms, extra, table, o, w, dt):
         m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, links, vx, vy)
         scale = w[SCALE * W + i]
         s, t = turned(links, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
-        w[NEAR * W + i] = min(0.1 - abs(s), t)
+        w[NEAR * W + i] = min(min(0.1 - abs(s), t), SHARE - dt * decay)
         angle = small_angle(s)
         w[Q * W + i], w[QD * W + i] = desired(table, o, w, ANGLE, i, W, 1) + angle, rate
         w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - desired(table, o, w, RATE, i, W, 1)
@@ -73,7 +74,7 @@ def sense(arms, extra, table, o, w, dt):
         w[FX * W + i], w[FY * W + i] = fx, fy
         if extra is not None:
             w[ACC * W + i] = acc
-        w[LOW * W + i] = min(area2, 1.0 - dt * decay)
+        w[LOW * W + i] = area2
         put_place(arms, OTHER, w, i, x + 0.5 * dt * vx, y + 0.5 * dt * vy)
     near = w[NEAR * W]
     for i in range(1, W):
@@ -166,9 +167,14 @@ def brake(arms, extra, w):
 
 
 @leaf
-def hold(arms, extra, w, dt):
+def hold(arms, extra, w, dt, far):
     """As `plant.hold`, without its judgement."""
     W = len(arms)
+    if far:
+        if w[of(NEAR_EDGE, 0, W, 1)] > 0.0:
+            walk(((),), arms, extra, w, 0, dt)
+            begin(arms, w)
+            return
     if extra is not None:
         brake(arms, extra, w)
     for i in range(W):
@@ -225,10 +231,12 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     W = len(arms)
     put(arms, w, x, y, vx, vy)
     begin(arms, w)
-    sense(arms, extra, table, 0, w, dt)
+    far = sense(arms, extra, table, 0, w, dt) > 0
+    if far:
+        watch(((),), arms, extra, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
-    hold(arms, extra, w, dt)
+    hold(arms, extra, w, dt, far)
     # The angles are those of the last sample that was looked at.
     move(W, w, OLD * W, w, Q * W)
     w[of(STATUS, 0, W, 1)] = DONE
