@@ -180,7 +180,7 @@ def test_prestress_stiffens_in_one_sign():
 
 
 @pytest.mark.parametrize("name", ["testbed", "four_arms", "asymmetric"])
-def test_stiffness_is_the_second_derivative_of_the_servo_energy(name):
+def test_stiffness_is_the_second_derivative_of_the_energy_of_servos_and_weight(name):
     """V(x) = sum K_i (q_i(x) - q_i0)^2 / 2 with torques c = -K (q - q0) at x0."""
     robot = MACHINES[name]
     N, x0 = robot.n_arms, random_points(robot, 1, seed=2, bend=0.4)[0]
@@ -189,8 +189,8 @@ def test_stiffness_is_the_second_derivative_of_the_servo_energy(name):
     spring = start[:N] + c / K
 
     def energy(dx, dy):
-        q = rk.inverse_kinematics(robot, x0 + [dx, dy])[:N]
-        return np.sum(K * (q - spring) ** 2) / 2
+        q = rk.inverse_kinematics(robot, x0 + [dx, dy])
+        return np.sum(K * (q[:N] - spring) ** 2) / 2 + rk.potential_energy(robot, q)
 
     h = 1e-4
     V = np.array([[energy(i * h, j * h) for j in (-1, 0, 1)] for i in (-1, 0, 1)])
@@ -198,6 +198,27 @@ def test_stiffness_is_the_second_derivative_of_the_servo_energy(name):
     xy = (V[2, 2] - V[2, 0] - V[0, 2] + V[0, 0]) / 4
     stiffness = rk.endeffector_stiffness(robot, start, K, c)
     assert_allclose(stiffness, np.array([[xx, xy], [xy, yy]]) / h**2, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_stiffness_with_weight_is_how_the_force_of_a_hanging_machine_changes(name):
+    """Held by springs just so that it rests where it is; forces at the end-effector by (6) and (7)."""
+    robot = MACHINES[name].replace(gravity=[3.0, -9.0], load=0.8)
+    N, x0 = robot.n_arms, random_points(robot, 1, seed=2, bend=0.4)[0]
+    K, start = np.linspace(5, 9, N), rk.inverse_kinematics(robot, x0)
+
+    def weight(q):
+        return rk.minimal_dynamics(robot, q, np.zeros_like(q))[2]
+
+    c = rk.weighted_pseudoinverse(rk.control_matrix(robot, start)) @ weight(start)
+
+    def force(x):
+        q = rk.inverse_kinematics(robot, x)
+        return rk.control_matrix(robot, q).T @ (c - K * (q - start)[:N]) - weight(q)
+
+    h = 1e-5
+    falls = np.stack([(force(x0 - step) - force(x0 + step)) / (2 * h) for step in h * np.eye(2)], axis=-1)
+    assert_allclose(rk.endeffector_stiffness(robot, start, K, c), falls, rtol=1e-6, atol=1e-5)
 
 
 @pytest.mark.parametrize(

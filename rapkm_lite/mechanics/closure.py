@@ -10,7 +10,7 @@ from . import cores
 from .at import at
 from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
-from .redundancy import endeffector_stiffness
+from .redundancy import base_angle_hessians
 
 
 def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int = 100) -> np.ndarray:
@@ -78,10 +78,10 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
 def _pose_hessian(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """The Hessian of half the squared residuals in x, (..., 2, 2); A^T A where it is not well positive definite.
 
-    It is the stiffness of springs of 1 N m/rad with the residuals as torques.  Where these are large, A^T A alone makes
-    steps that shrink slowly, or not at all.
+    Where the residuals are large, A^T A alone makes steps that shrink slowly, or not at all.
     """
-    square, hessian = A.mT @ A, endeffector_stiffness(robot, q, 1.0, residual)
+    square = A.mT @ A
+    hessian = square - np.einsum("...i,...ikl->...kl", residual, base_angle_hessians(robot, q))
     regular = (hessian[..., 0, 0] > 0.0) & (np.linalg.det(hessian) > 1e-3 * np.linalg.det(square))
     return np.where(regular[..., None, None], hessian, square)
 

@@ -120,10 +120,11 @@ def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[n
 
 
 def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
-    """Stiffness (..., 2, 2) in N/m of PD drives at rest: K_x = A^T K_P A - sum_i c_i d2 q_i / dx2.
+    """Stiffness (..., 2, 2) in N/m of PD drives at rest: K_x = A^T K_P A - sum_i c_i d2 q_i / dx2 + d2 V / dx2.
 
     The force that a displaced end-effector feels is -K_x dx.  The second term comes from the torques c (..., N) in N m
     that are there at rest, such as a prestress along the null vector: it stiffens in one sign and softens in the other.
+    The last one is that of gravity, with the potential energy V; a machine in a horizontal plane has none.
     K_P : number, (N,) or (N, N), N m/rad.  c : default none.
     Raises ValueError at the edge of the workspace.
 
@@ -139,7 +140,20 @@ def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
     K = A.mT @ gain @ A
     if c is not None:
         K = K - np.einsum("...i,...ikl->...kl", c, base_angle_hessians(robot, pose.q))
-    return K
+    return K + _weight_hessian(robot, pose) if robot.gravity.any() else K
+
+
+def _weight_hessian(robot: Manipulator, pose) -> np.ndarray:
+    """d2 V / dx2 of the potential energy, (..., 2, 2) in N/m.
+
+    As d = x - base - a, only the proximal links a matter: d2 a_i / dx2 = (E a_i) d2 q_i / dx2 - a_i A_i^T A_i with the
+    quarter turn E.
+    """
+    gx, gy = robot.gravity
+    moment = (robot.arm_moments / robot.lengths) @ [1.0, -1.0]
+    along, across = moment * (pose.a @ [gx, gy]), moment * (pose.a @ [gy, -gx])
+    bent = np.einsum("...i,...ikl->...kl", across, base_angle_hessians(robot, pose.q))
+    return pose.A.mT @ (along[..., None] * pose.A) - bent
 
 
 def base_angle_hessians(robot: Manipulator, q) -> np.ndarray:
