@@ -20,6 +20,7 @@ from matplotlib.text import Text
 import rapkm_lite as rk
 from rapkm_lite import explore, plotting
 from rapkm_lite.explore.controls import moved, snap
+from rapkm_lite.explore.shared import usual_gains
 from rapkm_lite.figures.marks import encode, figure, workspace_outline
 
 matplotlib.use("agg")
@@ -667,6 +668,34 @@ def test_a_machine_of_another_size_fills_the_pictures_alike(times):
         np.testing.assert_allclose(times * own, same, atol=0.011)
     own, same = (values(explore.allocation(r), "torques") for r in (other, robot))
     np.testing.assert_allclose(own, same, atol=0.11)
+
+
+@pytest.mark.parametrize("times, heavier", [(0.05, 1e-3), (50.0, 1e3)])
+def test_gains_go_with_the_inertia_of_a_machine(times, heavier):
+    """Lengths and masses scale: with gains that go with mass and length squared, all angles are the same."""
+    robot, torque = rk.load().replace(friction=0.0), heavier * times**2
+    scaled = {name: times * getattr(robot, name) for name in ("base", "lengths", "centers")}
+    heavy = {"masses": heavier * robot.masses, "inertias": torque * robot.inertias}
+    other = robot.replace(rotor_inertia=torque * robot.rotor_inertia, **scaled, **heavy)
+    gains = usual_gains(robot)
+    assert gains == (7.05, 0.225)
+    for own, same in zip(usual_gains(other), gains, strict=True):
+        assert 0.5 < own / (torque * same) < 1.3
+    for name in ("animation", "decentralized_run", "imperfections", "steady_state", "three_opinions", "via_points"):
+        assert not getattr(explore, name)(other).problem
+    angles = explore.steady_state(other).numbers["error at rest, theory"]
+    assert angles == explore.steady_state(robot).numbers["error at rest, theory"]
+
+
+def test_an_edge_that_no_arm_reaches_is_shortened():
+    base = [[0.3, 0.0], [0.1, 0.28], [-0.25, 0.2], [-0.2, -0.22], [0.12, -0.3]]
+    lengths = [[0.25, 0.3], [0.28, 0.24], [0.3, 0.22], [0.21, 0.33], [0.26, 0.26]]
+    assert_sound(explore.via_points(rk.Manipulator(base=base, lengths=lengths, masses=0.1)))
+
+
+def test_a_machine_of_ones_own_is_made_of_rods_whatever_the_given_one_is_made_of():
+    odd = rk.load().replace(centers=0.18, inertias=1e-3, friction=0.0)
+    assert explore.own_machine(odd).numbers == explore.own_machine().numbers
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -26,7 +26,9 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
     positive_number("step", step)
     whole = all(isinstance(v, int) for v in (low, high, step, value))
     kind = widgets.IntSlider if whole else widgets.FloatSlider
-    form = {} if whole else {"readout_format": f".{max(0, math.ceil(-math.log10(step) - 1e-9))}f"}
+    digits = max(0, math.ceil(-math.log10(step) - 1e-9))
+    digits += not math.isclose(round(step, digits), step, rel_tol=1e-9)  # 0.25 has one more than 0.2
+    form = {} if whole else {"readout_format": f".{digits}f"}
     return kind(value, min=low, max=high, step=step, description=label, **form, **_COMMON)
 
 

@@ -14,15 +14,25 @@ from ..figures.style import ALARM, NEUTRAL
 from ..machine.arguments import matvec
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
-from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics, reachable, working_modes
 from ..mechanics.trajectory import triangle
 from ..simulation.energy import antagonistic_energy, antagonistic_torque, copper_loss
 from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
-from .controls import choice, log_slider, offset_sliders, slider, switch
+from .controls import choice, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import beyond, central_triangle, distance_panels, draw_distance, frictionless, over_time, ready_made
+from .shared import (
+    beyond,
+    carried,
+    central_triangle,
+    distance_panels,
+    draw_distance,
+    frictionless,
+    gain_slider,
+    over_time,
+    ready_made,
+    usual_gains,
+)
 
 FAULTS = {
     "nothing": [],
@@ -43,11 +53,12 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     robot = load() if robot is None else robot
     path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
     needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
+    usual = usual_gains(robot)
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
-        law = PD(K_P, 0.225 * np.sqrt(K_P / 7.05))
+        law = PD(K_P, usual[1] * np.sqrt(K_P / usual[0]))
         law, lost = AntagonismFilter(law) if filter else law, ""
         try:
             run = simulate(built, law, path, model=robot, faults=[TorqueLimit(1e-3 * limit), *FAULTS[fault]])
@@ -67,7 +78,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
     controls = {
         "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
-        "K_P": log_slider("K_P in N m/rad", 2.0, 50.0, 7.05),
+        "K_P": gain_slider(robot, low=2.0),
         "limit": slider("torque limit in mN m", 40 * strong, 400 * strong, 10 * strong, 150 * strong),
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),
@@ -84,13 +95,10 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5)
-    q = inverse_kinematics(robot, marks.middle(robot))
-    A, inertia = act.control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
-    # N m s^2: what a gain of PD in N m/rad has to carry for one in 1/s^2, on the mean of both modes.
-    carried = 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
+    mass = carried(robot)
     laws = {
-        "PD": lambda k, d: PD(carried * k, carried * d),
-        "PD and filter": lambda k, d: AntagonismFilter(PD(carried * k, carried * d)),
+        "PD": lambda k, d: PD(mass * k, mass * d),
+        "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),
         "computed torque, fixed pair": CTC,
         "computed torque, switched pair": SwitchedCTC,
         "computed torque, end-effector": lambda k, d: CTC(k, d, None),
@@ -136,7 +144,8 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     def draw(picture, radius, proximal, distal, load, mode):
         lengths = 1e-3 * np.array([proximal, distal])
         base = centre + 1e-3 * radius * out
-        own = robot.replace(base=base, lengths=lengths, masses=ROD * lengths, load=load, mode=modes[mode])
+        rods = {"lengths": lengths, "masses": ROD * lengths, "centers": None, "inertias": None}
+        own = robot.replace(base=base, load=load, mode=modes[mode], **rods)
         middle = marks.middle(own)
         picture.line("machine", *(middle + way).T, color=NEUTRAL, linewidth=1.2, zorder=1)
         if reachable(own, middle):

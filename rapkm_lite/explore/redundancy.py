@@ -60,12 +60,12 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
         } | stop
 
     times = size(robot)
-    # It begins with three quarters of a newton on the testbed, elsewhere with no more than the drives can do.
+    # It begins with three quarters of a newton on the testbed, elsewhere with less than the drives can do.
     first = 0.0
     with suppress(ValueError):  # where the middle is out of reach, or the drives let go
         A = control_matrix(robot, inverse_kinematics(robot, marks.middle(robot)))
         reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
-        first = min(0.75, 0.05 * np.floor(20 * reach * times)) / times
+        first = min(0.75, 0.05 * np.floor(18 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},

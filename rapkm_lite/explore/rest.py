@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache, partial
 
 import numpy as np
@@ -17,9 +18,20 @@ from ..mechanics.kinematics import cross, inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
 from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
-from .controls import log_slider, offset_sliders
+from .controls import offset_sliders
 from .explorer import Explorer, explorer
-from .shared import curves, frictionless, held_machine, length_slider, over_time, place_sliders, ready_made, size
+from .shared import (
+    curves,
+    frictionless,
+    gain_slider,
+    held_machine,
+    length_slider,
+    over_time,
+    place_sliders,
+    ready_made,
+    size,
+    usual_gains,
+)
 
 
 @ready_made
@@ -30,14 +42,14 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     '-23.6 / -23.4 / -23.6 mN m'
     """
     robot = frictionless(robot)
-    N = robot.n_arms
+    N, usual = robot.n_arms, usual_gains(robot)
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
         offset = marks.offset_values(values, N)
         K_P = np.array([values[f"K_P_{i + 1}"] for i in range(N)])
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
-        K_D = 0.225 * np.sqrt(K_P / 7.05)
+        K_D = usual[1] * np.sqrt(K_P / usual[0])
         point, q, stop = held_machine(picture, "plane", robot, x, y)
         A = act.control_matrix(robot, q)
         weight = act.required_wrench(robot, q, 0 * q, 0 * q)
@@ -72,7 +84,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
-    controls |= {f"K_P_{i + 1}": log_slider(f"K_P {i + 1} in N m/rad", 1.0, 50.0, 7.05) for i in range(N)}
+    controls |= {f"K_P_{i + 1}": gain_slider(robot, f"K_P {i + 1} in N m/rad") for i in range(N)}
     controls |= place_sliders(robot, 0, 0)
     layout = [["plane", "error"], ["rest", "torque"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
@@ -142,7 +154,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
-    controls |= {"K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05)}
+    controls |= {"K_P": gain_slider(robot)}
     controls |= place_sliders(robot, 20, 30, -100, 100, 5, "desired ")
     return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
 
@@ -161,8 +173,10 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=marks.middle(robot) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    cost = 7.05**2 * np.trace(form(120 * size(robot), 40 * size(robot)))  # J/mrad^2, where the controls start
+    times = size(robot)
+    cost = usual_gains(robot)[0] ** 2 * np.trace(form(120 * times, 40 * times))  # J/mrad^2, where the controls start
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
+    digits = max(0, 2 - math.ceil(math.log10(2.0 * levels[0])))
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
@@ -196,8 +210,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         shares = costs * (directions.T @ dq) ** 2
         for k, share in enumerate(shares):
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
-            picture.text("shares", k + 1, share, f"{share:.2f}", ha="center", va="bottom", fontsize=9)
-        picture.fit("shares", 1.2 * shares, symmetric=False, least=0.5)
+            picture.text("shares", k + 1, share, f"{share:.{digits}f}", ha="center", va="bottom", fontsize=9)
+        picture.fit("shares", 1.2 * shares, symmetric=False, least=levels[0])
         step = min(0.22, 0.88 / robot.n_arms)
         directions *= np.where(directions.sum(axis=0) < 0, -1, 1)
         for (i, k), component in np.ndenumerate(directions):
@@ -207,9 +221,9 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")
         return {
-            "antagonistic energy": f"{dq @ S @ dq:.2f} J",
-            "trace of S": f"{np.trace(S):.3f} J/mrad²",
-            "principal costs": " / ".join(f"{c:.3f}" for c in np.maximum(costs, 0)) + " J/mrad²",
+            "antagonistic energy": f"{dq @ S @ dq:.{digits}f} J",
+            "trace of S": f"{np.trace(S):.{digits + 1}f} J/mrad²",
+            "principal costs": " / ".join(f"{c:.{digits + 1}f}" for c in np.maximum(costs, 0)) + " J/mrad²",
         }
 
     arms = [(words, {"color": look["color"], "linewidth": 7}) for words, look in marks.drive_lines(robot)]
@@ -223,7 +237,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 30.0, 7.05),
+        "K_P": gain_slider(robot, high=30.0),
         "side": length_slider(robot, "side of the triangle in mm", 20, 240, 10, 120),
         "shift": length_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40),
     }

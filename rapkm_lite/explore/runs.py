@@ -14,13 +14,14 @@ from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..lessons.lesson07.tasks import set_points
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
+from ..mechanics.kinematics import reachable
 from ..mechanics.trajectory import polygon
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, over_time, ready_made, size
+from .shared import central_triangle, curves, frictionless, gain_slider, over_time, ready_made, size, usual_gains
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -34,7 +35,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     N = robot.n_arms
-    friction = robot.friction if np.any(robot.friction) else load().friction[0]
+    damping = usual_gains(robot)[1]
+    friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
     paths, table = {"centred triangle": central_triangle(robot)}, None
     if robot.replace(friction=0.0) == load().replace(friction=0.0):
@@ -71,8 +73,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {
-        "K_P": log_slider("K_P in N m/rad", 1.0, 50.0, 7.05),
-        "K_D": log_slider("K_D in N m s/rad", 0.02, 1.0, 0.225),
+        "K_P": gain_slider(robot),
+        "K_D": log_slider("K_D in N m s/rad", damping / 0.225 * 0.02, damping / 0.225, damping),
         "filter": choice("antagonism filter", LAWS.keys()),
         "friction": switch("friction", True),
         "encoder": choice("encoder counts per turn", counts),
@@ -96,7 +98,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=8)
     def recorded(filter: str, offsets: bool):
-        run = simulate(robot, LAWS[filter](PD(7.05, 0.225)), path, offsets * some)
+        run = simulate(robot, LAWS[filter](PD(*usual_gains(robot))), path, offsets * some)
         A = act.control_matrix(robot, run.q)
         return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
 
@@ -164,9 +166,11 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     '0.0 mN m'
     """
     robot = frictionless(robot)
-    # The lower edge of the triangle of `central_triangle`.
+    # The lower edge of the triangle of `central_triangle`, or as much of it as all arms reach.
     wide = np.ptp(robot.base[:, 0]) / (0.4 if robot.n_arms > 2 else 0.6)
-    ends = marks.middle(robot) + np.array([[-0.12, -0.07], [0.12, -0.07]]) * wide
+    line, middle = wide * np.linspace([-0.12, -0.07], [0.12, -0.07], 49), marks.middle(robot)
+    parts = (part for part in np.linspace(1.0, 0.1, 19) if reachable(robot, middle + 1.1 * part * line).all())
+    ends = middle + next(parts, 0.1) * line[[0, -1]]
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
@@ -175,7 +179,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
-        q_a, law = between(legs).copy(), PD(7.05, 0.225)
+        q_a, law = between(legs).copy(), PD(*usual_gains(robot))
         q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
         done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
         return done, antagonistic_torque(done)

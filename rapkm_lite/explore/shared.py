@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 
 import numpy as np
@@ -11,11 +12,12 @@ import numpy as np
 from ..figures import marks
 from ..figures.style import AFTER, ALARM
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.actuation import force_polygon
+from ..mechanics.actuation import control_matrix, force_polygon
+from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.maps import sampling_box
 from ..mechanics.trajectory import Trajectory, triangle
-from .controls import slider
+from .controls import log_slider, slider
 from .explorer import Explorer
 
 
@@ -39,9 +41,34 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
 def size(robot: Manipulator) -> float:
     """Width of the workspace relative to the testbed's, rounded to 1, 2 or 5 times a power of ten."""
     left, right, low, high = sampling_box(robot)
-    wide = 1.25 * max(min(right - left, high - low), 1e-6) / 0.4
-    power = 10 ** math.floor(math.log10(wide))
-    return next(n for n in (5, 2, 1) if n * power <= wide) * power
+    return _rounded(max(min(right - left, high - low), 1e-6) / 0.4)
+
+
+def _rounded(ratio: float) -> float:
+    """1, 2 or 5 times a power of ten, that is at most 1.25 times the ratio."""
+    power = 10 ** math.floor(math.log10(1.25 * ratio))
+    return next(n for n in (5, 2, 1) if n * power <= 1.25 * ratio) * power
+
+
+def carried(robot: Manipulator) -> float:
+    """What a gain of PD in N m/rad has to carry for one in 1/s^2, N m s^2: the mean of both modes in the middle."""
+    q = inverse_kinematics(robot, marks.middle(robot))
+    A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
+    return 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
+
+
+def usual_gains(robot: Manipulator) -> tuple[float, float]:
+    """K_P in N m/rad and K_D in N m s/rad that make a machine about as fast as the testbed's make the testbed."""
+    heavier = 1.0
+    with suppress(ValueError):  # where the middle is out of reach
+        heavier = _rounded(carried(robot) / carried(load()))
+    return heavier * 7.05, heavier * 0.225
+
+
+def gain_slider(robot: Manipulator, label: str = "K_P in N m/rad", low: float = 1.0, high: float = 50.0):
+    """A slider of K_P; the numbers are the testbed's."""
+    K_P = usual_gains(robot)[0]
+    return log_slider(label, K_P / 7.05 * low, K_P / 7.05 * high, K_P)
 
 
 def length_slider(robot, label: str, low: float, high: float, step: float, value: float, middle: float = 0.0):
