@@ -38,7 +38,7 @@ function drawers() {
 
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
 function reach() {
-  const wide = "pre, table, .table-wrapper, .wide-picture, .formula, mjx-container[display=true]";
+  const wide = "pre, table, .table-wrapper, .wide-picture, .formula, .math-wrapper, mjx-container[display=true]";
   for (const box of document.querySelectorAll(`article :is(${wide})`))
     if (box.clientWidth && box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
@@ -46,7 +46,5 @@ function reach() {
 
 addEventListener("DOMContentLoaded", names);
 addEventListener("DOMContentLoaded", drawers);
-for (const event of ["load", "resize"]) addEventListener(event, reach);
-addEventListener("load", () => window.MathJax?.startup?.promise?.then(reach));
-// What was folded has its width once it is open.
-addEventListener("toggle", reach, true);
+// The page grows when formulas are set, pictures come and folds open, and with the window.
+addEventListener("DOMContentLoaded", () => new ResizeObserver(reach).observe(document.body));
