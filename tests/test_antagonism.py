@@ -35,8 +35,8 @@ def test_rest_always_exists_below_the_threshold():
             assert not rk.rest_exists(robot, q, K_P, offset, QUANTUM, friction)
 
 
-def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction, reach=2):
-    """Some counts near the ideal ones, read by a displacement x, whose torques are a prestress up to friction?
+def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction):
+    """Some counts that a displacement x reads, and whose torques are a prestress up to friction?
 
     Unknowns are the counts (N, whole), x scaled, and the prestress along the null basis; both strips are rows.
     """
@@ -48,12 +48,11 @@ def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction, reach=
     about = np.concatenate([middle - (q[:N] + offset) / quantum, -K_P * (quantum * middle - q[:N]) / friction])
     half = np.repeat([0.5, 1.0], N)
     free = rows.shape[1] - N
-    limits = np.repeat([reach, np.inf], [N, free])
     found = milp(
         np.zeros(N + free),
         constraints=LinearConstraint(rows, about - half, about + half),
         integrality=np.repeat([1, 0], [N, free]),
-        bounds=Bounds(-limits, limits),
+        bounds=Bounds(-np.inf, np.inf),
     )
     return found.status == 0
 
@@ -69,10 +68,61 @@ def test_places_of_rest_against_integer_programming(name):
         for factor in (1.0, 1.8, 5.0):
             gain = factor * 2 * 4.2e-3 / QUANTUM
             ours = rk.rest_exists(robot, q, gain, offset, QUANTUM, 4.2e-3)
-            # Counts further off than two would ask for torques beyond all friction here.
             assert ours == rest_by_integer_programming(robot, q, gain, offset, QUANTUM, 4.2e-3)
             seen.add(ours)
     assert seen == {True, False}
+
+
+FAR_RESTS = [
+    (
+        [1, 1, 1],
+        [0.06154574, -0.09502867],
+        [2.90013065, 49.3899056, 0.25709937],
+        [9.38408833e-05, -4.67328777e-03, -1.77959597e-02],
+        0.006503879507520728,
+    ),
+    (
+        [1, -1, 1],
+        [-0.05223648, -0.08965521],
+        [0.16004569, 12.31600793, 9.32792317],
+        [0.02749419, 0.01189974, -0.01351195],
+        0.0053973233164045726,
+    ),
+]
+
+
+@pytest.mark.parametrize("case", FAR_RESTS, ids=range(2))
+def test_a_soft_drive_rests_many_counts_from_the_ideal_place(case):
+    mode, x, K, offset, friction = case
+    robot = rk.load().replace(mode=mode)
+    q = rk.inverse_kinematics(robot, x)
+    assert rk.rest_exists(robot, q, K, offset, 3e-3, friction)
+    assert rest_by_integer_programming(robot, q, np.array(K), np.array(offset), 3e-3, friction)
+
+
+@pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
+@pytest.mark.parametrize("ratio", [1.0, 30.0, 1000.0])
+def test_places_of_rest_of_drives_with_unequal_gains(name, ratio):
+    rng = np.random.default_rng(int(ratio))
+    seen = []
+    for _ in range(12):
+        robot = rk.load(name)
+        robot = robot.replace(mode=rng.choice([-1, 1], robot.n_arms))
+        q = rk.inverse_kinematics(robot, rng.uniform(-0.06, 0.06, 2))
+        K = 0.1 * ratio ** rng.permutation(np.linspace(0.0, 1.0, robot.n_arms))
+        offset = rng.uniform(-0.03, 0.03, robot.n_arms)
+        # The stiffest drive rounds by more than its friction holds.
+        friction = QUANTUM * K.max() * 10 ** rng.uniform(-1.5, -0.5)
+        seen.append(rk.rest_exists(robot, q, K, offset, QUANTUM, friction))
+        assert seen[-1] == rest_by_integer_programming(robot, q, K, offset, QUANTUM, friction)
+    assert {*seen} == {True, False}
+
+
+def test_gains_too_unequal_to_try_all_counts_are_refused():
+    robot = rk.load()
+    q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    with pytest.raises(ValueError, match=r"K_P is so unequal .* counts from .*; allowed: gains that differ less"):
+        rk.rest_exists(robot, q, [1e-8, 1.0, 1e-8], np.zeros(3), QUANTUM, 0.4 * QUANTUM)
 
 
 @pytest.mark.parametrize("name", ["five_bar", "four_arms"])

@@ -207,7 +207,8 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     than the friction of each drive: a place of rest exists, to first order about q and with exact rates.  It does for
     K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is another question.
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
-    Raises ValueError at input singularities, and for values out of range.
+    Raises ValueError at input singularities, for values out of range, and for gains so unequal that there are too many
+    counts to try (one a million times another, say).
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)
@@ -218,27 +219,55 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
     friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
     A = control_matrix(robot, q)
-    ideal = desired + steady_state_error(A, K_P, offset) + offset
-    counts = _readable(A, np.rint(ideal / quantum), (desired + offset) / quantum)
-    c = -matvec(positive_definite("K_P", K_P, N), quantum * counts - desired)
+    zero = (desired + offset) / quantum
+    ideal = zero + steady_state_error(A, K_P, offset) / quantum
+    K = positive_definite("K_P", K_P, N)
+    if np.all(np.abs(K).sum(axis=-1) * quantum <= 2 * friction):
+        return True
+    counts = _readable(A, ideal, _reach(A, K, friction / quantum), zero)
+    c = -matvec(K, quantum * counts - desired)
     # Slabs |c_i - n_i| <= friction in the null space share a point if all but any one of them do (Helly): a bound on
     # the virtual work of the end-effector's motions that keep that drive still.
     still = cross(A[:, None], A)
     return bool(np.any(np.all(np.abs(c @ still.T) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
 
 
-def _readable(A: np.ndarray, near: np.ndarray, zero: np.ndarray) -> np.ndarray:
-    """Counts (k, N) within 4 of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
+def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:
+    """How many counts (N,) those of a rest differ from the ideal ones at most, for a friction of `ratio` per count.
 
-    Strips of the plane share a point if every three of them do (Helly).
+    At a rest the angles read differ from the true ones by a rounding r, |r_i| <= 1/2 count, and the torques from a
+    prestress by p, |p_i| <= friction.  Their equilibrium A^T K (A x + offset + r) + A^T p = 0, all in counts, makes
+    counts - ideal = (1 - S K) r - S p with S = A (A^T K A)^-1 A^T: soft drives are carried far by the others' friction.
     """
-    steps = np.arange(-4, 5)
+    S = A @ np.linalg.solve(A.T @ K @ A, A.T)
+    reach = np.abs(np.eye(len(A)) - S @ K).sum(axis=-1) / 2 + ratio * np.abs(S).sum(axis=-1)
+    if np.prod(np.sort(2 * reach + 1)[:2]) > 1e6:
+        raise ValueError(
+            f"K_P is so unequal that a drive may rest {reach.max():.3g} counts from where exact angles let it, "
+            "too many to try; allowed: gains that differ less"
+        )
+    return reach
+
+
+def _readable(A: np.ndarray, near: np.ndarray, reach: np.ndarray, zero: np.ndarray) -> np.ndarray:
+    """Counts (k, N) within `reach` of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
+
+    Strips of the plane share a point if every three of them do (Helly).  Where n_i A_i + n_j A_j + n_k A_k = 0, two
+    counts leave an interval for the third.  The drives of the smallest reach come first.
+    """
+    order = np.argsort(reach)
+    A, zero, lowest, highest = A[order], zero[order], (near - reach)[order] - 1e-3, (near + reach)[order] + 1e-3
     counts = np.zeros((1, 0))
     for k in range(len(A)):
-        column = np.tile(near[k] + steps, len(counts))[:, None]
-        counts = np.concatenate([np.repeat(counts, len(steps), axis=0), column], axis=-1)
+        low, high = np.full(len(counts), lowest[k]), np.full(len(counts), highest[k])
         for i, j in itertools.combinations(range(k), 2):
             n = np.array([cross(A[j], A[k]), cross(A[k], A[i]), cross(A[i], A[j])])
-            off = (counts[:, [i, j, k]] - zero[[i, j, k]]) @ n
-            counts = counts[np.abs(off) <= np.abs(n).sum() / 2]
-    return counts
+            off, half = (counts[:, [i, j]] - zero[[i, j]]) @ n[:2], np.abs(n).sum() / 2
+            with np.errstate(divide="ignore", invalid="ignore"):  # parallel strips i, j: no bound, or no count at all
+                ends = zero[k] + np.sort([(-half - off) / n[2], (half - off) / n[2]], axis=0)
+            low, high = np.fmax(low, ends[0]), np.fmin(high, ends[1])
+        first = np.ceil(low)
+        number = np.maximum(np.floor(high) - first + 1, 0).astype(int)
+        steps = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+        counts = np.column_stack([np.repeat(counts, number, axis=0), np.repeat(first, number) + steps])
+    return counts[:, np.argsort(order)]
