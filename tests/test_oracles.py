@@ -75,32 +75,43 @@ def test_forward_dynamics_agrees_with_pinocchio(name):
         assert_allclose(-reactions[k, :2], force, atol=1e-8 * np.abs(reactions[k]).max())
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_closed_loop_run_agrees_with_mujoco(name):
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
-    robot = MACHINES[name].replace(friction=0.0)
-    law, path = rk.experiment(name).law, rk.experiment(name).trajectory
-    offset = np.array([0.004, -0.002, 0.005, 0.001])[: robot.n_arms]
-    run = rk.simulate(robot, law, path, offset)
+def default_run(name):
+    """The frictionless default experiment of a machine, with offsets."""
+    offset = np.array([0.004, -0.002, 0.005, 0.001])[: MACHINES[name].n_arms]
+    given = rk.experiment(name)
+    return rk.simulate(MACHINES[name].replace(friction=0.0), given.law, given.trajectory, offset)
 
-    step = 2.5e-4
+
+def tips_in_mujoco(run, step):
+    """Samples k of a run and the tips (N, 2) that MuJoCo puts there, with this timestep and the same PD law."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e .[oracles]")
+    robot, law, path, N = run.robot, run.law, run.trajectory, run.robot.n_arms
     model = mujoco.MjModel.from_xml_string(rk.to_mjcf(robot, path.q[0], step))
     state = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, state, 0)
-    base = [model.joint(f"base{i + 1}").qposadr[0] for i in range(robot.n_arms)]
-    tips = [model.site(f"tip{i + 1}").id for i in range(robot.n_arms)]
-    error = gap = 0.0
-    for k in range(len(path)):
+    base = [model.joint(f"base{i + 1}").qposadr[0] for i in range(N)]
+    tips = [model.site(f"tip{i + 1}").id for i in range(N)]
+    for k in range(0, len(path), max(1, round(step / path.dt))):
         mujoco.mj_kinematics(model, state)
-        at = state.site_xpos[tips][:, :2]
-        error, gap = max(error, np.abs(at[1] - run.x[k]).max()), max(gap, np.abs(at - at[1]).max())
-        state.ctrl[:] = -law.K_P * (state.qpos[base] + offset - path.q_a[k]) - law.K_D * (
-            state.qvel[base] - path.qd_a[k]
-        )
-        mujoco.mj_step(model, state, round(path.dt / step))
+        yield k, state.site_xpos[tips][:, :2]
+        error, rate = state.qpos[base] + run.offset - path.q_a[k], state.qvel[base] - path.qd_a[k]
+        state.ctrl[:] = -law.K_P * error - law.K_D * rate
+        mujoco.mj_step(model, state, max(1, round(path.dt / step)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_closed_loop_run_agrees_with_mujoco(name):
+    run = default_run(name)
+    error = max(np.abs(tips[1] - run.x[k]).max() for k, tips in tips_in_mujoco(run, 2.5e-4))
     assert np.abs(run.error).max() > 1e-3  # the run has something to disagree about
-    assert gap < 1e-8
     assert error < 1e-6, f"largest distance {error:.3g} m"
+
+
+@pytest.mark.parametrize(("step", "most"), [(2.5e-4, 3e-9), (1e-3, 3e-8), (2e-3, 1e-7), (5e-3, 6e-7)])
+@pytest.mark.parametrize("name", NAMES)
+def test_loops_stay_closed_in_mujoco_at_any_timestep(name, step, most):
+    gap = max(np.abs(tips - tips[1]).max() for _, tips in tips_in_mujoco(default_run(name), step))
+    assert gap < most, f"largest gap {gap:.3g} m"
 
 
 def test_mjcf_says_what_the_machine_is():
