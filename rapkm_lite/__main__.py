@@ -83,7 +83,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     grades.set_defaults(run=_grade)
     options = parser.parse_args(arguments)
     try:
-        return options.run(options) or 0
+        options.run(options)
+        print(end="", flush=True)
+        return 0
+    except BrokenPipeError:
+        # Who reads along, such as `head`, has enough; the interpreter flushes once more when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

@@ -51,6 +51,17 @@ def test_summary_for_people_names_the_machine_and_both_tables():
         assert word in done.stdout
 
 
+@pytest.mark.skipif(os.name == "nt", reason="a closed pipe is another error there")
+def test_a_reader_that_has_enough_is_no_error_to_tell():
+    """As `| head -1`, but sure to have closed the pipe before the first line."""
+    read, write = os.pipe()
+    os.close(read)
+    own = [sys.executable, "-m", "rapkm_lite"]
+    done = subprocess.run(own, stdout=write, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    os.close(write)
+    assert done.returncode == 1 and done.stderr == b""
+
+
 def test_lessons_are_copied_without_outputs_and_solutions(tmp_path):
     target = tmp_path / "my lessons"
     assert command("lessons", str(target)).returncode == 0
