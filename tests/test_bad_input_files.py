@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
-from rapkm_lite.machine.datafiles import UNITS_OF
+from rapkm_lite.machine.datafiles import UNITS_OF, read_toml
 
 # What works, key by key; every case below differs from it in one place.
 GOOD = {
@@ -97,6 +97,18 @@ def test_numbers_of_a_log_hold_no_underscore(tmp_path, number):
         rk.read_log(file)
 
 
+@pytest.mark.parametrize("number", ["-1e200", "1e200", "-inf", "nan"])
+def test_numbers_of_a_log_are_finite_and_within_reason(tmp_path, number):
+    file = tmp_path / "own.csv"
+    rk.write_log(rk.Log("own", [0.0], *np.zeros((3, 1, 3))), file)
+    head, row = file.read_text(encoding="utf-8").splitlines()
+    cells = row.split(",")
+    cells[4] = number
+    file.write_text("\n".join([head, ",".join(cells)]), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"line 2, column 5 \(q1 desired in rad\) holds"):
+        rk.read_log(file)
+
+
 @pytest.mark.parametrize("N", [1, 2, 3, 5])
 def test_a_log_written_is_the_log_read_to_the_last_bit(tmp_path, N):
     random = np.random.default_rng(N)
@@ -118,6 +130,15 @@ def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target)
     assert not list(tmp_path.iterdir())
 
 
+def test_a_gap_of_a_log_is_half_a_step_too_long(tmp_path):
+    t = np.array([0.0, 0.01, 0.02, 0.03, 0.044])
+    rk.write_log(rk.Log("late", t, *np.zeros((3, 5, 3))), tmp_path / "late.csv")
+    assert rk.read_log(tmp_path / "late.csv").t[-1] == 0.044
+    t[-1] = 0.047
+    with pytest.raises(ValueError, match=r"line 6, column 1: after 0\.03 s"):
+        rk.write_log(rk.Log("gap", t, *np.zeros((3, 5, 3))), tmp_path / "gap.csv")
+
+
 def test_every_key_of_every_table_is_tried():
     assert {t: set(keys) for t, keys in GOOD.items()} == {t: set(k) for t, k in UNITS_OF.items() if t != "fault"}
     assert {"kind"}.union(*FAULTS.values()) == set(UNITS_OF["fault"])
@@ -136,6 +157,18 @@ def test_a_unit_of_a_fault_is_checked_and_named(said, kind):
         entries = FAULTS[kind] | {key: f"{{value = {FAULTS[kind][key]}, unit = 'furlong'}}"}
         more = f"[[fault]]\nkind = '{kind}'\n" + "".join(f"{k} = {v}\n" for k, v in entries.items())
         assert f"{key} in [fault] has the unit 'furlong'" in said(text(more=more))
+
+
+@pytest.mark.parametrize(
+    ("key", "unit", "other"), [("jump", "rad", "mrad"), ("limit", "N m", "N"), ("time", "s", "ms")]
+)
+def test_numbers_of_faults_are_in_si_units(tmp_path, key, unit, other):
+    file = tmp_path / "mine.toml"
+    file.write_text(f"[[fault]]\n{key} = {{value = 0.5, unit = '{unit}'}}\n", encoding="utf-8")
+    assert read_toml(file)["fault"][0][key] == 0.5
+    file.write_text(f"[[fault]]\n{key} = {{value = 0.5, unit = '{other}'}}\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=f"{key} in .* has the unit '{other}'; allowed: '{unit}'"):
+        read_toml(file)
 
 
 @pytest.mark.parametrize(("table", "key"), KEYS)

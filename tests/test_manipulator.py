@@ -106,6 +106,13 @@ def test_bad_values_are_named(key, value, message):
         rk.Manipulator(**(GOOD | {key: value}))
 
 
+def test_centres_of_mass_are_on_their_links():
+    for bad in (0.21, [0.1, 0.21], -0.01):
+        with pytest.raises(ValueError, match=r"centers = .* m; allowed: on the link"):
+            TESTBED.replace(centers=bad)
+    assert TESTBED.replace(centers=0.2).centers.max() == 0.2
+
+
 def test_a_machine_without_inertia_is_refused():
     # All mass of the distal links in the elbows, none of it turning with them: the elbow joints would move freely.
     with pytest.raises(ValueError, match=r"inertias = .* positive definite mass matrix"):
@@ -237,3 +244,9 @@ def test_arms_meet_where_their_circles_cross_in_any_frame(turn):
         assert rk.reachable(rk.Manipulator(base=base @ R.T, lengths=0.1025, masses=1.0), [0.0, 0.0])
         with pytest.raises(ValueError, match="arms that can meet"):
             rk.Manipulator(base=base @ R.T, lengths=0.0975, masses=1.0)
+
+
+def test_arms_may_meet_where_no_two_of_their_circles_cross():
+    """The outer circle of the second arm lies whole within the ring of the first, 0.8 to 1.2 m."""
+    robot = rk.Manipulator(base=[[0.0, 0.0], [0.05, 0.0]], lengths=[[1.0, 0.2], [0.5, 0.49]], masses=0.1)
+    assert rk.reachable(robot, [0.0, 0.95])

@@ -12,6 +12,7 @@ from samples import TESTBED
 
 import rapkm_lite as rk
 from rapkm_lite import explore, plotting
+from rapkm_lite.machine.arguments import real_array
 
 Q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
 A = rk.control_matrix(TESTBED, Q)
@@ -76,6 +77,14 @@ def test_other_kinds_of_numbers_count_as_what_they_are():
 def test_numbers_out_of_reason(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+@pytest.mark.parametrize("bad", [-1e200, 1e200, -np.inf, np.nan])
+def test_one_number_out_of_reason_among_thousands_is_named(bad):
+    values = np.zeros(2000)
+    values[7] = bad
+    with pytest.raises(ValueError, match=r"values\[7\] = "):
+        real_array("values", values)
 
 
 @pytest.mark.parametrize(("turns", "fits"), [(0.99, True), (1.01, False)])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.machine.likeness import equal, key
 from rapkm_lite.machine.values import Value, frozen
 
 
@@ -57,6 +58,19 @@ def test_values_are_equal_by_value():
         assert value != other
     assert Sample(np.ma.masked_less([1.0, 2.0], 1.5)) != Sample(np.ma.masked_less([1.0, 2.0], 0.5))
     assert Sample(np.array(7)) == Sample(7.0) and hash(Sample(np.array(7))) == hash(Sample(7.0))
+
+
+def test_nan_of_either_sign_is_one_key():
+    minus, plus = np.array([np.copysign(np.nan, -1.0), 1.0]), np.array([np.nan, 1.0])
+    assert minus.tobytes() != plus.tobytes()
+    assert equal(minus, plus) and key(minus) == key(plus)
+
+
+def test_what_a_mask_hides_does_not_count_and_the_mask_does():
+    hidden, shown = np.ma.array([1.0, 0.0], mask=[0, 1]), np.ma.array([1.0, 0.0], mask=[0, 0])
+    assert equal(hidden, np.ma.array([1.0, 5.0], mask=[0, 1]))
+    assert not equal(hidden, shown) and not equal(shown, hidden)
+    assert not equal(hidden, np.array([1.0, 0.0]))
 
 
 def test_a_value_prints_as_it_was_typed():
@@ -112,6 +126,11 @@ def test_values_of_the_package_stay_as_they_are(value):
                 array[(0,) * array.ndim] = 9.0
             with pytest.raises(ValueError, match="WRITEABLE"):
                 array.setflags(write=True)
+
+
+def test_the_tree_of_a_machine_is_read_only():
+    kept = arrays(rk.load().tree)
+    assert len(kept) > 10 and not any(array.flags.writeable for array in kept.values())
 
 
 @pytest.mark.parametrize("machine", ["testbed", "five_bar", "four_arms"])
@@ -236,6 +255,28 @@ def test_runs_with_laws_of_a_user_are_equal_by_value(kind):
         assert run == pickle.loads(pickle.dumps(run))
 
 
+def keyword_spring(gain):
+    def law(t, q_a, qd_a, d, *, gain=gain):
+        return -gain * (q_a - d.q_a)
+
+    return law
+
+
+def marked_spring(gain):
+    def law(t, q_a, qd_a, d):
+        return -law.gain * (q_a - d.q_a)
+
+    law.gain = gain
+    return law
+
+
+@pytest.mark.parametrize("spring", [spring_of, keyword_spring, marked_spring])
+def test_functions_differ_by_what_they_hold(spring):
+    """In a variable around them, in a default of a keyword, in an attribute."""
+    assert equal(spring(7.0), spring(7.0)) and not equal(spring(7.0), spring(8.0))
+    assert rk.AntagonismFilter(spring(7.0)) != rk.AntagonismFilter(spring(8.0))
+
+
 def test_what_cannot_be_looked_into_equals_only_itself():
     assert Sample(np.ones(1), (Shared(),)) != Sample(np.ones(1), (Shared(),))
     assert Sample(np.ones(1), (np.sin,)) == Sample(np.ones(1), (np.sin,)) != Sample(np.ones(1), (np.cos,))
@@ -286,6 +327,18 @@ def test_changed_values_of_a_users_class_stay_of_that_class():
         rk.simulate(robot, rk.compiled(lambda t, q_a, qd_a, d: np.full(3, np.nan if t > 0.05 else 0.0)), own)
     with pytest.raises(rk.SimulationError, match="K_I = 9000"):
         rk.simulate(robot, rk.PID(7.0, 9000.0, 0.2), Round(robot, 0.05).for_robot(robot), 4e-3)
+
+
+class Own(rk.Trajectory):
+    """A path of a user's."""
+
+
+def test_a_run_leaves_no_trace_on_its_path():
+    robot = rk.load()
+    used, fresh = (Own(**rk.hold(robot, [0.02, 0.05], 0.01)._fields()) for _ in range(2))
+    rk.simulate(robot, rk.PD(7.0, 0.2), used)
+    assert used == fresh and repr(used) == repr(fresh)
+    assert set(used.__getstate__()) == set(fresh.__getstate__())
 
 
 def test_fields_of_a_users_dataclass_may_come_later_or_stand_in_slots():
