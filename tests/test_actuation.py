@@ -536,6 +536,15 @@ def test_maps_mask_the_boundary_where_an_arm_is_stretched():
         assert sigma.mask[1, 1] and not sigma.mask[0, 0]
 
 
+def test_a_folded_arm_is_not_inside():
+    """With equal links an arm folds onto its base point, here the middle of nine."""
+    robot = rk.Manipulator(base=[[-0.1, 0.0], [0.1, 0.0]], lengths=0.2, masses=0.1)
+    box = (-0.11, -0.09, -0.01, 0.01)
+    inside = rk.workspace_grid(robot, 3, box)[2]
+    assert not inside[1, 1] and inside.sum() == 8
+    assert np.all(np.isfinite(rk.actuation_map(robot, n=3, box=box)[2].compressed()))
+
+
 def test_map_masks_the_input_singularity_of_a_mixed_mode():
     mode, box = next(
         (m, p)

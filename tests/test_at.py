@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from samples import MACHINES, TESTBED, machines, modes, norm, random_motion, random_points
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics.at import At
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
@@ -236,3 +237,21 @@ def test_a_textbook_law_is_the_same_through_at():
         pinv = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
         assert_allclose(pinv @ (G @ d.qdd + C @ d.qd + Q), c, atol=1e-14)
         assert_allclose(rk.inverse_dynamics(TESTBED, d.q, d.qd, d.qdd), c, atol=1e-14)
+
+
+def test_what_was_asked_before_does_not_stay_with_other_coordinates():
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    asked, fresh = rk.at(TESTBED, q), rk.at(TESTBED, q)
+    assert asked.A_T_pinv.shape == (3, 2) and isinstance(hash(asked), int)
+    other = asked.using((0, 2))
+    assert_allclose(T(other.A) @ other.A_T_pinv, np.eye(2), atol=1e-14)
+    assert other == fresh.using((0, 2)) and hash(other) == hash(fresh.using((0, 2)))
+
+
+def test_coordinates_may_be_given_at_once():
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    pose = At(TESTBED, q, None, (0, 2))
+    assert pose.independent == (0, 2) and pose == rk.at(TESTBED, q).using((0, 2))
+    assert_allclose(pose.A[[0, 2]], np.eye(2), atol=1e-14)
+    with pytest.raises(ValueError, match="independent"):
+        At(TESTBED, q, None, (0, 9))

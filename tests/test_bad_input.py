@@ -322,6 +322,12 @@ def test_rank_loss_is_named():
     refused(rk.redundant_dynamics, "q", TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]), np.zeros(6))
 
 
+def test_a_pose_of_open_loops_has_no_null_vector():
+    open_loops = Q[0] + 0.1 * np.eye(6)[0]
+    with pytest.raises(ValueError, match="q leaves the loops open"):
+        rk.null_vector(TESTBED, open_loops)
+
+
 @pytest.mark.parametrize("name", ["testbed", "four_arms"])
 def test_rates_that_open_the_loops_are_refused_where_a_motion_is_asked_for(name):
     """The sentence's remedy, N_J qd, is accepted; so are rates from closed poses a sample apart, and noise at rest."""
