@@ -115,6 +115,15 @@ def test_offsets_shift_all_laws_with_a_model_alike():
         np.testing.assert_allclose(run.x[-1] - place, shift, atol=0.03 * np.linalg.norm(shift))
 
 
+def test_a_pair_that_is_kept_is_that_of_a_fixed_law_at_the_same_pose():
+    law = rk.SwitchedCTC(K_P, K_D, hysteresis=1e6, pose="true")
+    path = rk.circle(ROBOT, 0.05, 0.3)
+    fixed = law.fixed(law.choose(ROBOT, path.q[0]))
+    kept, same = (rk.simulate(ROBOT, one, path, 1e-3 * np.array([4, -2, 5])) for one in (law, fixed))
+    np.testing.assert_allclose(kept.c, same.c, atol=1e-12)
+    assert kept.switches == 0
+
+
 def deviating():
     """A pose, rates and measured angles beside a point of the path: (q, qd, q_a, qd_a, desired)."""
     desired = PATH[900]

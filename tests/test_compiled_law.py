@@ -314,6 +314,13 @@ REFUSED = {
 }
 
 
+def test_a_compiled_law_that_was_copied_remembers_as_much():
+    law = rk.compiled(lambda t, q_a, qd_a, d, memory: -7.0 * (q_a - d.q_a), memory=3)
+    make, arguments = law.__reduce__()
+    for again in (make(*arguments), copy.copy(law), copy.deepcopy(law)):
+        assert again == law and again.memory == 3
+
+
 def test_a_decorated_law_travels():
     """The name of a decorated function is that of the law; runs go to other processes and come back as they were."""
     for law in (pid, rk.compiled(pid.function, memory=4), rk.AntagonismFilter(pid), rk.compiled(ctc, at="true")):

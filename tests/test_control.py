@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import rapkm_lite as rk
 from rapkm_lite.control.grammar import joint_gain
 from rapkm_lite.simulation import energy
+from rapkm_lite.simulation.experiments import Table1
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
 mv = lambda M, v: np.einsum("...ij,...j->...i", M, v)  # noqa: E731
@@ -528,6 +529,11 @@ def test_table_1_measured_and_simulated():
     table = rk.table1()
     assert_allclose(table.measured, [[1.3347, 1.5414, 1.6844], [0.4574, 0.7010, 1.0801]])
     assert np.abs(table.deviation).max() < 0.04  # the chapter's six energies, by one reading of many
+
+
+def test_deviations_of_table_1_are_shares_of_what_was_measured():
+    table = Table1(measured=np.full((2, 3), 2.0), simulated=np.full((2, 3), 3.0))
+    assert_allclose(table.deviation, 0.5)
 
 
 @pytest.mark.parametrize("gains", [[400.0, 0.0, 400.0], [400.0, -1.0, 400.0]])

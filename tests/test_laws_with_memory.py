@@ -134,6 +134,17 @@ def test_pid_with_anti_windup():
     )
 
 
+@pytest.mark.parametrize("which", [(0, 1, 2), (1,)], ids=["all", "integral"])
+def test_gains_of_pid_as_matrices_are_the_same_gains(which):
+    """At its limit a drive keeps its own integral, and its own only."""
+    gains, limit, offset = [7.0, 20.0, 0.2], [0.02, 1.0, 1.0], [8e-3, -2e-3, 5e-3]
+    path = rk.hold(ROBOT, [0.02, 0.05], 0.2)
+    plain = rk.simulate(ROBOT, rk.PID(*gains, limit=limit), path, offset)
+    assert np.any(np.abs(plain.c[:, 0]) >= 0.02)
+    matrices = [gain * np.eye(3) if k in which else gain for k, gain in enumerate(gains)]
+    assert_allclose(rk.simulate(ROBOT, rk.PID(*matrices, limit=limit), path, offset).c, plain.c, rtol=0, atol=1e-9)
+
+
 def test_pid_leaves_no_error_at_rest_where_pd_does():
     heavy = ROBOT.replace(gravity=(0.0, -1.0))
     stay = rk.hold(heavy, [0.02, 0.01], 4.0)
@@ -207,6 +218,24 @@ def test_filters_around_an_integral_a_callable_and_another_filter():
     assert_allclose(rk.simulate(ROBOT, twice, PATH, OFFSET).c, run.c, rtol=0, atol=1e-9)
     student = rk.simulate(ROBOT, rk.AntagonismFilter(PI(), pose="true"), PATH, OFFSET)
     assert_allclose(student.c, run.c, rtol=0, atol=1e-9)
+
+
+class Coordinates(rk.Law):
+    """It sends nothing, and says which coordinates it uses."""
+
+    pose = None
+
+    def step(self, memory, sample):
+        return np.zeros(3), memory
+
+    def coordinates(self, memory):
+        return 0, 2
+
+
+def test_a_filter_tells_the_coordinates_of_its_law():
+    path = rk.hold(ROBOT, [0.0, 0.0], 0.005)
+    run = rk.simulate(ROBOT, rk.AntagonismFilter(Coordinates()), path)
+    assert run.pairs.tolist() == [[0, 2]] * len(path)
 
 
 def test_weighted_filter_makes_the_least_heat_at_the_same_force():
@@ -317,6 +346,19 @@ def test_a_law_cannot_shift_the_path():
     assert_allclose(run.c, rk.simulate(ROBOT, PD, PATH, OFFSET).c, rtol=0, atol=1e-9)
     inside = rk.simulate(ROBOT, rk.AntagonismFilter(own), PATH, OFFSET)
     assert_allclose(inside.c, rk.simulate(ROBOT, rk.AntagonismFilter(PD), PATH, OFFSET).c, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["q_a", "qd_a"])
+def test_a_law_of_a_class_cannot_change_what_was_measured(name):
+    class Writes(rk.Law):
+        pose = None
+
+        def step(self, memory, sample):
+            getattr(sample, name)[0] += 0.1
+            return np.zeros(3), memory
+
+    with pytest.raises(ValueError, match="read-only"):
+        rk.simulate(ROBOT, Writes(), PATH)
 
 
 VALUES = {
