@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rapkm_lite as rk
 from rapkm_lite.simulation.faults import Fault, fault_table
+from rapkm_lite.simulation.sensors import Sensors
+from rapkm_lite.simulation.setup import prepare
 
 ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.02, duration=0.3)
@@ -308,6 +310,23 @@ def test_a_new_fault_that_marks_wrongly_is_named(drive, write, words):
     for call in (rk.simulate, rk.sweep):
         with pytest.raises(ValueError, match=words):
             call(ROBOT, PD, PATH, OFFSET, faults=[Wrong()])
+
+
+def test_a_new_fault_that_raises_is_the_cause_of_its_error():
+    class Odd(Fault):
+        def mark(self, table, t):
+            raise KeyError("here")
+
+    with pytest.raises(ValueError, match="mark raised KeyError") as caught:
+        rk.simulate(ROBOT, PD, PATH, faults=[Odd()])
+    assert isinstance(caught.value.__cause__, KeyError)
+
+
+def test_the_beginning_of_a_run_has_the_beginning_of_its_faults():
+    begun = prepare(ROBOT, PATH, Sensors(), faults=[rk.OffsetJump(0, 0.005, 1e-3)]).begin(11)
+    assert len(begun.trajectory) == 11
+    for name in ("alive", "held", "jump"):
+        assert len(getattr(begun.faults, name)) == 11
 
 
 TOML = """

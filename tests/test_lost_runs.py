@@ -226,6 +226,19 @@ def test_angles_that_fit_no_pose():
     consistent(jump, 5)
 
 
+class AsksForItsPose(rk.Law):
+    def step(self, memory, sample):
+        sample.pose("measured")
+        return np.zeros(3), memory
+
+
+def test_a_law_that_asks_for_a_pose_is_told_why_there_is_none():
+    still = rk.hold(ROBOT, [0.02, 0.05], 0.01)
+    error = lost(ROBOT, AsksForItsPose(), still, faults=[rk.OffsetJump(i, 0.005, (3, -2, 1)[i]) for i in range(3)])
+    assert "fit no pose" in error.reason and isinstance(error.__cause__, rk.ConvergenceError)
+    assert type(error.__cause__.__cause__) is rk.ConvergenceError  # of the search itself
+
+
 def test_a_singularity_of_the_coordinates():
     path = rk.triangle(ROBOT, duration=1.5)
     error = lost(ROBOT, rk.CTC(900.0, 60.0, (1, 2)), path, OFFSET)
@@ -513,6 +526,19 @@ def test_a_law_is_to_blame_up_to_a_milliard_radians_per_second(rate):
     with pytest.raises(rk.SimulationError, match=words):
         rk.simulate(ROBOT, law, path)
     np.testing.assert_allclose(rates[1], rate, rtol=0.02)
+
+
+def test_a_throw_within_one_hold_is_the_last_row():
+    """The law that then raises is not to blame, and has no row."""
+
+    def law(t, q_a, qd_a, desired):
+        assert np.abs(qd_a).max() < 1e9
+        return np.array([1e19, 0.0, 0.0]) * (t > 4.5e-12)
+
+    error = lost(ROBOT, law, rk.hold(ROBOT, [0.02, 0.05], 20e-12, dt=1e-12))
+    part = error.partial
+    assert "the machine left the workspace" in error.reason and error.time == pytest.approx(part.t[-1])
+    assert part.c[-1, 0] == 1e19 and np.abs(part.x - [0.02, 0.05]).max() < 1e-2
 
 
 def test_a_law_that_failed_in_a_later_chunk_is_not_run_again():

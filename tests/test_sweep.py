@@ -128,6 +128,40 @@ def test_a_law_that_fails_at_the_last_sample_has_failed_in_a_study_too(offset):
     assert row.failed[0] or not any(offset)
 
 
+def test_reasons_of_a_study_are_found_with_its_model():
+    """A model in another working mode loses the run; the right one would not."""
+    model, law, path = ROBOT.replace(mode=[1, -1, 1]), rk.CTC(400.0, 40.0), rk.circle(ROBOT, 0.05, 0.3)
+    study = rk.sweep(ROBOT, [law, law], path, np.zeros((2, 3)), model=model, failed="mask")
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(ROBOT, law, path, model=model)
+    assert study.failed.all() and study.reasons == 2 * (caught.value.reason,)
+    assert not rk.sweep(ROBOT, law, path, np.zeros((1, 3))).failed.any()
+
+
+def test_the_run_that_a_study_raises_has_the_offsets_of_its_row():
+    offsets = [[1e-3, 0.0, 0.0], [0.0, 2e-3, 0.0]]
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.sweep(ROBOT, [PD, rk.PD(7.05, 30.0)], rk.hold(ROBOT, [0.0, 0.0], 0.1), offsets)
+    assert caught.value.run == 1 and caught.value.partial.offset.tolist() == offsets[1]
+
+
+def test_a_study_ends_a_row_where_angles_fit_no_pose_at_the_sample_of_its_run():
+    path, law = rk.hold(ROBOT, [0.02, 0.05], 0.01), rk.AntagonismFilter(PD)
+    jumps = [rk.OffsetJump(i, 0.005, (3.0, -2.0, 1.0)[i]) for i in range(3)]
+    study = rk.sweep(ROBOT, law, path, np.zeros((2, 3)), faults=jumps, failed="mask")
+    with pytest.raises(rk.SimulationError, match="fit no pose") as caught:
+        rk.simulate(ROBOT, law, path, faults=jumps)
+    assert study.failed.all() and study.failure_time.tolist() == 2 * [caught.value.time]
+    assert caught.value.time == pytest.approx(0.005)
+
+
+def test_antagonistic_energy_of_unlike_drives_is_that_of_their_runs():
+    robot = ROBOT.replace(resistance=[0.3, 0.6, 1.2], torque_constant=[0.02, 0.03, 0.04])
+    study = rk.sweep(robot, PD, PATH, OFFSETS[:2])
+    runs = [rk.simulate(robot, PD, PATH, offset) for offset in OFFSETS[:2]]
+    np.testing.assert_allclose(study.antagonistic_energy, [rk.antagonistic_energy(run) for run in runs], rtol=1e-9)
+
+
 def test_pythagoras():
     """reference.md, fact 6: of every torque c a true-pose filter R saves (R / k_t^2) int ||c_null||^2 dt."""
     study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])
@@ -230,6 +264,14 @@ def test_result_is_an_array_of_energies():
     study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])
     assert len(study) == 3 and np.asarray(study).shape == (3, 3) and study.energy is study.energies
     assert repr(study).startswith("Sweep(3 runs, 0 failed, total energy ")
+
+
+@pytest.mark.parametrize("of", [np.array, np.asarray])
+def test_an_array_made_of_a_study_is_the_callers_own(of):
+    study = rk.sweep(ROBOT, PD, PATH, OFFSETS[:3])
+    before, mine = study.energies.copy(), of(study)
+    mine[:] = 0.0
+    np.testing.assert_array_equal(study.energies, before)
 
 
 CLOSED = ThreadPoolExecutor(1)
