@@ -4,17 +4,21 @@ import csv
 import json
 import os
 import re
+import time
 import tracemalloc
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import rapkm_lite
 from rapkm_lite.__main__ import main
 from rapkm_lite.checks import exercises
-from rapkm_lite.lessons.grading.grader import Grade, grade
-from rapkm_lite.lessons.grading.submission import called, found, hides_check, needed, sources, statements
+from rapkm_lite.lessons.grading import grader
+from rapkm_lite.lessons.grading.grader import Grade, grade, grade_one
+from rapkm_lite.lessons.grading.submission import Submission, called, found, hides_check, needed, sources, statements
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
-from rapkm_lite.lessons.grading.worker import nowhere
+from rapkm_lite.lessons.grading.worker import Bench, nowhere
 
 SETUP = "import numpy as np\nimport rapkm_lite as rk\nfrom rapkm_lite.checks import check, hint\n%matplotlib inline"
 TORQUES = "def filtered_torques(A, c):\n    return A @ np.linalg.solve(A.T @ A, A.T @ c)\n"
@@ -122,6 +126,46 @@ def test_the_tables_count_mistakes_and_points(graded, tmp_path):
     assert line.split()[2] == "10"
 
 
+def test_cells_that_a_spreadsheet_would_calculate_are_text(tmp_path):
+    words = ["=1+1", "+1", "-1", "@x", "\t=1", "ada = 1"]
+    write_csv(tmp_path / "grades.csv", [Grade(word, NAMES[0], "ok", -1.0, 1.0, word, word) for word in words])
+    with (tmp_path / "grades.csv").open(newline="", encoding="utf-8") as lines:
+        rows = list(csv.DictReader(lines))
+    shown = [*(f"'{word}" for word in words[:-1]), words[-1]]
+    assert [row["student"] for row in rows] == shown and [row["sentence"] for row in rows] == shown
+    assert {row["points"] for row in rows} == {"-1.0"}
+
+
+def test_a_close_answer_is_no_mistake_in_the_table():
+    wrong, close = Grade("ada", "04.x", "wrong", 0, 1, "", "sign"), Grade("ben", "04.x", "close", 1, 1, "", "rounded")
+    said = by_exercise([wrong, close])
+    assert "1 x sign" in said and "rounded" not in said
+
+
+def test_a_lesson_that_was_not_handed_in_has_no_points_and_a_wrong_one_has_zero():
+    grades = [Grade("ada", "04.x", "wrong", 0.0, 5.0, "", ""), Grade("ben", "05.y", "ok", 3.0, 3.0, "", "")]
+    lines = [line.split() for line in by_student(grades).splitlines()]
+    assert lines[1:3] == [["ada", "0", "-", "0", "5"], ["ben", "-", "3", "3", "3"]]
+
+
+@pytest.mark.parametrize("names", [("04_a.ipynb", "04_b.ipynb"), ("04_b.ipynb", "04_a.ipynb")])
+def test_of_two_notebooks_with_as_many_points_the_newer_one_counts(names, tmp_path, monkeypatch):
+    for name, age in zip(names, (2e9, 1e9), strict=True):
+        write(tmp_path / "ada" / name, [SETUP])
+        os.utime(tmp_path / "ada" / name, (age, age))
+    monkeypatch.setattr(
+        grader, "grade_one", lambda one, _: [Grade(one.student, NAMES[0], "ok", 1.0, 1.0, "", "", str(one.path))]
+    )
+    assert [Path(one.file).name for one in grade(tmp_path)] == [names[0]]
+
+
+@pytest.mark.parametrize(("word", "share"), [("ok", 1), ("close", 1), ("wrong", 0), ("todo", 0)])
+def test_right_and_close_answers_have_all_points_and_others_none(word, share, monkeypatch):
+    monkeypatch.setattr(grader, "_results", lambda *_, **__: ({NAMES[0]: (word, "", "")}, False))
+    own = {one.exercise: one for one in grade_one(Submission("ada", Path("04_x.ipynb"), "04"), 1.0)}[NAMES[0]]
+    assert own.verdict == word and own.points == share * own.of and own.of > 0
+
+
 @pytest.mark.parametrize("place", ["nowhere/grades.csv", ".", "x" * 300])
 def test_a_place_for_the_file_is_looked_at_before_grading(place, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("rapkm_lite.lessons.grading.grader.grade", lambda *_: pytest.fail("it graded"))
@@ -175,6 +219,36 @@ def test_names_of_a_function_are_its_own():
         "print(answer(1))\n",
     ]
     assert [s.key for s in needed(statements(texts)[0], {"answer"})] == ["0.0", "0.3", "1.0"]
+
+
+ANSWER = "def answer(q):\n    return x * q\n"
+
+
+def keys(text):
+    return [s.key for s in needed(statements([text])[0], {"answer"})]
+
+
+def test_a_value_that_is_replaced_is_not_needed():
+    assert keys("x = 1 / 0\nx = 3\n" + ANSWER) == ["0.1", "0.2"]
+
+
+def test_variables_of_a_comprehension_are_its_own():
+    assert keys("x = 3\nrows = [x / 0 for x in range(3)]\n" + ANSWER) == ["0.0", "0.2"]
+
+
+def test_what_sets_the_seed_is_needed_and_what_sets_the_printing_is_not():
+    text = "import numpy as np\nnp.random.seed(1)\nnp.set_printoptions()\nx = np.random.rand()\n"
+    assert keys(text + ANSWER) == ["0.0", "0.1", "0.3", "0.4"]
+
+
+def test_what_sets_an_attribute_is_needed():
+    text = "class Box:\n    pass\nbox = Box()\nsetattr(box, 'one', 1.0)\nprint(box)\n"
+    assert keys(text + ANSWER.replace("x", "box.one")) == ["0.0", "0.1", "0.2", "0.4"]
+
+
+def test_what_a_function_uses_is_needed_though_the_function_is_replaced_later():
+    text = "def g(q):\n    return a * q\na = 1\nx = g(2)\ndef g(q):\n    return q\n"
+    assert keys(text + ANSWER) == ["0.0", "0.1", "0.2", "0.4"]
 
 
 def test_answers_without_a_check_are_looked_for_by_the_names_that_the_lessons_use():
@@ -338,3 +412,79 @@ def test_folders_without_submissions_are_refused(tmp_path, capsys):
         found(tmp_path, {"04"})
     assert main(["grade", str(tmp_path)]) == 2
     assert "allowed: a folder with notebooks" in capsys.readouterr().err
+
+
+# What the worker does with one notebook.
+def right(A, c):
+    return A @ np.linalg.solve(A.T @ A, A.T @ c)
+
+
+def wrong(A, c):
+    return -right(A, c)
+
+
+@pytest.fixture
+def bench(tmp_path):
+    return Bench("04", tmp_path / "log", set())
+
+
+def test_without_a_check_the_last_answer_counts(bench):
+    bench.bound[NAMES[0]] = [(0, wrong), (0, right)]
+    assert bench.without_check(NAMES[0], [f'"{NAMES[0]}"']).word == "ok"
+    bench.bound[NAMES[0]].reverse()
+    assert bench.without_check(NAMES[0], [f'"{NAMES[0]}"']).word == "wrong"
+
+
+def test_the_rest_of_a_cell_that_failed_is_left_out(bench):
+    texts = ["filtered_torques = 1.0\n1 / 0\nfiltered_torques = 2.0\n", "filtered_torques = 3.0\n"]
+    bench.run(statements(texts)[0], texts)
+    assert bench.bound[NAMES[0]] == [(0, 1.0), (1, 3.0)]
+    assert "ZeroDivisionError" in bench.failed[0]
+
+
+def test_a_later_answer_replaces_a_verdict_and_a_blank_one_does_not(bench):
+    for answer, word in ((right, "ok"), (..., "ok"), (wrong, "wrong")):
+        bench.check(NAMES[0], answer)
+        assert bench.results[NAMES[0]].word == word
+
+
+def test_the_worker_imports_the_package_that_grades_and_is_not_strict(monkeypatch):
+    monkeypatch.setenv("RAPKM_LITE_STRICT", "1")
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    own = grader._environment()
+    assert own["RAPKM_LITE_STRICT"] == "0"
+    assert own["PYTHONPATH"].split(os.pathsep) == [str(Path(rapkm_lite.__file__).parents[1]), "elsewhere"]
+
+
+def graded_alone(folder, before):
+    """The verdict on a right answer that needs `one`, which the statements before it make."""
+    body = TORQUES.replace("return A", "return one * A")
+    write(folder / "04_x.ipynb", [SETUP, before, body + CHECKS[0]])
+    return {g.exercise: g.verdict for g in grade_one(Submission("ada", folder / "04_x.ipynb", "04"), 15.0)}[NAMES[0]]
+
+
+def test_files_of_a_student_are_written_elsewhere(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert graded_alone(tmp_path, "one = [open('mine.txt', 'w').close(), 1.0][1]") == "ok"
+    assert not list(Path().iterdir())
+
+
+COUNTER = "import sys, time\nfor _ in range(200):\n    open(sys.argv[1], 'a').write('x')\n    time.sleep(0.05)\n"
+STARTS = """import subprocess, sys, time
+from pathlib import Path
+mark = {mark!r}
+one = [subprocess.Popen([sys.executable, "-c", {code!r}, mark]), 1.0][1]
+while not Path(mark).exists() or not Path(mark).stat().st_size:
+    one = [time.sleep(0.01), 1.0][1]
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="groups of processes are another thing there")
+def test_what_a_notebook_started_ends_with_it(tmp_path):
+    """A process that would write for ten seconds."""
+    mark = tmp_path / "alive"
+    assert graded_alone(tmp_path, STARTS.format(mark=str(mark), code=COUNTER)) == "ok"
+    written = mark.stat().st_size
+    time.sleep(1.0)
+    assert mark.stat().st_size == written
