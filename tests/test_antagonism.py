@@ -36,7 +36,7 @@ def test_rest_always_exists_below_the_threshold():
 
 
 def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction):
-    """Some counts that a displacement x reads, and whose torques are a prestress up to friction?
+    """Some counts that a displacement x reads, and whose torques carry the weight up to a prestress and friction?
 
     Unknowns are the counts (N, whole), x scaled, and the prestress along the null basis; both strips are rows.
     """
@@ -45,7 +45,9 @@ def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction):
     middle = np.rint((q[:N] + rk.steady_state_error(A, K_P, offset) + offset) / quantum)
     one, stiff = np.eye(N), K_P * quantum / friction
     rows = np.block([[-one, A / np.abs(A).max(), 0 * Z], [stiff * one, 0 * A, Z]])
-    about = np.concatenate([middle - (q[:N] + offset) / quantum, -K_P * (quantum * middle - q[:N]) / friction])
+    carries = rk.weighted_pseudoinverse(A) @ rk.required_wrench(robot, q, 0 * q, 0 * q)
+    torque = -K_P * (quantum * middle - q[:N]) - carries
+    about = np.concatenate([middle - (q[:N] + offset) / quantum, torque / friction])
     half = np.repeat([0.5, 1.0], N)
     free = rows.shape[1] - N
     found = milp(
@@ -57,10 +59,11 @@ def rest_by_integer_programming(robot, q, K_P, offset, quantum, friction):
     return found.status == 0
 
 
+@pytest.mark.parametrize("load", [0.0, 0.3], ids=["lying", "hanging"])
 @pytest.mark.parametrize("name", ["testbed", "four_arms"])
-def test_places_of_rest_against_integer_programming(name):
+def test_places_of_rest_against_integer_programming(name, load):
     """Counts, strips and friction as one integer programme: below the threshold, near it, far above."""
-    robot, rng = rk.load(name), np.random.default_rng(6)
+    robot, rng = rk.load(name).replace(load=load, gravity=[0.0, -9.81 * (load > 0)]), np.random.default_rng(6)
     seen = set()
     for _ in range(4):
         q = rk.inverse_kinematics(robot, rng.uniform(-0.05, 0.05, 2))

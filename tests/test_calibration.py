@@ -443,6 +443,18 @@ def test_under_the_filter_torques_are_mute_and_angles_are_not():
     assert "mute" in rk.calibrate(FRICTIONLESS, log, use="torques", K_P=7.05).note
 
 
+def test_a_filter_is_seen_behind_the_weight_of_a_hanging_machine():
+    """The torques carry the weight, and so follow the sag, but nothing in them presses."""
+    robot, logs = FRICTIONLESS.replace(gravity=[0.0, -9.81]), []
+    for x in random_points(robot, 8, seed=3, bend=0.4):
+        path = rk.hold(robot, x, 2.0)
+        run = rk.simulate(robot, rk.AntagonismFilter(rk.PD(30.0, 0.8)), path, OFFSET[:3])
+        logs.append(log_of(run, path, OFFSET[:3]))
+    with pytest.raises(ValueError, match="as under an antagonism filter"):
+        rk.calibrate(robot, logs, use="torques")
+    assert "the torques are mute" in rk.calibrate(robot, logs, use="torques", K_P=30.0).note
+
+
 def log_behind_friction(sides, f_c=4.2e-3, K_P=7.05, records=20):
     """A log of PD drives at 12 places, each approached from the given sides; the sensor reads c + side f_c."""
     x = np.repeat(random_points(FRICTIONLESS, 12, seed=6, bend=0.5), len(sides), axis=0)

@@ -500,6 +500,13 @@ def test_what_is_no_run_is_refused_by_the_functions_of_runs(ask, reads):
             ask(SimpleNamespace(**{key: value for key, value in known.items() if key != name}))
 
 
+def test_antagonism_form_belongs_to_the_path_wherever_the_set_points_are():
+    path = rk.circle(FRICTIONLESS, 0.05, 1.0, 5e-3)
+    moved = path.with_set_points(path.q_a + 4e-3 * np.array([1.0, -1.0, 1.0]))
+    form = rk.antagonism_form(FRICTIONLESS, path, 7.05)
+    assert_allclose(rk.antagonism_form(FRICTIONLESS, moved, 7.05), form, rtol=1e-12)
+
+
 def test_antagonism_form_is_that_of_the_machine_not_of_the_one_that_the_path_was_made_for():
     """In another working mode the same path has other matrices; a run tells."""
     path, offset = rk.circle(FRICTIONLESS, 0.05, 5.0, centre=(0.0, 0.02)), np.array([0.004, -0.002, 0.005])

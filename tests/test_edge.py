@@ -81,6 +81,28 @@ def test_no_hold_makes_or_loses_energy_at_the_edge(robot):
     assert np.median(low) < 0.1, "most runs end at the edge"
 
 
+@pytest.mark.parametrize(
+    "inside, speed, dt", [(1e-4, 0.5, 5e-4), (1e-4, 0.5, 1e-3), (1e-5, 0.1, 1e-3), (1e-5, 0.0, 1e-2)]
+)
+def test_an_arm_that_leaves_the_edge_takes_no_energy_along(inside, speed, dt):
+    """From a place `inside` the reach of the first arm, away from the edge: as stiff as the way there."""
+    robot = rk.load().replace(friction=0.0)
+    out = robot.base[0] / np.linalg.norm(robot.base[0])
+    t = dt * np.arange(5)
+    x = robot.base[0] - out * (robot.lengths[0].sum() - inside) + speed * t[:, None] * out
+    path = rk.follow(robot, t, x, np.tile(speed * out, (5, 1)), 0.0 * x)
+    sag = [-0.05, 0.0, 0.0] if speed == 0.0 else 0.0
+    law = rk.PD(7.05, 0.225)
+    for one in (law, lambda t, q_a, qd_a, want: -7.05 * (q_a - want.q_a) - 0.225 * (qd_a - want.qd_a)):
+        try:
+            run = rk.simulate(robot, one, path, sag)
+        except rk.SimulationError as error:
+            run = error.partial
+        kinetic, work = rk.kinetic_energy(robot, run.q, run.qd), np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=-1)
+        assert len(work) > 0
+        np.testing.assert_allclose(np.diff(kinetic), work, rtol=0, atol=1e-6 * kinetic.max())
+
+
 def test_a_run_beside_one_at_the_edge_does_not_feel_it():
     path, offsets = rk.hold(HEAVY, [-0.04, -0.07], 0.1), np.array([[0.0, 0.0, 0.0], [4e-3, -2e-3, 5e-3]])
     weak, firm = rk.PD(1e-12, 1e-12), rk.PD(20.0, 0.5)

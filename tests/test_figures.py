@@ -384,6 +384,18 @@ def test_a_machine_of_another_size_and_place_is_in_the_same_frame(world, times, 
     assert ax.get_ylim()[0] < ax.lines[-1].get_ydata().min() < ax.lines[-1].get_ydata().max() < ax.get_ylim()[1]
 
 
+def test_accelerations_of_a_hanging_machine_are_those_of_all_torques_and_its_weight():
+    robot = rk.load().replace(gravity=[0.0, -9.81], friction=0.0)
+    ax = plotting.plot_accelerations(robot, [[0.0, 0.0]], 0.3)[0]
+    q = rk.inverse_kinematics(robot, [0.0, 0.0])
+    corners = 0.3 * np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    at = rk.at(robot, q)
+    right = np.linalg.lstsq(at.F, rk.forward_dynamics(robot, q, 0 * q, corners)[0].T, rcond=None)[0]
+    shown = ax.patches[0].get_xy()
+    np.testing.assert_allclose(shown.min(axis=0), right.min(axis=1), atol=1e-9)
+    np.testing.assert_allclose(shown.max(axis=0), right.max(axis=1), atol=1e-9)
+
+
 def test_places_at_the_rim_are_seen(world):
     ax = plotting.plot_places(world["robot"], {"low": [[0.0, -0.12]], "left": [[-0.15, 0.05]]})[1]
     for line in ax.lines[:2]:

@@ -145,6 +145,26 @@ def test_quantized_angles_and_filtered_rates():
     np.testing.assert_allclose(run.c, rk.simulate(ROBOT, PD, path, OFFSET, **sensors).c, rtol=0, atol=1e-9)
 
 
+def test_a_run_that_begins_in_motion_measures_its_rates_from_the_start():
+    """A filter without delay reads the true rates at the first sample, and a delay begins with them."""
+    t = np.linspace(0.0, 0.2, 201)
+    turn = 2 * np.pi * t
+    out, along = (
+        0.1 * np.stack(part, axis=-1) for part in ((np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn)))
+    )
+    path = rk.follow(ROBOT, t, out, 2 * np.pi * along, -((2 * np.pi) ** 2) * out)
+    for law in (rk.PD(7.05, 0.225), rk.RedundantCTC(400.0, 40.0)):
+        ideal = rk.simulate(ROBOT, law, path)
+        for delay in (0.0, 5e-3):
+            run = rk.simulate(ROBOT, law, path, velocity_filter=delay)
+            np.testing.assert_allclose(run.c[0], ideal.c[0], rtol=0, atol=1e-12)
+    law, ideal = rk.PD(7.05, 0.225), rk.simulate(ROBOT, rk.PD(7.05, 0.225), path)
+    for faults in ((), [rk.EncoderDropout(drive, 0.0, 2e-3) for drive in range(3)]):
+        runs = [rk.simulate(ROBOT, one, path, velocity_filter=5e-3, faults=faults) for one in (law, textbook(law))]
+        np.testing.assert_allclose(runs[0].c, runs[1].c, rtol=0, atol=1e-9)
+    assert np.abs(runs[0].c[0] - ideal.c[0]).max() > 0.1, "a silent encoder shows no rate"
+
+
 def test_mirrored_machine():
     """Mirroring x -> -x swaps arms 1 and 2 and turns every working mode sign."""
     mirror = ROBOT.replace(mode=[-1, -1, -1])

@@ -21,14 +21,14 @@ def placed(first, w, i, j, W, L, x, y):
 def moving(extra, w, i, j, W, L, links, vx, vy):
     """`share` of an arm of the machine at the velocity (vx, vy) of its tip, with gravity."""
     P, p = W * L, i * L + j
-    m11, m12, m22, fx, fy, bx, by, rate, acc, decay = share(
+    m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends = share(
         w[S1 * P + p], w[S2 * P + p], w[TIP * P + p], w[L1SQ * P + p], w[L2SQ * P + p], links, vx, vy
     )
     if extra is not None and len(extra) > 0:
         gravity = w[of(GRAVITY_X, j, W, L)], w[of(GRAVITY_Y, j, W, L)]
         gx, gy = weight(w[at(W1, i, j, W, L)], w[at(W2, i, j, W, L)], *gravity, links)
         fx, fy = fx + gx, fy + gy
-    return m11, m12, m22, fx, fy, bx, by, rate, acc, decay
+    return m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends
 
 
 @leaf

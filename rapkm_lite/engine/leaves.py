@@ -131,12 +131,19 @@ def weight(w1, w2, gx, gy, links):
 @leaf
 def share(s1, s2, tip, l1sq, l2sq, links, vx, vy):
     """An arm in the equations of motion: m11, m12, m22, fx, fy of `inertia`; b; base rate and its part of the base
-    acceleration at zero xdd; decay rate of a x d, 1/s."""
+    acceleration at zero xdd; cotangent of the elbow angle, and its rate; a x d decays with the product of both."""
     bx, by, lx, ly, ad, inv, _ = links
     base, back = bx * vx + by * vy, lx * vx + ly * vy
     base_acc, back_acc = accelerations(base, back, base, back, ad, inv, l1sq, l2sq)
     m11, m12, m22, fx, fy = inertia(s1, s2, tip, bx, by, lx, ly, base_acc, back_acc)
-    return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv * (base + back)
+    return m11, m12, m22, fx, fy, bx, by, base, base_acc, ad * inv, base + back
+
+
+@leaf
+def steep(cotangent, rate, dt):
+    """Above one where an arm is so near to its stretched or folded pose, or will be in a hold, that `edge` has to look:
+    where its elbow's sine may change by more than a twentieth, at its rate or at 5000 rad/s^2, or is below 0.3."""
+    return abs(cotangent) * (20.0 * dt * (abs(rate) + 2500.0 * dt) + 0.3)
 
 
 @leaf

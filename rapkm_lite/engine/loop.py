@@ -65,6 +65,18 @@ def real(faulty, sensor):
     return len(faulty) > 0 or sensor.quantized or sensor.filtered
 
 
+@leaf
+def smooth(lanes, arms, sensor, w, i, dt, k):
+    """The rate ED of an encoder through its low-pass; the first reading has none before it, and the true rate."""
+    L, W = len(lanes), len(arms)
+    blend = sensor.blend if k > 0 else 0.0
+    for j in range(L):
+        rate = (w[at(E, i, j, W, L)] - w[at(READ, i, j, W, L)]) / dt
+        slow = w[at(SLOW, i, j, W, L)] if k > 0 else w[at(ED, i, j, W, L)]
+        w[at(SLOW, i, j, W, L)] = slow + blend * (rate - slow)
+        w[at(ED, i, j, W, L)] = w[at(SLOW, i, j, W, L)]
+
+
 @outlined
 def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
     """Errors E, ED of real encoders: jumps of their offset, counts, dropouts, rates from their differences."""
@@ -85,12 +97,7 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
                 w[at(E, i, j, W, L)] = w[at(READ, i, j, W, L)] if k > 0 else w[at(E, i, j, W, L)]
                 w[at(ED, i, j, W, L)] = 0.0
         if sensor.filtered:
-            # Nothing to compare the first reading with.
-            blend = sensor.blend if k > 0 else 0.0
-            for j in range(L):
-                rate, slow = (w[at(E, i, j, W, L)] - w[at(READ, i, j, W, L)]) / dt, w[at(SLOW, i, j, W, L)]
-                w[at(SLOW, i, j, W, L)] = slow + blend * (rate - slow)
-                w[at(ED, i, j, W, L)] = w[at(SLOW, i, j, W, L)]
+            smooth(lanes, arms, sensor, w, i, dt, k)
         for j in range(L):
             w[at(READ, i, j, W, L)] = w[at(E, i, j, W, L)]
             w[at(E, i, j, W, L)] -= want(table, o, ANGLE, i, W)

@@ -10,14 +10,12 @@ import math
 
 from .arms import acting, moving, placed
 from .jit import leaf, outlined
-from .leaves import small_angle, solve2, stiffness, turned
+from .leaves import small_angle, solve2, steep, stiffness, turned
 from .rows import *
 from .tables import *
 
 # Largest lambda h of a Runge-Kutta step across the bend of the friction law, and the most steps.
 STIFF, MOST_STEPS = 1.0, 4000.0
-# Largest decay of an elbow's sine in a step, as a share, at the rate with which the step begins; beyond it goes `edge`.
-SHARE = 0.05
 
 
 @outlined
@@ -31,13 +29,13 @@ def sense(lanes, arms, extra, table, o, w, dt):
         ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
         for j in range(L):
             links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
-            m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(
+            m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends = moving(
                 extra, w, i, j, W, L, links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             )
             # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
             s, t = turned(links, scale * ux, scale * uy)
-            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), t), SHARE - dt * decay)
+            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), t), 1.0 - steep(cotangent, bends, dt))
             angle = small_angle(s)
             w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
             w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
@@ -85,7 +83,7 @@ def pull(lanes, arms, extra, row, w):
     for i in range(W):
         for j in range(L):
             links, area2 = placed(0, w, i, j, W, L, w[of(SX, j, W, L)], w[of(SY, j, W, L)])
-            m11, m12, m22, fx, fy, bx, by, rate, _, _ = moving(
+            m11, m12, m22, fx, fy, bx, by, rate, _, _, _ = moving(
                 extra, w, i, j, W, L, links, w[of(SVX, j, W, L)], w[of(SVY, j, W, L)]
             )
             c = acting(extra, w, i * L + j, W * L, row, rate, w[of(BEND, j, W, L)])

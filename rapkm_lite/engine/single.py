@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
+from . import edge
 from .arms import acting, moving, placed, slow
-from .edge import walk, watch
 from .jit import index, kernel, leaf, outlined
-from .leaves import small_angle, solve2, stiffness, turned
-from .plant import MOST_STEPS, SHARE, STIFF, judge, mend
+from .leaves import small_angle, solve2, steep, stiffness, turned
+from .plant import MOST_STEPS, STIFF, judge, mend
 from .rows import *
 from .tables import *
 
@@ -62,10 +62,10 @@ def sense(arms, extra, table, o, w, dt):
     fetch(RATE, W, table, o, w)
     for i in range(W):
         links, area2 = get_place(arms, PLACE, w, i)
-        m11, m12, m22, fx, fy, bx, by, rate, acc, decay = moving(extra, w, i, 0, W, 1, links, vx, vy)
+        m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends = moving(extra, w, i, 0, W, 1, links, vx, vy)
         scale = w[SCALE * W + i]
         s, t = turned(links, scale * desired(table, o, w, COS, i, W, 1), scale * desired(table, o, w, SIN, i, W, 1))
-        w[NEAR * W + i] = min(min(0.1 - abs(s), t), SHARE - dt * decay)
+        w[NEAR * W + i] = min(min(0.1 - abs(s), t), 1.0 - steep(cotangent, bends, dt))
         angle = small_angle(s)
         w[Q * W + i], w[QD * W + i] = desired(table, o, w, ANGLE, i, W, 1) + angle, rate
         w[E * W + i], w[ED * W + i] = angle + w[OFFSET * W + i], rate - desired(table, o, w, RATE, i, W, 1)
@@ -96,7 +96,7 @@ def acceleration(arms, extra, row, place, other, w, vx, vy, x, y):
     sharpness = w[of(SHARPNESS, 0, W, 1)]
     for i in range(W):
         links, area2 = get_place(arms, place, w, i)
-        m11, m12, m22, fx, fy, bx, by, rate, _, _ = moving(extra, w, i, 0, W, 1, links, vx, vy)
+        m11, m12, m22, fx, fy, bx, by, rate, _, _, _ = moving(extra, w, i, 0, W, 1, links, vx, vy)
         c = acting(extra, w, i, W, row, rate, sharpness)
         w[M11 * W + i], w[M12 * W + i], w[M22 * W + i] = m11, m12, m22
         w[FX * W + i], w[FY * W + i] = fx + bx * c, fy + by * c
@@ -168,13 +168,8 @@ def brake(arms, extra, w):
 
 @leaf
 def hold(arms, extra, w, dt, far):
-    """As `plant.hold`, without its judgement."""
+    """As `plant.hold`, without its judgement; `far` as `loop.sense` returns it."""
     W = len(arms)
-    if far:
-        if w[of(NEAR_EDGE, 0, W, 1)] > 0.0:
-            walk(((),), arms, extra, w, 0, dt)
-            begin(arms, w)
-            return
     if extra is not None:
         brake(arms, extra, w)
     for i in range(W):
@@ -188,6 +183,9 @@ def hold(arms, extra, w, dt, far):
         x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
         x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, dt)
     w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
+    if far:
+        edge.hold(((),), arms, extra, w, dt)
+        begin(arms, w)
 
 
 @leaf
@@ -233,7 +231,7 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     begin(arms, w)
     far = sense(arms, extra, table, 0, w, dt) > 0
     if far:
-        watch(((),), arms, extra, w, dt)
+        edge.watch(((),), arms, extra, w, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
     hold(arms, extra, w, dt, far)

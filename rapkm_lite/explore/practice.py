@@ -57,7 +57,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
 
     def draw(picture, longer, K_P, limit, fault, filter):
-        built = robot.replace(lengths=(1 + 1e-3 * longer) * robot.lengths)
+        built = robot.replace(**{name: (1 + 1e-3 * longer) * getattr(robot, name) for name in ("lengths", "centers")})
         law = PD(K_P, usual[1] * np.sqrt(K_P / usual[0]))
         law, lost = AntagonismFilter(law) if filter else law, ""
         try:

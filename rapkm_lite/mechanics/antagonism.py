@@ -18,7 +18,7 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .actuation import control_matrix
+from .actuation import control_matrix, required_wrench
 from .at import at
 from .kinematics import cross
 from .linalg import product
@@ -203,10 +203,12 @@ def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
 def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: float) -> bool:
     """Is there a place of rest near the desired pose q (2N,) for PD drives with stepped angles and Coulomb friction?
 
-    True when counts exist that a pose of the closed loops reads, and whose torques differ from a prestress by no more
-    than the friction of each drive: a place of rest exists, to first order about q and with exact rates.  It does for
-    K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is another question.
-    K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : N m per drive.
+    True when counts exist that a pose of the closed loops reads, and whose torques differ by no more than the friction
+    of each drive from torques that carry the weight, prestress included: a place of rest exists, to first order about q
+    and with exact rates.  It does for K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is
+    another question.
+    K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
+    each drive.
     Raises ValueError at input singularities, for values out of range, and for gains so unequal that there are too many
     counts to try (one a million times another, say).
 
@@ -218,18 +220,18 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     desired = exact_array("q", q, robot.n_joints)[:N]
     offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
     friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
-    A = control_matrix(robot, q)
+    A, weight = control_matrix(robot, q), required_wrench(robot, q, np.zeros(2 * N), np.zeros(2 * N))
     zero = (desired + offset) / quantum
-    ideal = zero + steady_state_error(A, K_P, offset) / quantum
+    ideal = zero + steady_state_error(A, K_P, offset, weight) / quantum
     K = positive_definite("K_P", K_P, N)
     if np.all(np.abs(K).sum(axis=-1) * quantum <= 2 * friction):
         return True
     counts = _readable(A, ideal, _reach(A, K, friction / quantum), zero)
     c = -matvec(K, quantum * counts - desired)
-    # Slabs |c_i - n_i| <= friction in the null space share a point if all but any one of them do (Helly): a bound on
-    # the virtual work of the end-effector's motions that keep that drive still.
-    still = cross(A[:, None], A)
-    return bool(np.any(np.all(np.abs(c @ still.T) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
+    # Slabs |c_i - n_i| <= friction about torques n that carry the weight share a point if all but any one of them do
+    # (Helly): a bound on the virtual work of the end-effector's motions that keep that drive still.
+    still, work = cross(A[:, None], A), cross(A, weight)
+    return bool(np.any(np.all(np.abs(c @ still.T - work) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
 
 
 def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..machine.arguments import bounded
+from ..machine.arguments import bounded, matvec
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
+from . import cores
 from .at import at
-from .encoders import closure, poses
+from .encoders import poses
 
 # Fewest records of the later half of a rest, over which its means are taken.
 SHORTEST = 10
@@ -138,7 +139,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
             raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
         K_P = gain.K_P
         left = stand.c + K_P * (stand.q_a - stand.desired)
-        if np.sum(left**2) >= 0.25 * np.sum(stand.c**2):
+        if np.sum(left**2) >= 0.25 * np.sum(stand.c**2) or _filtered(robot, stand, K_P):
             raise ValueError(
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
                 "filter; allowed: the gain of the drives, or use = 'angles'"
@@ -153,10 +154,21 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     spread = spread if spread > 1e-12 else 0.0  # the rounding of means
-    felt, seen = (np.abs(closure(at(robot, poses(robot, a)), a, 0)[0]).max() for a in (angles, stand.q_a))
-    if felt < 0.1 * seen and seen > 5 * spread:
+    if filtered := _filtered(robot, stand, K_P):
+        asked, pressed = filtered
         notes.append(
-            f"the torques are mute: the angles contradict each other by {1e3 * seen:.3g} mrad, the torques by "
-            f"{1e3 * felt:.2g} mrad, as under an antagonism filter; use the angles"
+            f"the torques are mute: errors of the angles ask for {1e3 * asked:.3g} mN m that only press, and there are "
+            f"{1e3 * pressed:.2g} mN m, as under an antagonism filter; use the angles"
         )
     return angles, spread
+
+
+def _filtered(robot: Manipulator, stand: Rests, K_P: np.ndarray) -> tuple[float, float] | None:
+    """Torques in N m that only press, as the errors ask for them and as they are, where these are no tenth of those.
+
+    That is how they look behind an antagonism filter, whatever weight they carry besides.
+    """
+    n = cores.null_space(at(robot, poses(robot, stand.q_a)).A).mT
+    asked, pressed = (np.abs(matvec(n, c)).max() for c in (K_P * (stand.q_a - stand.desired), stand.c))
+    noise = np.sqrt(np.mean(stand.c_error**2))
+    return (asked, pressed) if pressed < 0.1 * asked and asked > 5 * max(noise, 1e-12) else None

@@ -12,6 +12,7 @@ from ..machine.arguments import having, matvec, of_kind, positive_number, real_a
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import steady_state_torque
+from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.sampling import PART
 from ..mechanics.trajectory import Trajectory
 
@@ -45,7 +46,8 @@ def copper_loss(robot, c, dt) -> np.ndarray:
 def mechanical_work(run) -> np.ndarray:
     """Work of the drives on the mechanism (N,) in J, over the holds c[k] (q_a[k+1] - q_a[k]).
 
-    Without friction it sums to zero over the drives on a closed path from rest to rest.
+    Without friction it sums over the drives to the energy that the machine has gained: to zero in a horizontal plane on
+    a closed path from rest to rest.
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
@@ -91,7 +93,8 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     """Symmetric S (N, N) in J/rad^2: offsets dq (N,) in rad cost about dq^T S dq of antagonistic energy along the path.
 
     S = integral of K_0^T (R_el / k_t^2) K_0 dt, where -K_0 dq are the torques at rest of the corrected (14) at each
-    point of the path: quasi-static, to first order in the offsets, without friction.
+    point of the path: quasi-static, to first order in the offsets, without friction.  Weight is left out: in a vertical
+    plane drives of unequal gains fight over it, too, and the cost of offsets has a part that is linear in them.
 
     >>> import rapkm_lite as rk
     >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)
@@ -101,7 +104,7 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     trajectory = of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
     if trajectory.n_arms != manipulator(robot).n_arms:
         raise ValueError(f"trajectory has {trajectory.n_arms} arms, robot has {robot.n_arms}; allowed: the same number")
-    A = control_matrix(robot, trajectory.for_robot(robot).q)
+    A = control_matrix(robot, inverse_kinematics(robot, trajectory.x))  # set-points may leave the path
     K_0 = -np.stack([steady_state_torque(A, K_P, unit) for unit in np.eye(robot.n_arms)], axis=-1)
     weight = robot.resistance / robot.torque_constant**2
     return np.einsum("kij,i,kil->jl", K_0[:-1], weight, K_0[:-1]) * trajectory.dt

@@ -20,7 +20,7 @@ class Sensors(Value):
     offset : calibration offsets in rad, measured minus true angle: one number or (N,).
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
-        first-order low-pass; None for the true rates.
+        first-order low-pass that begins with the true ones; None for the true rates.
     Raises ValueError for values out of range.
 
     >>> Sensors(encoder=2000)
@@ -76,7 +76,9 @@ class Encoders:
         if faults is not None and last is not None:
             angle = np.where(faults.held[k], last, angle)
         if self._tau is not None:
-            if last is not None:
+            if last is None:
+                self._slow = qd if faults is None else np.where(faults.held[k], 0.0, qd)
+            else:
                 blend = self._dt / (self._tau + self._dt)
                 self._slow = self._slow + blend * ((angle - last) / self._dt - self._slow)
             rate = self._slow.copy()

@@ -12,7 +12,7 @@ from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
 from ...figures.runs import plot_torques
 from ...figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line, axes_or_new
-from ...mechanics.actuation import control_matrix
+from ...mechanics.actuation import control_matrix, required_wrench
 from ...mechanics.antagonism import null_vector, steady_state_error, steady_state_torque
 from ...mechanics.kinematics import cross, inverse_kinematics
 
@@ -27,9 +27,9 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     >>> ax = plot_disagreement(robot, q, [4e-3, -2e-3, 5e-3], 7.05)
     """
     ax = axes_or_new(ax, figsize=(4.6, 4.4))
-    A, offset = control_matrix(robot, q), np.asarray(offset, dtype=float)
-    rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset), rcond=None)[0]
-    torque = 1e3 * steady_state_torque(A, K_P, offset)
+    A, weight, offset = control_matrix(robot, q), required_wrench(robot, q, 0 * q, 0 * q), np.asarray(offset, float)
+    rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset, weight), rcond=None)[0]
+    torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
     size = np.linalg.norm(A, axis=1)
     normal, level = A / size[:, None], -1e3 * offset / size
     # Lines that are nearly parallel meet far away, or nowhere.
@@ -93,7 +93,8 @@ def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, t
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
     x, y, inside, points = grid_points(robot, n)
     q = inverse_kinematics(robot, points)
-    torque = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset), axis=-1)
+    weight = required_wrench(robot, q, 0 * q, 0 * q)
+    torque = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset, weight), axis=-1)
     plot_map(x, y, on_grid(inside, torque), ax, vmin=0.0, label="norm of the rest torques in mN m")
     signed = on_grid(inside, null_vector(robot, q) @ np.asarray(offset, dtype=float))
     ax.contour(x, y, signed, levels=[0.0], colors="white", linewidths=1.6)

@@ -96,10 +96,10 @@ def plot_accelerations(robot, places, limit: float, axes=None):
     for ax, x in zip(axes, places, strict=True):
         q = inverse_kinematics(robot, x)
         A = control_matrix(robot, q)
-        G = minimal_dynamics(robot, q, 0 * q, None)[0]
+        G, _, weight = minimal_dynamics(robot, q, 0 * q, None)
 
-        def accelerations(force, G=G):
-            return np.linalg.solve(G, np.vstack([force, force[:1]]).T)
+        def accelerations(force, G=G, weight=weight):
+            return np.linalg.solve(G, np.vstack([force, force[:1]]).T - weight[:, None])
 
         whole = accelerations(force_polygon(A, limit))
         ax.fill(*whole, color="#DCE3EA", label="all drives")

@@ -16,7 +16,7 @@ from ...mechanics.kinematics import inverse_kinematics, wrap
 
 
 def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
-    """Norm of the rest torques of PD drives over the workspace, one map for each wrong model.
+    """Norm of the rest torques of PD drives over the workspace, without weight, one map for each wrong model.
 
     models : dict of title -> Manipulator, which demands the angles.  K_P : one gain of all drives in N m/rad.
     Returns the axes.
