@@ -44,7 +44,7 @@ def sense(lanes, arms, extra, study, history, table, o, w, dt):
         far = single.sense(arms, extra, table, o, w, dt)
     if far > 0:
         plant.mend(lanes, arms, table, o, w)
-        edge.watch(lanes, arms, extra, w, dt)
+        edge.watch(w, len(arms), len(lanes), dt)
     return far > 0
 
 
@@ -54,7 +54,7 @@ def hold(lanes, arms, extra, study, history, w, dt, far):
     if study is not None:
         plant.hold(lanes, arms, extra, w, dt)
         if far:
-            edge.hold(lanes, arms, extra, w, dt)
+            edge.hold(w, len(arms), len(lanes), dt)
     if history is not None:
         single.hold(arms, extra, w, dt, far)
 

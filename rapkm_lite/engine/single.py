@@ -184,7 +184,7 @@ def hold(arms, extra, w, dt, far):
         x, y, vx, vy = step(arms, extra, C, w, x, y, vx, vy, k1x, k1y, dt)
     w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)] = x, y, vx, vy
     if far:
-        edge.hold(((),), arms, extra, w, dt)
+        edge.hold(w, W, 1, dt)
         begin(arms, w)
 
 
@@ -231,7 +231,7 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     begin(arms, w)
     far = sense(arms, extra, table, 0, w, dt) > 0
     if far:
-        edge.watch(((),), arms, extra, w, dt)
+        edge.watch(w, len(arms), 1, dt)
     for i in range(len(c)):
         w[C * W + i] = c[i]
     hold(arms, extra, w, dt, far)
