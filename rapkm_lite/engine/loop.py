@@ -39,7 +39,8 @@ def sense(lanes, arms, extra, study, history, table, o, w, dt):
     """The machine at a sample, in the layout of a study or of a single run: is one far off or near the edge?"""
     far = 0
     if study is not None:
-        far = plant.sense(lanes, arms, extra, table, o, w, dt)
+        plant.sense(lanes, arms, extra, table, o, w)
+        far = plant.compare(lanes, arms, table, o, w, dt)
     if history is not None:
         far = single.sense(arms, extra, table, o, w, dt)
     if far > 0:

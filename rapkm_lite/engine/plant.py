@@ -19,33 +19,44 @@ STIFF, MOST_STEPS = 1.0, 4000.0
 
 
 @outlined
-def sense(lanes, arms, extra, table, o, w, dt):
-    """Base angles and rates, geometry and shares of all arms; returns 0 where no arm is far from the desired motion, or
-    near the edge."""
+def sense(lanes, arms, extra, table, o, w):
+    """Geometry, rates and shares of all arms, and the sine and cosine of their angles from the desired motion."""
     L, W = len(lanes), len(arms)
-    count = 0
     for i in range(W):
-        wanted, wanted_rate = want(table, o, ANGLE, i, W), want(table, o, RATE, i, W)
-        ux, uy = want(table, o, COS, i, W), want(table, o, SIN, i, W)
+        ux, uy, wanted = want(table, o, COS, i, W), want(table, o, SIN, i, W), want(table, o, RATE, i, W)
         for j in range(L):
             links, area2 = placed(0, w, i, j, W, L, w[of(X, j, W, L)], w[of(Y, j, W, L)])
             m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends = moving(
                 extra, w, i, j, W, L, links, w[of(VX, j, W, L)], w[of(VY, j, W, L)]
             )
-            # The angle from the desired proximal link by a series; `mend` replaces those that are not near.
             scale = w[at(SCALE, i, j, W, L)]
-            s, t = turned(links, scale * ux, scale * uy)
-            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), t), 1.0 - steep(cotangent, bends, dt))
-            angle = small_angle(s)
-            w[at(Q, i, j, W, L)], w[at(QD, i, j, W, L)] = wanted + angle, rate
-            w[at(E, i, j, W, L)] = angle + w[at(OFFSET, i, j, W, L)]
-            w[at(ED, i, j, W, L)] = rate - wanted_rate
+            w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)] = turned(links, scale * ux, scale * uy)
+            w[at(COTANGENT, i, j, W, L)], w[at(BENDS, i, j, W, L)] = cotangent, bends
+            w[at(QD, i, j, W, L)], w[at(ED, i, j, W, L)] = rate, rate - wanted
             w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)] = bx, by
             w[at(M11, i, j, W, L)], w[at(M12, i, j, W, L)], w[at(M22, i, j, W, L)] = m11, m12, m22
-            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)] = fx, fy
+            w[at(FX, i, j, W, L)], w[at(FY, i, j, W, L)], w[at(LOW, i, j, W, L)] = fx, fy, area2
             if extra is not None:
                 w[at(ACC, i, j, W, L)] = acc
-            w[at(LOW, i, j, W, L)] = area2
+
+
+@outlined
+def compare(lanes, arms, table, o, w, dt):
+    """Base angles of all arms and their errors; returns 0 where none is far from the desired motion or near the edge.
+
+    Apart from `sense`: together they need more vector registers than there are.
+    """
+    L, W = len(lanes), len(arms)
+    count = 0
+    for i in range(W):
+        wanted = want(table, o, ANGLE, i, W)
+        for j in range(L):
+            # By a series; `mend` replaces angles that are not near.
+            s, t = w[at(SINE, i, j, W, L)], w[at(COSINE, i, j, W, L)]
+            edge = steep(w[at(COTANGENT, i, j, W, L)], w[at(BENDS, i, j, W, L)], dt)
+            w[at(NEAR, i, j, W, L)] = min(min(0.1 - abs(s), t), 1.0 - edge)
+            angle = small_angle(s)
+            w[at(Q, i, j, W, L)], w[at(E, i, j, W, L)] = wanted + angle, angle + w[at(OFFSET, i, j, W, L)]
     for p in range(W * L):
         count += 1 if w[NEAR * W * L + p] < 0.0 else 0
     for j in range(L):
@@ -55,10 +66,8 @@ def sense(lanes, arms, extra, table, o, w, dt):
 
 @leaf
 def mend(lanes, arms, table, o, w):
-    """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent.
-
-    An angle stays on the turn of the sample before; where that is not the nearest to the desired one, AROUND says so.
-    """
+    """Base angles of arms more than 0.1 rad from the desired motion, by the arc tangent, on the turn of the sample
+    before; where that is not the nearest to the desired one, AROUND says so."""
     L, W = len(lanes), len(arms)
     for j in range(L):
         around = 0.0
@@ -106,32 +115,25 @@ def joined(arms, w, j, W, L):
     return solve2(m11, m12, m22, fx, fy)
 
 
-@leaf
-def asked(arms, w, j, W, L, kx, ky, dt):
-    """Steps of equal length that friction asks of a run that accelerates with (kx, ky) in a hold; 0.0 where all its
-    drives move so fast that friction is constant."""
-    sharpness, m11, m12, m22 = w[of(SHARPNESS, j, W, L)], -0.0, -0.0, -0.0
-    for i in range(W):
-        m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
-    stiff, fast, near = 0.0, 0.0, 0.0
-    for i in range(W):
-        f, row = w[at(FRICTION, i, j, W, L)], (w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)])
-        rate, acc = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)]
-        a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, (kx, ky), dt)
-        stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-    return near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
-
-
 @outlined
 def count_steps(lanes, arms, extra, w, dt):
-    """Steps that each run needs in a hold because of friction, and BEND, 0.0 where it is constant in it; returns the
-    largest number, or 0.0 where that is so in all runs."""
+    """Steps of equal length that each run needs in a hold because of friction, and BEND, 0.0 where all its drives move
+    so fast that friction is constant; returns the largest number, or 0.0 where that is so in all runs."""
     L, W = len(lanes), len(arms)
     most = 0.0
     for j in range(L):
-        n = asked(arms, w, j, W, L, w[of(KX, j, W, L)], w[of(KY, j, W, L)], dt)
+        sharpness, m11, m12, m22 = w[of(SHARPNESS, j, W, L)], -0.0, -0.0, -0.0
+        for i in range(W):
+            m11, m12, m22 = m11 + w[at(M11, i, j, W, L)], m12 + w[at(M12, i, j, W, L)], m22 + w[at(M22, i, j, W, L)]
+        stiff, fast, near = 0.0, 0.0, 0.0
+        for i in range(W):
+            f, row = w[at(FRICTION, i, j, W, L)], (w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)])
+            rate, acc, k = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)], (w[of(KX, j, W, L)], w[of(KY, j, W, L)])
+            a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, k, dt)
+            stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
+        n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = max(1.0, n)
-        w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else w[of(SHARPNESS, j, W, L)]
+        w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else sharpness
         w[of(STEP, j, W, L)] = dt / max(1.0, n) if n <= MOST_STEPS else dt
         # A run beyond the limit takes one step and is judged afterwards.
         most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else min(n, 1.0))

@@ -14,9 +14,12 @@ BX, BY, L1SQ, L2SQ, HALF, MODE, S1, S2, TIP, W1, W2, FRICTION, SCALE, ELBOW_SCAL
 MODEL = 14
 # What belongs to the runs of a law: offsets, gains of drives and elbows, limit of a torque, inverse weights, R / k_t^2.
 OFFSET, GAIN_P, GAIN_D, GAIN_I, ELBOW_P, ELBOW_D, LIMIT, EASE, WEIGHT = range(2 * MODEL, 2 * MODEL + 9)
-# The machine at the sample: angle and rate, rows b, base acceleration; what tells a lost arm and a far one; shares of
-# the arms in the equations of motion.
-Q, QD, B1, B2, ACC, LOW, NEAR, M11, M12, M22, FX, FY = range(WEIGHT + 1, WEIGHT + 13)
+# The machine at the sample: angle and rate, rows b, base acceleration; sine and cosine of the angle from the desired
+# one, cotangent of the elbow and its rate; what tells a lost arm and a far one; shares of the arms in the equations of
+# motion.
+(
+    Q, QD, B1, B2, ACC, SINE, COSINE, COTANGENT, BENDS, LOW, NEAR, M11, M12, M22, FX, FY,
+) = range(WEIGHT + 1, WEIGHT + 17)  # fmt: skip
 # The controller: measured errors, what encoders and laws remember; A and a Newton step of the pose; the model's links;
 # accelerations and errors of the joints; torques, also less friction; sums of a study.
 (
