@@ -32,6 +32,8 @@ class Measured:
 
     >>> print(Measured("largest error", 2.4, "mm", 2.0))
     largest error 2.4 mm (at most 2 mm: missed)
+    >>> print(Measured("largest error", 120.0004, "mm", 120.0))
+    largest error 120.0004 mm (at most 120 mm: missed)
     """
 
     what: str
@@ -52,7 +54,9 @@ class Measured:
     def __str__(self) -> str:
         word = "most" if self.at_most else "least"
         missed = "" if self.holds else ": missed"
-        return f"{self.what} {self.value:.4g} {self.unit} (at {word} {self.limit:.4g} {self.unit}{missed})"
+        # A number that misses by less than four digits show says so by more of them.
+        digits = next((n for n in range(4, 17) if self.holds or f"{self.value:.{n}g}" != f"{self.limit:.{n}g}"), 17)
+        return f"{self.what} {self.value:.{digits}g} {self.unit} (at {word} {self.limit:.4g} {self.unit}{missed})"
 
 
 @dataclass(frozen=True)
