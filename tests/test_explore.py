@@ -698,6 +698,17 @@ def test_a_machine_of_ones_own_is_made_of_rods_whatever_the_given_one_is_made_of
     assert explore.own_machine(odd).numbers == explore.own_machine().numbers
 
 
+def test_a_machine_of_ones_own_begins_with_the_given_one_as_near_as_its_sliders_come():
+    robot = rk.load()
+    wide = robot.replace(
+        base=0.292 / np.linalg.norm(robot.base[0]) * robot.base, lengths=[0.18, 0.26], centers=None, mode=[1, 1, -1]
+    )
+    values = explore.own_machine(wide).values
+    assert values == explore.own_machine().values | {"radius": 290, "proximal": 180, "distal": 260, "mode": "(+, +, −)"}
+    large = explore.own_machine(robot.replace(base=10 * robot.base, lengths=10 * robot.lengths, centers=None))
+    assert (large.values["radius"], large.values["distal"]) == (320, 300)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_machine_that_stands_elsewhere_has_the_same_numbers(name):
     """Translation: what is asked of a machine about its own middle does not depend on where that is."""

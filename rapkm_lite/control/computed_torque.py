@@ -41,7 +41,7 @@ class APD(LawValue):
 
     K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
     independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
-    Raises ValueError at run time where the independent coordinates are singular.
+    Where the independent coordinates are singular `torque` raises ValueError, and a run ends with SimulationError.
 
     >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
     >>> law = rk.APD(K_P=7.0, K_D=0.2, independent=(0, 1))
@@ -75,6 +75,7 @@ class APD(LawValue):
         if self.independent is None:
             xd = matvec(np.linalg.pinv(at(model, q).F), qd)
             e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
+            e = np.broadcast_to(e, (*angles.shape[:-1], 2))  # one torque for each measurement, which do not enter
             return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
         j = list(joint_indices("independent", self.independent, model.n_joints))
         e, ed = angles[..., j] - desired.q[..., j], rates[..., j] - desired.qd[..., j]

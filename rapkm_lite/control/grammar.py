@@ -73,7 +73,11 @@ class Law:
         return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
 
     def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
-        """Drive torques c (..., N) in N m."""
+        """Drive torques c (..., N) in N m.
+
+        Raises NotImplementedError for laws that have none without a memory, such as `PID`, for functions, and for a
+        filter around either.
+        """
         alone = type(self).start is Law.start and type(self).step is Law.step
         no = "gives neither torque nor step; needed: one of them"
         unasked = "has no torque without its memory; needed: start and step, as in simulate"

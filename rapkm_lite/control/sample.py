@@ -136,7 +136,7 @@ class Controller:
     @property
     def x(self) -> np.ndarray | None:
         """The last estimate of the end-effector position (2,) in m, None where there is none."""
-        return self.places[0] if self.places else None
+        return self.places[0].copy() if self.places else None
 
     @property
     def pair(self) -> tuple[int, int] | None:

@@ -17,6 +17,7 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
+from ..mechanics.cores import full_rank
 from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .grammar import joint_gain
@@ -63,7 +64,8 @@ def effective_gain(F, K) -> np.ndarray:
     K = real_array("K", K)
     K = K * np.eye(n) if K.ndim == 0 else real_array("K", K, n, n)
     check_leading(F=F.shape[:-2], K=K.shape[:-2])
-    return solve("F^T F", F.mT @ F, F.mT @ K @ F)
+    Q, R = full_rank("F", F, "its columns are not independent; allowed: one column for each degree of freedom")
+    return solve("R", R, Q.mT @ K @ F)
 
 
 def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np.ndarray:
@@ -94,6 +96,7 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
 
     pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
     (A~^T)^+ G~.
+    Raises ValueError at input singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.feedback_norm(robot, q).round(4))

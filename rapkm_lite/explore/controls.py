@@ -81,7 +81,7 @@ def switch(label: str, value: bool = False) -> widgets.Widget:
 
 
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
-    """One slider per drive, offset_1, offset_2, ..., in mrad.
+    """One slider per drive, offset_1, offset_2, ..., in mrad; `values` are cut or repeated to as many.
 
     >>> import rapkm_lite as rk
     >>> sorted(offset_sliders(rk.load(), [4, -2, 5]))
@@ -112,6 +112,8 @@ def parts(draw, controls, play, live, about) -> None:
         having(f"controls[{name!r}]", widget, "a widget with a value, such as slider returns", "value", "observe")
     if play is not None and (not isinstance(play, str) or play not in controls):
         raise ValueError(f"play = {short(play)}; allowed: one of {', '.join(controls)}")
+    if play is not None and not isinstance(controls[play], widgets.IntSlider):
+        raise ValueError(f"play = {play!r}; allowed: the name of a slider with whole numbers")
     truth("live", live)
     of_kind("about", about, str, "text")
     parameters = list(inspect.signature(draw).parameters.values())[1:]

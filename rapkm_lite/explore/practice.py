@@ -126,9 +126,17 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, distance_panels(robot, 2.5), size=(9.2, 3.8))
 
 
+def _nearest(lengths, low: int, high: int) -> int:
+    """The nearest step of 5 mm to the mean of lengths in m."""
+    return int(np.clip(5 * round(200 * float(np.mean(lengths))), low, high))
+
+
 @ready_made
 def own_machine(robot: Manipulator | None = None) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
+
+    It begins with the directions of the base joints and the working mode of the given machine, and with the mean of
+    each of its lengths, as near as the sliders come.
 
     >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
@@ -136,7 +144,8 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     robot = frictionless(robot)
     N, centre = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - centre
-    out = along / np.linalg.norm(along, axis=1, keepdims=True)
+    away = np.linalg.norm(along, axis=1)
+    out = along / away[:, None]
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
     offset, side = np.resize(OFFSET, N), 0.24 if N > 2 else 0.16
     way = triangle(load(), side, dt=0.02).x
@@ -179,10 +188,10 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         "pressing": over_time("torque in mN m", title="Only presses"),
     }
     controls = {
-        "radius": slider("base joints from the middle in mm", 200, 320, 5, 230),
-        "proximal": slider("proximal links in mm", 150, 300, 5, 200),
-        "distal": slider("distal links in mm", 150, 300, 5, 200),
+        "radius": slider("base joints from the middle in mm", 200, 320, 5, _nearest(away, 200, 320)),
+        "proximal": slider("proximal links in mm", 150, 300, 5, _nearest(robot.lengths[:, 0], 150, 300)),
+        "distal": slider("distal links in mm", 150, 300, 5, _nearest(robot.lengths[:, 1], 150, 300)),
         "load": slider("load in kg", 0.0, 1.0, 0.1, 0.5),
-        "mode": choice("working mode", modes),
+        "mode": choice("working mode", modes, mode_name(robot.mode)),
     }
     return explorer(draw, controls, panels, size=(10.4, 3.6))

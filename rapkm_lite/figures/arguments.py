@@ -149,7 +149,7 @@ def _pairs(name: str, value, known: Known) -> None:
 def _arms(name: str, value, known: Known) -> None:
     listed = value.ndim == 1 if isinstance(value, np.ndarray) else isinstance(value, list | tuple | range)
     if listed and len(value) == 1:
-        whole_number(name, value[0], 0)
+        whole_number(name, value[0], 0, _drives(known) - 1)
     else:
         joint_indices(name, list(value) if isinstance(value, range) else value, _drives(known), None, "arm")
 

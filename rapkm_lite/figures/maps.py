@@ -57,8 +57,10 @@ def pair_measures(robot: Manipulator, q) -> np.ndarray:
     return np.stack([singular_values(A[..., list(pair), :])[..., 1] for pair in drive_pairs(robot)], axis=-1)
 
 
-def grid_points(robot: Manipulator, n: int, box=None):
+def grid_points(robot: Manipulator, n: int, box=None, driven: bool = False):
     """Samples x (n,), y (n,) in m, inside (n, n), and the points (k, 2) in m of this grid that all arms reach bent.
+
+    driven : leave out those at input singularities, where A has lost rank.
 
     >>> import rapkm_lite as rk
     >>> x, y, inside, points = grid_points(rk.load(), 50)
@@ -66,7 +68,12 @@ def grid_points(robot: Manipulator, n: int, box=None):
     True
     """
     x, y, inside = workspace_grid(robot, n, box)
-    return x, y, inside, np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    if driven:
+        sigma = singular_values(control_matrix(robot, inverse_kinematics(robot, points)))
+        regular = sigma[:, 1] > 1e-9 * sigma[:, 0]
+        inside[inside], points = regular, points[regular]
+    return x, y, inside, points
 
 
 def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:

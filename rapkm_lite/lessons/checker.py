@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..machine.arguments import whole_number
 from ..machine.datafiles import known
 from .answers import Answer, Ended, NotYet, Result, fitting, given, numbers, tidied
 from .exercise import Case, Exercise, Measured
@@ -127,7 +128,6 @@ def hint(name: str, step: int | None = None) -> None:
     hints = _known(name).hints
     if step is None:
         step = min(_steps.get(name, 0) + 1, len(hints))
-    if isinstance(step, bool) or step not in range(1, len(hints) + 1):
-        raise ValueError(f"step = {step!r}; allowed: a whole number from 1 to {len(hints)}")
-    _steps[name] = step
+    step = whole_number("step", step, 1, len(hints))
     print(f"Hint {step} of {len(hints)} for {name}: {hints[step - 1]}")
+    _steps[name] = step

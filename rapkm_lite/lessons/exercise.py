@@ -44,7 +44,9 @@ class Measured:
 
     @property
     def holds(self) -> bool:
-        return self.value <= self.limit if self.at_most else self.value >= self.limit
+        # A limit that is met exactly is met, whatever rounding says.
+        over = (self.value - self.limit) * (1 if self.at_most else -1)
+        return over <= 1e-9 * abs(self.limit)
 
     @property
     def miss(self) -> float:

@@ -35,8 +35,8 @@ class Log(Value):
 
     def __post_init__(self):
         t, q_a = real_array("t", self.t), real_array("q_a", self.q_a)
-        if t.ndim != 1 or len(t) == 0 or q_a.ndim != 2 or len(q_a) != len(t):
-            raise ValueError(f"t has shape {t.shape} and q_a {q_a.shape}; allowed: (k,) and (k, N) with k >= 1")
+        if t.ndim != 1 or q_a.ndim != 2 or len(q_a) != len(t) or q_a.size == 0:
+            raise ValueError(f"t has shape {t.shape} and q_a {q_a.shape}; allowed: (k,) and (k, N) with k, N >= 1")
         late = np.flatnonzero(np.diff(t) <= 0.0)
         if len(late):
             raise ValueError(f"t[{late[0] + 1}] = {t[late[0] + 1]:g} s follows {t[late[0]]:g} s; allowed: increasing")
@@ -82,7 +82,7 @@ def read_log(source: str | Path) -> Log:
             header, *lines = list(csv.reader(file)) or [[]]
     except (OSError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or ("not UTF-8 text" if isinstance(error, UnicodeError) else error)
-        raise ValueError(f"source = {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
+        raise ValueError(f"the log {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
     while lines and not lines[-1]:
         lines.pop()
     header = _names(path, header)

@@ -1,6 +1,7 @@
 """Actuation: control matrix, degree of actuation (8)-(10), inverse dynamics and prestress (11).
 
 m = N drives act on delta = 2 degrees of freedom.  What needs only a matrix takes any A (..., m, delta) of full rank.
+What takes a pose raises ValueError where its loops are open, as `At` does.
 """
 
 from __future__ import annotations
@@ -157,6 +158,8 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
 def prestress_projector(A, W=None) -> np.ndarray:
     """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range is the torques that move nothing.
 
+    Raises ValueError at input singularities.
+
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(np.linalg.matrix_rank(rk.prestress_projector(rk.control_matrix(robot, q))))
     1
@@ -173,6 +176,7 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
     also the inverse dynamics (25) in redundant coordinates.
+    Raises ValueError at input singularities, for open loops, and where an arm is stretched or folded.
 
     >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1)
     >>> rk.inverse_dynamics(robot, path.q, path.qd, path.qdd).shape
@@ -194,6 +198,7 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 
     As in the first line of (11); on V it is the left-hand side Gbar q2dd + Cbar q2d + Qbar of (6), with the
     end-effector position as q2.
+    Raises ValueError for open loops, and where an arm is stretched or folded.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> bool(abs(rk.required_wrench(robot, q, 0 * q, 0 * q)).max() < 1e-12)

@@ -42,6 +42,7 @@ def command_filter(A, K) -> np.ndarray:
     """R_{A^T K} = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
 
     -K R_{A^T K} e has the end-effector force of the filtered -R K e, and the same torques only for K = k_P I.
+    Raises ValueError at input singularities, and for a gain that is not positive definite.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.control_matrix(robot, q)
@@ -172,6 +173,7 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
     wrench : static control force A^T c (..., delta) that gravity and load demand (Qbar at rest); default none.
+    Raises ValueError at input singularities, and for a gain that is not positive definite.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.steady_state_error(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(5)
@@ -209,8 +211,8 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     another question.
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
     each drive.
-    Raises ValueError at input singularities, for values out of range, and for gains so unequal that there are too many
-    counts to try (one a million times another, say).
+    Raises ValueError at input singularities, where an arm is stretched or folded, for values out of range, and for
+    gains so unequal that there are too many counts to try (one a million times another, say).
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)

@@ -227,12 +227,12 @@ def redundant(N, N_dot, G, C, Q):
     return product(N, G, N), product(N, product(C, N) + product(G, N_dot)), matvec(N, Q)
 
 
-def full_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def full_rank(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> tuple[np.ndarray, np.ndarray]:
     """Q and R of A (..., m, k); raises ValueError where A has lost rank."""
     Q, R = orthogonal(A)
     measure = pivots(R)[1]
     if measure < 1e-12:
-        raise ValueError(f"{name} has lost rank (relative pivot {measure:.3g}): {_INPUT_SINGULARITY}")
+        raise ValueError(f"{name} has lost rank (relative pivot {measure:.3g}): {where}")
     return Q, R
 
 

@@ -1,6 +1,8 @@
 """Motion equations: tree with multipliers (2), minimal coordinates (4)-(7), redundant coordinates (22)-(24).
 
 Sign convention, as in (2):  G qdd + C qd + Q + J^T lambda = u,  u = (c, 0),  c (..., N) the drive torques in N m.
+Poses whose loops are open raise ValueError, as with `At`, but in `mass_matrix`, `coriolis_matrix` and
+`generalized_forces`, which belong to the tree.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import exact_array, joint_indices, one_of, real_array, whole_number
+from ..machine.arguments import exact_array, joint_indices, one_of, real_array, short, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from .actuation import distal_cross_products, drive_pairs
 from .at import at
@@ -44,7 +44,9 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     n = whole_number("n", n, 2, 5000)
     left, right, low, high = sampling_box(robot) if box is None else exact_array("box", box, 4)
     if not (left < right and low < high):
-        raise ValueError(f"box = {(left, right, low, high)}; allowed: (x_min, x_max, y_min, y_max) with min < max")
+        raise ValueError(
+            f"box = {tuple(map(float, (left, right, low, high)))}; allowed: (x_min, x_max, y_min, y_max) with min < max"
+        )
     x, y = np.linspace(left, right, n), np.linspace(low, high, n)
     dx, dy = x[:, None] - robot.base[:, 0], y[:, None] - robot.base[:, 1]
     reach = np.hypot(dx, dy[:, None])
@@ -74,6 +76,8 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
     """
     one_of("measure", measure, _MEASURES)
     N = manipulator(robot).n_arms
+    if measure == "prestress" and pair is not None:
+        raise ValueError(f"pair = {short(pair)} of measure = 'prestress'; allowed: None, all drives share a prestress")
     drives = list(range(N) if pair is None else joint_indices("pair", pair, N, 2, "drive"))
     x, y, inside = workspace_grid(robot, n, box)
     values = _MEASURES[measure](robot, poses_inside(robot, x, y, inside, mode), drives)

@@ -63,16 +63,18 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 @functools.cache
 def _fixed_partition(first: tuple[int, ...], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     others = [i for i in range(m) if i not in first]
-    return np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
+    kept = np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
+    for index in kept:
+        index.setflags(write=False)
+    return kept
 
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
     m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
     rows = real_array("rows", rows).astype(np.asarray(rows).dtype)
+    batch = f" or ({', '.join(map(str, lead))}, delta)" if lead else ""
     if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
-        raise ValueError(
-            f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,) or {(*lead, 'delta')}"
-        )
+        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,){batch}")
     ordered = np.sort(rows, axis=-1)
     bad = np.any((rows < 0) | (rows >= m), axis=-1) | np.any(np.diff(ordered, axis=-1) == 0, axis=-1)
     if np.any(bad):
@@ -94,7 +96,9 @@ PARTITION_RULES = {
 
 @functools.cache
 def _choices(m: int, delta: int) -> np.ndarray:
-    return np.array(list(itertools.combinations(range(m), delta)))
+    choices = np.array(list(itertools.combinations(range(m), delta)))
+    choices.setflags(write=False)
+    return choices
 
 
 def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.ndarray:
@@ -115,4 +119,5 @@ def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.n
     if delta > m:
         raise ValueError(f"delta = {delta}; allowed: at most the {m} rows of A_tilde")
     choices = _choices(m, delta)
-    return choices[np.argmax(PARTITION_RULES[rule](A_tilde.take(choices, axis=-2)), axis=-1)]
+    best = np.argmax(PARTITION_RULES[rule](A_tilde.take(choices, axis=-2)), axis=-1)
+    return choices.take(best, axis=0)  # a copy, also for one matrix

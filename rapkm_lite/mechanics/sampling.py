@@ -28,7 +28,7 @@ def sample_times(duration: float, dt: float) -> np.ndarray:
         raise ValueError(f"dt = {dt:g} s; allowed: 1e-12 s or more")
     steps = round(min(duration / dt, 1e9))
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
-        raise ValueError(f"dt = {dt:g} s; allowed: a whole fraction of duration = {duration:g} s")
+        raise ValueError(f"dt = {dt:.12g} s; allowed: a whole fraction of duration = {duration:.12g} s")
     if steps > MOST:
         raise ValueError(f"duration = {duration:g} s has {steps} samples of dt = {dt:g} s; allowed: up to {MOST}")
     return np.arange(steps + 1) * (duration / steps)

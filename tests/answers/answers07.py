@@ -83,7 +83,7 @@ ANSWERS = {
         ("right", "row by row, a list", row_by_row),
         ("right", "in place", in_place),
         ("wrong", "null space at the guess, first order", with_the_guess, "at the guess"),
-        ("wrong", "only three drives", null_vector_of_three, "4 arms"),
+        ("close", "only three drives", null_vector_of_three),
         ("wrong", "squares", lambda r, q, g: ((q - best(r, q, g)) ** 2).sum(axis=1), "root"),
         ("wrong", "largest entry", lambda r, q, g: np.abs(q - best(r, q, g)).max(axis=1), "largest"),
         ("wrong", "sum", lambda r, q, g: np.abs(q - best(r, q, g)).sum(axis=1), "added"),

@@ -181,7 +181,7 @@ GAINS = [
     ("wrong", "what omega^2 leaves", lambda r, q, w: w * np.sqrt(shares(r, q).min()), "natural frequency"),
     ("wrong", "each pose", lambda r, q, w: w**2 / shares(r, q).min(axis=1), "shape"),
     ("wrong", "K_D", lambda r, q, w: 2 * gain(r, q, w) / w, "factor omega"),
-    ("wrong", "three drives", lambda r, q, w: w**2 / (shares(r, q).min() * 3 / r.n_arms), "number of drives"),
+    ("close", "three drives", lambda r, q, w: w**2 / (shares(r, q).min() * 3 / r.n_arms)),
     ("wrong", "3/7 everywhere", lambda r, q, w: w**2 * 7 / 3, "centroid"),
     ("wrong", "matrix", lambda r, q, w: rk.effective_gain(rk.orthogonal_complement(r, q), driven(r)), "shape"),
 ]

@@ -179,8 +179,15 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
     >>> import rapkm_lite as rk
     >>> ax = plot_crossed_linkage(rk.load(), (0, 1))
     """
-    ax = axes_or_new(ax, figsize=(5.6, 4.6))
     base, length = robot.base[list(pair)], robot.lengths[pair[0], 0]
+    if not np.allclose(robot.lengths[list(pair)], length) or not np.isclose(
+        np.ptp(base, axis=0) @ np.ptp(base, axis=0), 4 * length**2
+    ):
+        raise ValueError(
+            f"robot has links of {robot.lengths[list(pair)].tolist()} m in the arms of pair = {tuple(pair)}; allowed: "
+            "four equal links, half as long as the base between them"
+        )
+    ax = axes_or_new(ax, figsize=(5.6, 4.6))
     middle, along = base.mean(axis=0), (base[1] - base[0]) / np.linalg.norm(base[1] - base[0])
     frame = np.stack([along, [-along[1], along[0]]])
 

@@ -87,11 +87,13 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
     """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all.
 
+    For three arms.
+
     >>> import rapkm_lite as rk
     >>> ax = plot_fight_map(rk.load(), [4e-3, -2e-3, 5e-3], 7.05, n=21)
     """
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
-    x, y, inside, points = grid_points(robot, n)
+    x, y, inside, points = grid_points(robot, n, driven=True)
     q = inverse_kinematics(robot, points)
     weight = required_wrench(robot, q, 0 * q, 0 * q)
     torque = 1e3 * np.linalg.norm(steady_state_torque(control_matrix(robot, q), K_P, offset, weight), axis=-1)
@@ -123,6 +125,8 @@ def plot_log(log, axes=None):
 
 def film_three_lines(robot, q, offset, K_P, frames: int = 32):
     """The opinions of the drives while the normal part of the offsets fades: the lines close on the rest point.
+
+    For three arms.
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()

@@ -13,6 +13,7 @@ from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
 from ...figures.runs import lines_per_drive
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+from ...machine.arguments import short
 from ...mechanics.actuation import drive_pairs
 from ...mechanics.antagonism import null_vector
 from ...mechanics.closure import estimate_pose
@@ -165,6 +166,9 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     """
     ax = axes_or_new(ax, figsize=(5.4, 3.4))
     for (label, run), (colour, marker) in with_looks("runs", runs, ((BEFORE, "o"), (AFTER, "."))):
+        price = run.robot.resistance / run.robot.torque_constant**2
+        if not np.allclose(price, price[0]):
+            raise ValueError(f"runs[{label!r}] has drives of {short(price.tolist())} W/(N m)²; allowed: equal drives")
         along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
         ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
@@ -180,7 +184,7 @@ def plot_filter_share(run, share: float, axes=None):
     """A log while the filter is turned on: torques c - share N_{A^T} c over time, and their points in the torque plane.
 
     share : 0 without, 1 with the filter.  Left the torques of every drive, right each sample as in `plot_torque_plane`;
-    pale the samples without filter.  Returns both axes.
+    pale the samples without filter.  For three arms.  Returns both axes.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_filter_share(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 0.5)
@@ -208,6 +212,8 @@ def plot_filter_share(run, share: float, axes=None):
 
 def film_filter(run, frames: int = 18):
     """A film of `plot_filter_share`: the torque points of a log land on the axis while the filter is turned on.
+
+    For three arms.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size

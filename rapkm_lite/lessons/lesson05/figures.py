@@ -75,7 +75,7 @@ def plot_feedback_map(robot, pair, ax=None, n: int = 220):
     >>> import rapkm_lite as rk
     >>> ax = plot_feedback_map(rk.load(), (0, 1), n=21)
     """
-    x, y, inside, points = grid_points(robot, n)
+    x, y, inside, points = grid_points(robot, n, driven=True)
     level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
     ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
     plot_pair_curves(robot, ax, pairs=[pair], on_map=True)

@@ -47,7 +47,8 @@ def contradiction_cases(rng) -> list[tuple]:
         x = rng.uniform(-0.06, 0.06, (5, 2))
         q_a = inverse_kinematics(robot, x)[:, : robot.n_arms]
         near = x + rng.normal(0, 2e-3, x.shape)
-        cases.append(Case(label, robot, q_a + rng.normal(0, 5e-3, q_a.shape), near))
+        q_a = q_a + rng.normal(0, 5e-3, q_a.shape)
+        cases.append(Case(label, robot, q_a, near, beyond=name == "four_arms"))
     return cases
 
 

@@ -125,7 +125,7 @@ def plot_one_sign(trajectory, ax=None, n: int = 201):
     """
     ax = axes_or_new(ax, figsize=(6.4, 4.2))
     robot = trajectory.robot
-    x, y, inside, points = grid_points(robot, n)
+    x, y, inside, points = grid_points(robot, n, driven=True)
     possible = on_grid(inside, common_sign(control_matrix(robot, inverse_kinematics(robot, points))))
     colours = ListedColormap(["#E8E4DC", "#B9CDE0"])
     ax.pcolormesh(x, y, possible, cmap=colours, vmin=0, vmax=1, shading="nearest", rasterized=True)

@@ -74,7 +74,8 @@ def fights(rng) -> list[tuple]:
             A = control_matrix(robot, inverse_kinematics(robot, x))
             n = null_basis(A)
             fight = n @ rng.normal(0, 0.02, n.shape[1])
-            cases.append(Case(label, A, fight, float(np.abs(fight).max() + rng.uniform(0.02, 0.1))))
+            limit = float(np.abs(fight).max() + rng.uniform(0.02, 0.1))
+            cases.append(Case(label, A, fight, limit, beyond=name == "four_arms"))
     return cases
 
 

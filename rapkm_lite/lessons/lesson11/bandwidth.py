@@ -26,9 +26,13 @@ def gain_for_bandwidth(robot, q, omega: float) -> float:
     return omega**2 / _shares(robot, q).min()
 
 
+def _somewhere(robot, rng) -> np.ndarray:
+    return inverse_kinematics(robot, rng.uniform(-0.06, 0.06, (6, 2)))
+
+
 def _bandwidths(rng) -> list[tuple]:
     return [
-        Case(words, robot, inverse_kinematics(robot, rng.uniform(-0.06, 0.06, (6, 2))), float(omega))
+        Case(words, robot, _somewhere(robot, rng), float(omega), beyond=robot.n_arms > 3)
         for words, robot in ((words, load(file)) for words, file in _MACHINES.items())
         for omega in rng.uniform(5.0, 40.0, 2)
     ]
@@ -98,6 +102,9 @@ GAIN_FOR_BANDWIDTH = Exercise(
         "the fast direction of the worst pose is taken; the slow one is wanted": (
             lambda robot, q, omega: omega**2 / _shares(robot, q).max(axis=1).min()
         ),
+        "this is the gain on all joints; on the driven joints alone only a share of it acts": (
+            lambda robot, q, omega: omega**2
+        ),
         "the factor (F^T F)^-1 is missing, as in the printed (35): the result depends on the coordinates": (
             _printed_gain(None)
         ),
@@ -107,9 +114,6 @@ GAIN_FOR_BANDWIDTH = Exercise(
         "this is the gain of line 2 of (32), with the mass matrix between": _line_2,
         "singular values are taken for eigenvalues: those of the effective gain depend on the coordinates": (
             _singular_value
-        ),
-        "this is the gain on all joints; on the driven joints alone only a share of it acts": (
-            lambda robot, q, omega: omega**2
         ),
         "the passive joints are selected, the complement of the driven ones": (
             lambda robot, q, omega: omega**2 / (1 - _shares(robot, q)).min()

@@ -37,7 +37,8 @@ def frequency_cases(rng) -> list[Case]:
     cases = []
     for label, robot in _plants():
         for x in rng.uniform(-0.06, 0.06, (3, 2)):
-            cases.append(Case(label, robot, inverse_kinematics(robot, x), rng.uniform(3.0, 14.0, robot.n_arms)))
+            K_P = rng.uniform(3.0, 14.0, robot.n_arms)
+            cases.append(Case(label, robot, inverse_kinematics(robot, x), K_P, beyond=robot.n_arms > 3))
     robot = load()
     far, stiff = inverse_kinematics(robot, [0.1, 0.06]), np.array([14.0, 3.0, 3.0])
     equal = Case("equal gains", robot, inverse_kinematics(robot, [0.02, 0.03]), np.full(3, 7.05))
@@ -78,7 +79,8 @@ def error_cases(rng) -> list[Case]:
     for label, robot, model in _variants():
         path, some = triangle(robot, 0.12, float(rng.choice([2.0, 2.5, 4.0]))), rng.integers(100, 1900, 4)
         motion = path.q[some], path.qd[some], path.xd[some], path.xdd[some]
-        cases.append(Case(label, robot, model, *motion, rng.uniform(200.0, 900.0)))
+        K_P = rng.uniform(200.0, 900.0)
+        cases.append(Case(label, robot, model, *motion, K_P, beyond=robot.n_arms > 3))
     return cases
 
 
