@@ -5,7 +5,8 @@
 
 Made from the stored headings, formulas, pictures, questions and exercises; folded parts are left out.  Each question
 keeps its answers, closed until somebody clicks or presses A, which opens the next one and then closes all.  Arrow keys
-turn the pages, the browser prints one page per slide.  Formulas need ``latex2mathml`` (in ``docs/requirements.txt``).
+turn the pages, the browser prints one page per slide while answers are closed.  Formulas need ``latex2mathml`` (in
+``docs/requirements.txt``).
 """
 
 from __future__ import annotations

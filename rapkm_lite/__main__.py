@@ -54,7 +54,7 @@ def _grade(options) -> None:
 
 def _tell_grades(folder: Path, grades) -> None:
     from .lessons.checker import exercises
-    from .lessons.grading.submission import surpassed, unnamed
+    from .lessons.grading.submission import silent, surpassed, unnamed
     from .lessons.grading.tables import by_exercise, by_student
 
     print(by_exercise(grades), by_student(grades), sep="\n\n")
@@ -64,6 +64,8 @@ def _tell_grades(folder: Path, grades) -> None:
     if left := unnamed(folder, known):
         words = "not graded, since their names have no number of a lesson with exercises, like 04_title.ipynb"
         print(f"\n{words}: {', '.join(left)}")
+    if empty := silent(folder, known):
+        print(f"\nno notebook that could be graded: {', '.join(empty)}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

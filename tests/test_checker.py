@@ -221,7 +221,7 @@ def test_hints_come_in_three_steps(capsys):
     hint(name, 1)
     assert "Hint 1" in capsys.readouterr().out
     for step in (0, 4, True, "1"):
-        with pytest.raises(ValueError, match="step .*allowed: "):
+        with pytest.raises(ValueError, match=r"step .*allowed: "):
             hint(name, step)
     with pytest.raises(ValueError, match=r"did you mean '04.saved_energy'\?\); allowed: 01\."):
         hint("04.saved_enery")

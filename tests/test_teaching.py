@@ -60,9 +60,11 @@ def test_exam_says_which_lessons_its_items_go_with():
     for row in teaching.course()["objective"]:
         for item in row["exam"]:
             lessons[item].add(row["lesson"])
-    strangers = {item for item, where in lessons.items() if not any((n <= "06") == (item <= 24) for n in where)}
-    named = re.search(r"except (\d+), which belongs to a folded part of lesson\s+(\d+)", EXAM)
-    assert strangers == {int(named[1])} and lessons[int(named[1])] == {named[2]}
+    strangers = {i: {n for n in where if (n <= "06") != (i <= 24)} for i, where in lessons.items()}
+    words = r"except (\d+) and the second half of (\d+), which belong to folded\s+parts of lessons (\d+) and (\d+)"
+    named = re.search(words, EXAM)
+    expected = {int(named[1]): {named[3]}, int(named[2]): {named[4]}}
+    assert {item: where for item, where in strangers.items() if where} == expected
 
 
 def test_map_names_every_item_exercise_and_lesson():

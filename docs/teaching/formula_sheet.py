@@ -1,4 +1,4 @@
-"""The students' formula sheet: one page A4 as PDF, formulas only, no answers.
+"""The students' formula sheet: one page A4 as PDF, formulas only, no numbers.
 
     python docs/teaching/formula_sheet.py            # writes formula_sheet.pdf
     python docs/teaching/formula_sheet.py sheet.pdf

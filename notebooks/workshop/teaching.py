@@ -131,7 +131,7 @@ def mistakes_page() -> str:
 def _said_before(blocks: list[str], question: str) -> list[str]:
     """The paragraph that a question follows in its cell, which may hold what it asks about."""
     before = blocks[blocks.index(question) - 1] if blocks.index(question) else ""
-    plain = before and not re.match(r"#|>|[-*|] |\d+\. |<|\$\$|\*\*", before)
+    plain = before and "</details>" not in before and not re.match(r"#|>|[-*|] |\d+\. |<|\$\$|\*\*", before)
     return [before, ""] if plain else []
 
 

@@ -6,6 +6,7 @@ import copy
 import functools
 import inspect
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +45,10 @@ def copied(value: Any) -> Any:
     return copy.deepcopy(value) if isinstance(value, list | dict | set | bytearray) else value
 
 
+REFERENCE: ContextVar[Callable | None] = ContextVar("reference", default=None)
+"""The package's answer to the exercise that is judged right now."""
+
+
 class Answer:
     """A function that gets copies, so that arithmetic in place changes nothing outside.  What `check` returns.
 
@@ -56,6 +61,11 @@ class Answer:
         self._function, self.own, self.student = function, own, student
 
     def __call__(self, *arguments, **named):
+        if self._function is REFERENCE.get():
+            words = (
+                "the answer calls what check handed on, the package's; run the cell that defines yours again"
+            )
+            raise Ended("todo", words, "the package's")
         got = self._function(*map(copied, arguments), **{name: copied(value) for name, value in named.items()})
         return tidied(got)
 

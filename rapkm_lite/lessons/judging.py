@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from ..machine.manipulator import Manipulator
-from .answers import NOTHING, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
+from .answers import NOTHING, REFERENCE, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
 from .seen import Seen, alike, largest, ratio_of
@@ -18,6 +18,7 @@ from .seen import Seen, alike, largest, ratio_of
 
 def judged(exercise: Exercise, answer: Any) -> Result:
     """The verdict on one answer, whatever it is and does."""
+    before = REFERENCE.set(exercise.reference if callable(exercise.reference) else None)
     try:
         answer = _unwrapped(answer)
         if exercise.judge and exercise.raw:
@@ -29,6 +30,8 @@ def judged(exercise: Exercise, answer: Any) -> Result:
         return _behaviour(exercise, answer) if exercise.judge else _near_and_far(exercise, answer, cases)
     except Ended as end:
         return end.result._replace(sentence=end.result.sentence + "".join(getattr(end, "__notes__", ())))
+    finally:
+        REFERENCE.reset(before)
 
 
 def _unwrapped(answer: Any) -> Any:

@@ -87,6 +87,13 @@ def unnamed(folder: Path, known: set[str]) -> list[str]:
     return [name for name, numbers in names if not numbers & {*known, "00"}]
 
 
+def silent(folder: Path, known: set[str]) -> list[str]:
+    """The students' folders without a notebook that is graded, and other things that lie among them."""
+    heard = {parts[0] for path, parts in _notebooks(folder) if {*_NUMBER.findall(path.name)} & {*known, "00"}}
+    names = (entry.name for entry in os.scandir(folder) if entry.name[0] != "." and not entry.name.endswith(".csv"))
+    return sorted({*names} - heard - {*unnamed(folder, known)})
+
+
 def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
     """All notebooks with the parts of their place, but those of hidden folders, as checkpoints are."""
     places = []

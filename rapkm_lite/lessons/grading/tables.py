@@ -64,15 +64,16 @@ def by_exercise(grades: list[Grade]) -> str:
 
 
 def by_student(grades: list[Grade]) -> str:
-    """Points of each student, per lesson and in all."""
+    """Points of each student, per lesson and in all, of those of all lessons that anybody handed in."""
     lessons = sorted({grade.exercise[:2] for grade in grades})
+    most = sum({grade.exercise: grade.of for grade in grades}.values())
     lines = [f"{'student':<28}" + "".join(f"{lesson:>8}" for lesson in lessons) + f"{'all':>8}{'of':>8}"]
     for student in sorted({grade.student for grade in grades}):
         own = [grade for grade in grades if grade.student == student]
         sums = [sum(grade.points for grade in own if grade.exercise[:2] == lesson) for lesson in lessons]
         handed = {grade.exercise[:2] for grade in own}
         cells = [f"{s:>8g}" if lesson in handed else f"{'-':>8}" for s, lesson in zip(sums, lessons, strict=True)]
-        lines.append(f"{student[:27]:<28}{''.join(cells)}{sum(sums):>8g}{sum(g.of for g in own):>8g}")
+        lines.append(f"{student[:27]:<28}{''.join(cells)}{sum(sums):>8g}{most:>8g}")
     return "\n".join(lines)
 
 

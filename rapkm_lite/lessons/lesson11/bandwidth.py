@@ -102,9 +102,8 @@ GAIN_FOR_BANDWIDTH = Exercise(
         "the fast direction of the worst pose is taken; the slow one is wanted": (
             lambda robot, q, omega: omega**2 / _shares(robot, q).max(axis=1).min()
         ),
-        "this is the gain on all joints; on the driven joints alone only a share of it acts": (
-            lambda robot, q, omega: omega**2
-        ),
+        "this is omega^2, as for a gain on all joints, of which only a share acts on the driven ones; (35) as printed, "
+        "without (F^T F)^-1, says the same for three arms in the angles of a pair": (lambda robot, q, omega: omega**2),
         "the factor (F^T F)^-1 is missing, as in the printed (35): the result depends on the coordinates": (
             _printed_gain(None)
         ),
