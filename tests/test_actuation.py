@@ -646,3 +646,22 @@ def test_a_matrix_for_each_pose():
 def test_two_opposite_drives_leave_the_third_without_a_load(third):
     """A^T n = (n_1 - n_2 [+ n_3], k n_3) = 0 asks for n_3 = 0."""
     assert not rk.common_sign([[1.0, 0.0], [-1.0, 0.0], third])
+
+
+def test_chosen_rows_belong_to_the_caller():
+    A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, [0.02, 0.05]))
+    rows = rk.select_independent(A_tilde)
+    rows += 1
+    assert rk.select_independent(A_tilde).tolist() == [0, 2]
+
+
+def test_a_prestress_of_one_pair_is_refused():
+    with pytest.raises(ValueError, match=r"pair = \(0, 1\) of measure = 'prestress'; allowed: None"):
+        rk.actuation_map(TESTBED, "prestress", n=5, pair=(0, 1))
+
+
+@pytest.mark.parametrize("x, words", [([0.02, 0.05], r"\(delta,\)$"), ([[0.02, 0.05]] * 3, r"or \(3, delta\)$")])
+def test_shapes_of_rows_are_told_as_shapes(x, words):
+    A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, x))
+    with pytest.raises(ValueError, match=words):
+        rk.explicit_pseudoinverse(A_tilde, np.array([[0, 1], [0, 2]]))

@@ -315,7 +315,7 @@ def test_rank_loss_is_named():
         rk.projector(np.zeros((2, 4)))
     for columns in (1, 2, 3):
         refused(rk.common_sign, "A", np.zeros((5, columns)))
-    refused(rk.effective_gain, "F^T F", np.zeros((6, 2)), 1.0)
+    refused(rk.effective_gain, "F", np.zeros((6, 2)), 1.0)
     edge = rk.inverse_kinematics(TESTBED, TESTBED.base[0] + 0.4 * np.array([np.cos(0.5), np.sin(0.5)]))
     refused(rk.orthogonal_complement, "q", TESTBED, edge)
     refused(rk.inverse_dynamics, "q", TESTBED, edge, edge, edge)

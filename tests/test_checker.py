@@ -220,7 +220,7 @@ def test_hints_come_in_three_steps(capsys):
         assert capsys.readouterr().out == f"Hint {step} of 3 for {name}: {exercises()[name].hints[step - 1]}\n"
     hint(name, 1)
     assert "Hint 1" in capsys.readouterr().out
-    for step in (0, 4, True, "1"):
+    for step in (0, 4, 1.5, True, "1", np.array([1, 2])):
         with pytest.raises(ValueError, match=r"step .*allowed: "):
             hint(name, step)
     with pytest.raises(ValueError, match=r"did you mean '04.saved_energy'\?\); allowed: 01\."):
@@ -292,3 +292,22 @@ def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):
 def test_two_cases_are_enough_to_see_that_an_answer_is_constant():
     two = Exercise(lambda v: 2.0 * v, ("a", "b", "c"), "N m", lambda rng: [(v,) for v in rng.normal(size=(2, 3))])
     assert "same for every case" in judged(two, lambda v: np.ones(3)).sentence
+
+
+def test_what_check_hands_on_is_no_answer_however_it_is_called(capsys):
+    name = "04.filtered_torques"
+    handed = check(name, ...)
+
+    def wrapped(A, c):
+        return handed(A, c)
+
+    verdict = judged(exercises()[name], wrapped)
+    assert verdict.word == "todo" and "what check handed on" in verdict.sentence
+    assert judged(exercises()["04.filtered_command"], wrapped).word != "todo"
+    A, c = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.array([0.1, 0.2, 0.3])
+    assert handed(A, c).shape == (3,)
+
+
+def test_a_limit_that_is_met_exactly_is_met_whatever_rounding_says():
+    assert Measured("way", 0.3 - 0.1, "m", 0.2, at_most=False).holds
+    assert Measured("way", 0.1 + 0.2, "m", 0.3).holds and not Measured("way", 0.3001, "m", 0.3).holds

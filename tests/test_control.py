@@ -588,3 +588,29 @@ def test_one_measurement_or_many_and_one_desired_state_or_many():
     assert_allclose(law.torque(TESTBED, d.q, d.qd, q_a, qd_a, d), rows, rtol=1e-14)
     rows = [law.torque(TESTBED, d.q, d.qd, q_a[0], qd_a[0], one) for one in path]
     assert_allclose(law.torque(TESTBED, d.q, d.qd, q_a[0], qd_a[0], path[:]), rows, rtol=1e-14)
+
+
+def test_a_gain_of_dependent_columns_is_refused_however_they_round():
+    """(F^T F) of a product of two vectors is singular but for rounding."""
+    rng = np.random.default_rng(10)
+    for _ in range(50):
+        with pytest.raises(ValueError, match="F has lost rank"):
+            rk.effective_gain(np.outer(rng.normal(size=6), rng.normal(size=2)), 1.0)
+
+
+@pytest.mark.parametrize("law", [rk.APD(7.0, 0.2, None), rk.CTC(400.0, 40.0, None)])
+def test_one_pose_beside_many_measurements_has_as_many_torques(law):
+    """Also where measured base angles do not enter: with the end-effector as coordinates."""
+    d, many = rk.triangle(ROBOT)[3], rk.triangle(ROBOT)[2:6]
+    alone = law.torque(ROBOT, d.q, d.qd, d.q_a, d.qd_a, d)
+    assert_allclose(law.torque(ROBOT, d.q, d.qd, many.q_a, many.qd_a, d), np.tile(alone, (4, 1)), rtol=1e-12)
+
+
+def test_the_estimate_of_a_controller_is_not_changed_from_outside():
+    path = rk.hold(ROBOT, [0.02, 0.03], 0.1)
+    one, other = (rk.Controller(rk.CTC(400.0, 40.0, None), ROBOT) for _ in range(2))
+    for t in (0.0, 1e-3):
+        same = [c(t, path.q_a[0], path.qd_a[0], path[0]) for c in (one, other)]
+        assert_allclose(*same, rtol=0, atol=0)
+        one.x[:] = 0.0
+    assert_allclose(one.x, other.x, rtol=0, atol=0)

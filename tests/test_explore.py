@@ -863,3 +863,11 @@ def test_curves_of_a_law_that_works_are_seen():
     for panel in ("torque", "error"):
         curves = [m.data[:, 1] for m in explorer.picture.marks if (m.kind, m.panel) == ("line", panel)]
         assert 0.15 * explorer.picture.ylim(panel)[1] < np.abs(np.concatenate(curves)).max()
+
+
+@pytest.mark.parametrize(
+    "widget", [explore.slider("a", 0, 1, 0.1, 0.5), explore.log_slider("a", 1, 10, 5), explore.switch("a")]
+)
+def test_only_whole_numbers_play(widget):
+    with pytest.raises(ValueError, match="play = 'a'; allowed: the name of a slider with whole numbers"):
+        explore.explorer(lambda picture, a: None, {"a": widget}, {"panel": {}}, play="a")

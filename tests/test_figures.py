@@ -405,3 +405,25 @@ def test_places_at_the_rim_are_seen(world):
 def test_what_cannot_be_told_apart_is_refused():
     with pytest.raises(ValueError, match="samples has 3 entries; allowed: 1 to 2"):
         plotting.plot_bands({"a": [3.0, 5.0], "b": [1.0, 2.0], "c": [7.0, 8.0]})
+
+
+@pytest.mark.parametrize("n", [20, 21, 41])
+def test_a_sample_on_a_singular_curve_leaves_a_gap(n):
+    """With an odd number of samples the middle line of a five-bar's map is where its drives cannot push."""
+    robot = rk.load("five_bar")
+    for ax in (plotting.plot_feedback_map(robot, (0, 1), n=n), plotting.plot_one_sign(rk.triangle(robot, 0.1), n=n)):
+        assert ax.collections
+        plt.close("all")
+
+
+def test_a_linkage_of_other_lengths_and_unlike_drives_are_refused():
+    robot = rk.load()
+    for other in (rk.load("asymmetric"), robot.replace(lengths=0.22, centers=None)):
+        with pytest.raises(ValueError, match="allowed: four equal links"):
+            plotting.plot_crossed_linkage(other, (0, 1))
+    unlike = robot.replace(resistance=[0.6, 0.6, 1.2])
+    run = rk.simulate(unlike, rk.PD(7.05, 0.225), rk.circle(unlike, 0.05, 0.1))
+    with pytest.raises(ValueError, match=r"runs\['PD'\] .*allowed: equal drives"):
+        plotting.plot_torque_plane({"PD": run})
+    with pytest.raises(ValueError, match=r"arms = 5; allowed: .*to 2"):
+        plotting.plot_machine(robot, rk.inverse_kinematics(robot, [0.0, 0.0]), arms=(5,))

@@ -61,6 +61,7 @@ SUBMISSIONS = {
     "hal": checked([TORQUES + "return (", *RIGHT[1:]]),
     "ivy": checked(["def filtered_torques(A, c):\n    raise NotImplementedError\n", *RIGHT[1:]]),
     "jon": checked(["from rapkm_lite.lessons.lesson04.exercises import filtered_torques\n", *RIGHT[1:]]),
+    "moe": checked([f"def filtered_torques(A, c):\n    return check({NAMES[0]!r}, ...)(A, c)\n", *RIGHT[1:]]),
     "kim": [SETUP, "while True: pass", *checked(RIGHT)[1:]],
     "lou": [SETUP, *RIGHT, *(f'hint("04.{name}")' for name in ("filtered_torques", "filtered_command"))],
 }
@@ -76,6 +77,7 @@ VERDICTS = {
     "hal": ["wrong", "ok", "ok"],
     "ivy": ["todo", "ok", "ok"],
     "jon": ["todo", "ok", "ok"],
+    "moe": ["todo", "ok", "ok"],
     "kim": ["ok", "ok", "ok"],
     "lou": ["ok", "ok", "ok"],
 }
@@ -145,7 +147,7 @@ def test_a_close_answer_is_no_mistake_in_the_table():
 def test_a_lesson_that_was_not_handed_in_has_no_points_and_a_wrong_one_has_zero():
     grades = [Grade("ada", "04.x", "wrong", 0.0, 5.0, "", ""), Grade("ben", "05.y", "ok", 3.0, 3.0, "", "")]
     lines = [line.split() for line in by_student(grades).splitlines()]
-    assert lines[1:3] == [["ada", "0", "-", "0", "5"], ["ben", "-", "3", "3", "3"]]
+    assert lines[1:3] == [["ada", "0", "-", "0", "8"], ["ben", "-", "3", "3", "8"]]
 
 
 @pytest.mark.parametrize("names", [("04_a.ipynb", "04_b.ipynb"), ("04_b.ipynb", "04_a.ipynb")])
@@ -263,7 +265,23 @@ def test_notebooks_without_the_number_of_a_lesson_are_named(tmp_path, capsys):
     write(tmp_path / "gus" / "homework.ipynb", [SETUP])
     write(tmp_path / "gus" / "00_start_here.ipynb", [SETUP])
     assert main(["grade", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.endswith(f"like 04_title.ipynb: {Path('gus', 'homework.ipynb')}\n")
+    said = capsys.readouterr().out
+    assert f"like 04_title.ipynb: {Path('gus', 'homework.ipynb')}\n" in said
+
+
+def test_students_without_a_notebook_that_is_graded_are_named(tmp_path, capsys):
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [SETUP])
+    write(tmp_path / "gus" / "00_start_here.ipynb", [SETUP])
+    write(tmp_path / "homework.ipynb", [SETUP])
+    (tmp_path / "ivy").mkdir()
+    (tmp_path / "jon").mkdir()
+    (tmp_path / "jon" / "04_title.zip").write_bytes(b"")
+    (tmp_path / ".hidden").mkdir()
+    (tmp_path / "grades.csv").touch()
+    assert main(["grade", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "like 04_title.ipynb: homework.ipynb\n" in said
+    assert said.endswith("no notebook that could be graded: gus, ivy, jon\n")
 
 
 def test_every_notebook_is_graded_or_named(tmp_path, capsys):

@@ -89,7 +89,7 @@ def unnamed(folder: Path, known: set[str]) -> list[str]:
 
 def silent(folder: Path, known: set[str]) -> list[str]:
     """The students' folders without a notebook that is graded, and other things that lie among them."""
-    heard = {parts[0] for path, parts in _notebooks(folder) if {*_NUMBER.findall(path.name)} & {*known, "00"}}
+    heard = {parts[0] for path, parts in _notebooks(folder) if known & {*_NUMBER.findall(path.name)}}
     names = (entry.name for entry in os.scandir(folder) if entry.name[0] != "." and not entry.name.endswith(".csv"))
     return sorted({*names} - heard - {*unnamed(folder, known)})
 

@@ -180,13 +180,8 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
     >>> ax = plot_crossed_linkage(rk.load(), (0, 1))
     """
     base, length = robot.base[list(pair)], robot.lengths[pair[0], 0]
-    if not np.allclose(robot.lengths[list(pair)], length) or not np.isclose(
-        np.ptp(base, axis=0) @ np.ptp(base, axis=0), 4 * length**2
-    ):
-        raise ValueError(
-            f"robot has links of {robot.lengths[list(pair)].tolist()} m in the arms of pair = {tuple(pair)}; allowed: "
-            "four equal links, half as long as the base between them"
-        )
+    if not np.allclose([*robot.lengths[list(pair)].flat, np.linalg.norm(base[1] - base[0]) / 2], length):
+        raise ValueError(f"pair = {tuple(pair)} of this robot; allowed: four equal links, half as long as their base")
     ax = axes_or_new(ax, figsize=(5.6, 4.6))
     middle, along = base.mean(axis=0), (base[1] - base[0]) / np.linalg.norm(base[1] - base[0])
     frame = np.stack([along, [-along[1], along[0]]])
@@ -206,8 +201,7 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
         place = end + 0.5 * length * (frame[0] * np.sign((end - middle) @ frame[0]) - 0.6 * frame[1])
         ax.annotate(f"drive {i + 1}", place, color=arm_text_colour(i), ha="center", va="center", weight="bold")
     for theta in tilts:
-        rod = length * np.array([np.cos(2 * theta), np.sin(2 * theta)]) @ frame
-        ends = middle + centre(theta) + np.array([[-1.0], [1.0]]) * rod
+        ends = middle + centre(theta) + [[-length], [length]] * np.array([np.cos(2 * theta), np.sin(2 * theta)]) @ frame
         ax.plot(*ends.T, color=NEUTRAL, lw=2.0, zorder=3)
         ax.plot(*ends.mean(axis=0), "o", color=ALARM, ms=6, zorder=5)
         for i, (start, end) in zip(pair, zip(base, ends, strict=True), strict=True):
