@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -148,10 +149,11 @@ def _pairs(name: str, value, known: Known) -> None:
 
 def _arms(name: str, value, known: Known) -> None:
     listed = value.ndim == 1 if isinstance(value, np.ndarray) else isinstance(value, list | tuple | range)
+    N = _drives(known)
     if listed and len(value) == 1:
-        whole_number(name, value[0], 0, _drives(known) - 1)
+        whole_number(name, value[0], 0, math.inf if N is None else N - 1)
     else:
-        joint_indices(name, list(value) if isinstance(value, range) else value, _drives(known), None, "arm")
+        joint_indices(name, list(value) if isinstance(value, range) else value, N, None, "arm")
 
 
 def _signs(name: str, value, known: Known) -> None:
