@@ -12,7 +12,7 @@ import numpy as np
 
 from ..machine.arguments import whole_number
 from ..machine.datafiles import known
-from .answers import Answer, Ended, NotYet, Result, fitting, given, numbers, tidied
+from .answers import Answer, Ended, Handed, NotYet, Result, fitting, given, numbers, tidied
 from .exercise import Case, Exercise, Measured
 from .judging import judged
 
@@ -97,7 +97,7 @@ def going_on(exercise: Exercise, word: str, own: Any) -> Any:
     mine = own if callable(own) else None
     if word == "ok" and mine is not None:
         return Answer(mine, own=mine)
-    return Answer(reference, own=mine, student=Answer(mine) if mine is not None else None)
+    return Handed(reference, own=mine, student=Answer(mine) if mine is not None else None)
 
 
 def _own_value(own: Any, package: Any) -> Any:
