@@ -52,6 +52,8 @@ GROUPS = {
         "test_lanes",
         "test_long_runs",
         "test_nbgrader",
+        "test_numbers_of_explorers",
+        "test_numbers_of_figures",
         "test_package",
         "test_reach",
         "test_skeleton",

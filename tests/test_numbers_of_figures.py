@@ -1,0 +1,490 @@
+"""Curves of the figures carry the numbers that their labels say: in their units, of the right drive, in their place.
+
+What is drawn is compared with what was given, times the factor of the unit, or with a calculation that is not theirs.
+"""
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from numpy.testing import assert_allclose
+
+import rapkm_lite as rk
+from rapkm_lite import explore, plotting
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+ROBOT = rk.load().replace(friction=0.0)
+OFFSET = np.array([4e-3, -2e-3, 5e-3])
+PATH = rk.triangle(ROBOT, dt=5e-3)
+RUN = rk.simulate(ROBOT, rk.PD(7.05, 0.225), PATH, OFFSET)
+T = np.linspace(0.0, 2.0, 101)
+
+
+def pose(x, robot=ROBOT, mode=None):
+    return rk.inverse_kinematics(robot, x, mode)
+
+
+def xy(line):
+    return np.column_stack(line.get_data())
+
+
+def named(ax):
+    """The lines of an axis by their label."""
+    return {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
+
+
+def y_of(ax, label):
+    return np.asarray(named(ax)[label].get_ydata())
+
+
+def seen(ax, what):
+    """The lines of one colour that are no points."""
+    return [line for line in ax.lines if to_hex(line.get_color()) == to_hex(what) and len(line.get_xdata()) > 2]
+
+
+# Machines.
+def test_names_of_gaps_are_their_lengths():
+    q = pose([0.02, 0.05]) + [0.0, 0.0, 0.3, 0.0, 0.0, 0.0]
+    words = [text.get_text() for text in plotting.plot_cut_tree(ROBOT, q).get_legend().get_texts()]
+    # Arm 3, turned about its base, carries its tip along a chord.
+    chord = 2e3 * np.linalg.norm(ROBOT.base[2] - [0.02, 0.05]) * np.sin(0.15)
+    assert words == ["arm 2 to arm 1: 0.0 mm", f"arm 2 to arm 3: {chord:.1f} mm"]
+
+
+def test_an_arc_ends_on_the_link_whose_angle_it_names():
+    q = pose([0.02, 0.05])
+    arcs = [xy(line) for line in plotting.plot_joint_angles(ROBOT, q).lines if len(line.get_xdata()) == 40]
+    assert len(arcs) == 6
+    for k, arc in enumerate(arcs):
+        i, elbow = divmod(k, 2)
+        centre = ROBOT.base[i] + elbow * 0.2 * np.array([np.cos(q[i]), np.sin(q[i])])
+        outer = [0.02, 0.05] if elbow else ROBOT.base[i] + 0.2 * np.array([np.cos(q[i]), np.sin(q[i])])
+        way, link = arc[-1] - centre, outer - centre
+        assert way @ link == pytest.approx(np.linalg.norm(way) * np.linalg.norm(link), rel=1e-9)
+
+
+def test_arrows_of_forces_have_the_length_that_was_asked_for():
+    forces = np.array([[0.5, 0.0], [0.0, 0.2], [-0.1, -0.1]])
+    ax = plotting.plot_pin_forces(ROBOT, pose([0.02, 0.05]), forces, newton_per_metre=5.0)
+    ways = np.array([text.xy for text in ax.texts]) - [0.02, 0.05]
+    assert_allclose(5.0 * ways, forces, atol=1e-12)
+
+
+def test_names_of_drives_stand_away_from_their_links():
+    q = pose([0.02, 0.05])
+    for i, text in enumerate(plotting.plot_machine(ROBOT, q).texts):
+        assert np.dot(text.xyann, [np.cos(q[i]), np.sin(q[i])]) < 0
+
+
+def test_distal_lines_are_prolonged_beyond_the_platform():
+    ax = plotting.plot_four_legs([0.05, 0.0, 0.2], lines=True)
+    ends = [xy(line) for line in ax.lines if line.get_linestyle() == ":"]
+    corners = np.array([line[0] for line in ends])
+    # Away from the elbow: the four of them meet inside, or pass through, the platform.
+    assert all(np.linalg.norm(b - corners.mean(axis=0)) < np.linalg.norm(a - b) for a, b in ends)
+    elbows = [xy(line)[0] for line in ax.lines if line.get_marker() == "o" and len(line.get_xdata()) == 2]
+    for (corner, end), elbow in zip(ends, elbows, strict=True):
+        assert (corner - elbow) @ (end - corner) > 0
+
+
+def test_links_that_are_parallel_are_counted_from_one():
+    labels = [*named(plotting.plot_pair_curves(ROBOT, n=41))]
+    assert labels == ["links 1 and 2 parallel", "links 1 and 3 parallel", "links 2 and 3 parallel"]
+
+
+@pytest.mark.parametrize(("most", "extend"), [(0.5, "max"), (2.0, "neither"), (None, "neither")])
+def test_a_scale_is_pointed_where_values_lie_beyond(most, extend):
+    ax = plotting.plot_map([0.0, 1.0], [0.0, 1.0], np.ma.array([[0.1, 0.2], [0.3, 1.0]]), vmax=most)
+    assert ax.collections[0].colorbar.extend == extend
+
+
+# Torques, forces, prestress.
+def test_forces_of_one_drive_reach_as_far_as_its_torque():
+    q = pose([0.02, 0.05])
+    ax, A = plotting.plot_available_forces(ROBOT, q, torque=0.08), rk.control_matrix(ROBOT, q)
+    for i in range(3):
+        assert_allclose(xy(named(ax)[f"drive {i + 1}"]), [-0.08 * A[i], 0.08 * A[i]])
+
+
+def test_a_drive_has_no_share_of_the_prestress_on_the_curve_of_the_others():
+    """Two parallel distal links hold each other alone."""
+    for i, ax in enumerate(plotting.plot_prestress_maps(ROBOT, n=41)):
+        others = [k + 1 for k in range(3) if k != i]
+        assert ax.get_title() == f"drive {i + 1};  line: pair ({others[0]},{others[1]})"
+
+
+def test_torques_of_choices_are_in_millinewton_metres():
+    torque = np.random.default_rng(1).normal(size=(len(PATH.t), 3))
+    (ax,) = plotting.plot_torque_choices(PATH, {"any": torque})
+    for i in range(3):
+        assert_allclose(y_of(ax, f"drive {i + 1}"), 1e3 * torque[:, i])
+
+
+def test_drives_are_content_on_their_lines():
+    """A_i p = -offset_i, for places p beside the wanted one."""
+    q = pose([0.02, 0.05])
+    ax, A = plotting.plot_disagreement(ROBOT, q, OFFSET, 7.05), rk.control_matrix(ROBOT, q)
+    for i, line in enumerate(named(ax).values()):
+        assert_allclose(xy(line) @ A[i], -1e3 * OFFSET[i], atol=1e-9)
+
+
+def test_torques_of_theory_stand_on_those_of_the_run():
+    ax = plotting.plot_rest_torques(RUN, RUN.c)
+    for i in range(3):
+        assert_allclose(ax.lines[3 + i].get_ydata(), 1e3 * RUN.c[:, i])
+        assert_allclose(ax.lines[i].get_ydata(), 1e3 * RUN.c[:, i])
+
+
+def test_runs_and_theories_of_a_gain_ratio_have_one_unit():
+    lines = named(plotting.plot_gain_ratio([0.5, 1.0], [0.03, 0.05], {"wrong": [0.04, 0.04], "right": [0.03, 0.05]}))
+    assert_allclose(lines["wrong"].get_ydata(), [40, 40])
+    assert_allclose(lines["right"].get_ydata(), lines["simulated"].get_ydata())
+
+
+def test_white_lines_of_the_fight_map_are_where_nothing_fights():
+    ax = plotting.plot_fight_map(ROBOT, OFFSET, 7.05, n=81)
+    lines = np.concatenate([path.vertices for path in ax.collections[-1].get_paths()])
+    lines = lines[rk.reachable(ROBOT, 1.02 * lines)][::7]
+    A = rk.control_matrix(ROBOT, pose(lines))
+    fight = np.linalg.norm(rk.steady_state_torque(A, 7.05, OFFSET), axis=-1)
+    assert len(lines) > 10 and np.median(fight) < 1e-3 and 7.05 * np.linalg.norm(OFFSET) > 0.04
+
+
+def test_a_log_is_drawn_in_milliradians_and_millinewton_metres():
+    log = rk.mystery_run("gain")
+    angles, torques = plotting.plot_log(log)
+    for i in range(3):
+        assert_allclose(angles.lines[i].get_ydata(), 1e3 * (log.q_a - log.q_a_desired)[:, i])
+        assert_allclose(torques.lines[i].get_ydata(), 1e3 * log.c[:, i])
+
+
+# The filter.
+@pytest.mark.parametrize("plot", ["plot_joint_moves", "plot_spacing"])
+def test_a_slope_of_two_goes_with_the_square(plot):
+    spacing, gap = np.array([0.01, 0.02, 0.04]), np.array([1e-3, 3e-3, 16e-3])
+    if plot == "plot_spacing":
+        ax, level = plotting.plot_spacing(spacing, gap, ("level", 5e-3)), "level"
+        dots = "this edge"
+    else:
+        ax = plotting.plot_joint_moves(ROBOT, [-0.05, 0.0], [0.05, 0.0], spacing, gap, 5e-3)[1]
+        dots, level = "straight lines in joint space", "offsets of this lesson"
+    assert_allclose(y_of(ax, "slope two"), [1.0, 4.0, 16.0])
+    assert_allclose(xy(named(ax)[dots]), 1e3 * np.column_stack([spacing, gap]))
+    assert_allclose(y_of(ax, level), 5.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_the_filter_takes_its_share_of_what_moves_nothing(share):
+    left, right = plotting.plot_filter_share(RUN, share)
+    torque = np.stack([y_of(left, f"drive {i + 1}") for i in range(3)], axis=-1)
+    A, c = rk.control_matrix(ROBOT, RUN.q[::10]), 1e3 * RUN.c[::10]
+    moving = np.einsum("kji,kj->ki", A, c)
+    assert_allclose(np.einsum("kji,kj->ki", A, torque), moving, atol=1e-9)  # the forces stay
+    n = rk.null_vector(ROBOT, RUN.q)
+    assert_allclose(np.sum(n[::10] * torque, axis=1), (1 - share) * np.sum(n[::10] * c, axis=1), atol=1e-9)
+    pale, now = (xy(line) for line in right.lines[:2])
+    assert_allclose(pale[:, 0], 1e3 * np.sum(n * RUN.c, axis=1)[::25], atol=1e-9)
+    assert_allclose(now, pale * [1 - share, 1.0], atol=1e-9)
+
+
+def test_measured_bars_stand_beside_simulated_ones_of_the_same_row():
+    table = rk.table1()
+    ax = plotting.plot_table1(table)
+    bars = [bar.get_height() for bar in ax.patches if np.isfinite(bar.get_x())]
+    rows = [table.measured[0], table.simulated[0], table.measured[1], table.simulated[1]]
+    assert_allclose(np.reshape(bars, (4, 3)), rows)
+    names = ["measured, without filter", "simulated, without filter", "measured, with filter", "simulated, with filter"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == names
+
+
+# Computed torque.
+def test_arrows_show_where_the_drives_of_a_pair_feel_nothing():
+    """Both base joints of the pair stand still, to first order, while the end-effector moves along the arrow."""
+    path = rk.triangle(ROBOT)
+    for ax in np.ravel(plotting.plot_singular_poses(path, [(0, 1)])):
+        tip, x = (np.array(at) for at in (ax.texts[0].xy, ax.texts[0].xyann))
+        d = rk.arm_vectors(ROBOT, pose(x))[1][[0, 1]]
+        assert np.abs(d @ (tip - x)).max() < 0.03 * np.linalg.norm(tip - x) * 0.2
+
+
+def test_rates_of_decay_are_positive_where_a_function_falls():
+    t = np.linspace(0, 1, 11)
+    values, rates = plotting.plot_lyapunov(t, {"V": 3 * np.exp(-4 * t), "W": np.exp(-2 * t)}, 4.0)
+    assert_allclose(y_of(rates, "V"), 4.0)
+    assert_allclose(y_of(rates, "W"), 2.0)
+    assert_allclose(y_of(values, "V"), 3 * np.exp(-4 * t))
+
+
+def test_the_map_of_the_feedback_is_its_decimal_logarithm():
+    ax = plotting.plot_feedback_map(ROBOT, (0, 1), n=41)
+    level, (x, y, *_) = ax.collections[0].get_array(), plotting.grid_points(ROBOT, 41, driven=True)
+    i, j = 20, 24
+    q = pose([x[j], y[i]])
+    pair, (G, _, _) = rk.control_matrix(ROBOT, q, (0, 1)), rk.minimal_dynamics(ROBOT, q, 0 * q, (0, 1))
+    norm = np.linalg.norm(np.linalg.pinv(pair.T) @ G, 2)
+    assert level[i, j] == pytest.approx(np.log10(norm), abs=1e-9)
+
+
+def test_redundant_coordinates_are_the_smooth_curve_of_the_feedback():
+    ax = plotting.plot_feedback_along(PATH)
+    smooth, *pairs = (y_of(ax, label) for label in ("redundant", "pair (1,2)", "pair (1,3)", "pair (2,3)"))
+    assert smooth.max() < 3 * smooth.min() and all(pair.max() > 20 * smooth.max() for pair in pairs)
+
+
+def test_one_pair_is_in_use_at_a_time():
+    run = rk.simulate(ROBOT, rk.SwitchedCTC(900, 60), PATH)
+    lines = [line.get_ydata() for line in plotting.plot_pairs(run).lines]
+    assert np.all(np.sum(np.isfinite(lines), axis=0) == 1)
+    for k, (line, pair) in enumerate(zip(lines, rk.drive_pairs(ROBOT), strict=True)):
+        assert np.array_equal(np.isfinite(line), [tuple(p) == pair for p in run.pairs]) and np.nanmax(line) == k
+
+
+# Studies.
+def test_offset_1_runs_to_the_right_in_a_landscape():
+    values = np.linspace(-2.0, 2.0, 5)
+    one, two, three = np.meshgrid(values, values, values, indexing="ij")
+    cube = (one + 2.0) * 3.0 + 0.1 * (two + 2.0) + 0.01 * (three + 2.0)
+    for ax, third in zip(plotting.plot_landscape(values, cube, cube), (0, 2, 4), strict=True):
+        filled, lines = ax.collections
+        # Levels of what rises with offset 1 are upright; those of the theory lie on those of the simulation.
+        for level, path in zip(lines.levels, lines.get_paths(), strict=True):
+            if len(path.vertices):
+                assert np.ptp(path.vertices[:, 0]) < 0.15
+                x, y = path.vertices.mean(axis=0)
+                there = (x + 2.0) * 3.0 + 0.1 * (y + 2.0) + 0.01 * (values[third] + 2.0)
+                assert there == pytest.approx(level, abs=1e-6)
+        upright = [p.vertices for p in filled.get_paths() if len(p.vertices)]
+        assert min(np.ptp(part[:, 0]) for part in upright) < 1.5 < np.ptp(upright[0][:, 1])
+
+
+def test_a_mean_stands_on_its_curve_of_shares():
+    ax = plotting.plot_bands({"a": [1.0, 2.0, 3.0, 10.0], "b": [1.0, 1.0, 1.0, 5.0]})
+    diamonds = [xy(line)[0].tolist() for line in ax.lines if line.get_marker() == "D" and len(line.get_xdata())]
+    assert diamonds == [[4.0, 75.0], [2.0, 75.0]]
+
+
+def test_readings_stand_between_the_ends_of_their_range():
+    ax = plotting.plot_readings(["a", "b"], [2.0, -1.0], [4.0, 1.0], [[2.0, 1.0], [3.0, 0.0]], [4.0, -1.0])
+    assert [line.get_xdata().tolist() for line in ax.lines] == [[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]]
+
+
+def test_energies_over_the_gain_are_told_apart():
+    lines = named(plotting.plot_gain_curve([1.0, 7.0], [2.2, 5.5], [2.0, 2.1], [0.2, 3.5]))
+    got = {label: line.get_ydata().tolist() for label, line in lines.items()}
+    assert got == {"without filter": [2.2, 5.5], "with filter": [2.0, 2.1], "antagonistic part": [0.2, 3.5]}
+
+
+def test_what_an_edge_needs_begins_and_ends_as_it_is_commanded():
+    ax = plotting.plot_five_bar_curves(ROBOT, [-0.1, -0.06], [0.1, -0.02])[1]
+    dotted = [line for line in ax.lines if line.get_linestyle() == ":" and len(line.get_xdata())]
+    for line, pair in zip(dotted, ((0, 1), (1, 2)), strict=True):
+        straight = xy(named(ax)[f"drives ({pair[0] + 1},{pair[1] + 1})"])
+        turn = np.degrees(pose([0.1, -0.02]) - pose([-0.1, -0.06]))[list(pair)]
+        assert_allclose(xy(line)[[0, -1]], straight[[0, -1]], atol=1e-9)
+        assert_allclose(straight[-1], turn, atol=1e-9)
+
+
+# Readings and rests.
+def test_components_of_null_vectors_are_those_of_drives_1_and_2():
+    places = [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.03]]
+    n = rk.null_vector(ROBOT, pose(places))
+    assert_allclose(xy(named(plotting.plot_places(ROBOT, {"a": places})[1])["a"]), n[:, :2])
+
+
+def test_counts_lie_around_what_they_count():
+    exact = 5e-3 * T
+    for ax in plotting.plot_counted(T, 1e-3 * np.rint(1e3 * exact), exact):
+        assert_allclose(y_of(ax, "without rounding"), 5.0 * T)
+        assert np.abs(y_of(ax, "from counts") - y_of(ax, "without rounding")).max() <= 0.5 + 1e-9
+
+
+def test_steps_of_a_torque_go_on_either_side_of_the_exact_one():
+    """An encoder rounds to the nearest count: the step is off by half a count at most; friction holds +-f_c."""
+    ax = plotting.plot_torque_steps(7.05, 1e-3, 4.2e-3)
+    exact, moved, held = (y_of(ax, f) for f in ("exact angle", "measured, is driven on", "measured, can rest here"))
+    off = np.where(np.isfinite(moved), moved, held) - exact
+    assert np.nanmax(np.abs(off)) == pytest.approx(7.05 / 2, abs=0.02) and abs(np.nanmean(off)) < 0.01
+    assert np.nanmax(np.abs(held)) <= 4.2 < np.nanmin(np.abs(moved))
+    band = ax.patches[0].get_extents().transformed(ax.transData.inverted())
+    assert_allclose([band.y0, band.y1], [-4.2, 4.2])
+
+
+def test_errors_stand_over_the_residuals_that_they_leave():
+    ax = plotting.plot_bias(np.array([[1e-5, 2e-5]]), np.array([[1e-3, 3e-3]]), ["a"])
+    assert_allclose(xy(named(ax)["a"]), [[0.01, 1.0], [0.02, 3.0]])
+
+
+# Room and faults.
+def test_limits_lie_where_the_drives_are_clipped():
+    torques = plotting.plot_clipping(RUN, RUN, 0.085)[0]
+    assert [line.get_ydata()[0] for line in torques.lines if line.get_linestyle() == ":"] == [-85.0, 85.0]
+
+
+def test_a_drive_stands_at_its_limit_where_the_room_ends():
+    c, n = np.array([0.05, -0.06, -0.02]), np.array([0.6, 0.64, 0.48])
+    ends = np.array([(-0.085 - c) / n, (0.085 - c) / n])
+    room = ends.min(axis=0).max(), ends.max(axis=0).min()
+    ax = plotting.plot_room(c, n, 0.085, room, {"least size": 0.0})
+    shade = ax.patches[1].get_extents().transformed(ax.transData.inverted())
+    assert_allclose([shade.x0, shade.x1], 1e3 * np.array(room))
+    torque = [np.interp([shade.x0, shade.x1], *line.get_data()) for line in [*named(ax).values()][:3]]
+    assert_allclose(np.abs(torque).max(axis=0), 85.0, rtol=1e-9)
+
+
+def test_accelerations_of_least_size_and_of_pairs_touch_those_of_all_drives():
+    """No choice of torques leads beyond the polygon of all drives; in some direction torques of least size reach it."""
+    ax = plotting.plot_accelerations(ROBOT, [[0.02, 0.01]], 0.085)[0]
+    corners = ax.patches[0].get_xy()[:-1]
+    edge = np.roll(corners, -1, axis=0) - corners
+    edge, corners = edge[np.linalg.norm(edge, axis=1) > 1e-9], corners[np.linalg.norm(edge, axis=1) > 1e-9]
+    out = np.stack([edge[:, 1], -edge[:, 0]], axis=-1) / np.linalg.norm(edge, axis=1)[:, None]
+    out *= np.sign(np.sum(out * corners, axis=1))[:, None]
+    far = np.sum(out * corners, axis=1)
+    for label, line in named(ax).items():
+        reach = (xy(line) @ out.T / far).max()
+        assert reach <= 1 + 1e-9
+        assert reach > (0.99 if label == "all, least size" else 0.5)
+    A = rk.control_matrix(ROBOT, pose([0.02, 0.01]))
+    G, _, _ = rk.minimal_dynamics(ROBOT, pose([0.02, 0.01]), np.zeros(6), None)
+    pair = xy(named(ax)["pair (1,2)"]) @ G @ np.linalg.inv(A[:2])
+    assert_allclose(np.abs(pair), 0.085, rtol=1e-9)
+
+
+def test_fights_of_a_wrong_geometry_are_in_millinewton_metres():
+    model = ROBOT.replace(lengths=0.2004)
+    (ax,) = np.atleast_1d(plotting.plot_geometry_maps(ROBOT, {"long": model}, 7.05, n=41))
+    x, y, *_ = plotting.grid_points(ROBOT, 41)
+    i, j = 20, 22
+    wanted = pose([x[j], y[i]], model)[:3]
+    A = rk.control_matrix(ROBOT, pose([x[j], y[i]]))
+    left = np.eye(3) - A @ np.linalg.pinv(A)
+    fight = 7.05e3 * np.linalg.norm(left @ (wanted - pose([x[j], y[i]])[:3]))
+    assert ax.collections[0].get_array()[i, j] == pytest.approx(fight, rel=0.05)
+
+
+def test_what_a_filter_lets_pass_goes_with_the_error_of_its_model():
+    eps = np.array([1e-3, 1e-2, 1e-1])
+    share, leak = plotting.plot_model_share(eps, 0.2 * eps, T, 0.01 + 0 * T)
+    assert_allclose(y_of(share, "slope one"), y_of(share, "filter with the wrong model"))
+    assert_allclose(leak.lines[0].get_ydata(), 10.0)
+
+
+def test_a_step_fills_the_band_on_the_line_of_the_hunting_maps():
+    (ax,) = plotting.plot_hunting_maps([1.0, 7.0], [500.0, 2000.0], {"a": [[0.0, 9.0], [0.0, 5.0]]}, 4.2e-3)
+    gains, counts = ax.lines[0].get_data()
+    assert_allclose(gains * 2 * np.pi / counts, 2 * 4.2e-3)
+
+
+def test_shifts_and_distances_are_in_millimetres():
+    assert_allclose(xy(named(plotting.plot_saturation([0.1, 0.2], {"a": [1e-3, 1e-4]}))["a"]), [[100, 1], [200, 0.1]])
+    off = 1e3 * np.hypot(*(RUN.x - PATH.x).T)
+    assert_allclose(y_of(plotting.plot_faulty_runs({"a": RUN}, least=1e-9), "a"), np.maximum(off, 1e-9))
+
+
+# Frequencies and gains, other mechanisms.
+def test_a_bar_holds_the_middle_four_fifths():
+    ax = plotting.plot_law_bands(["a"], {"energy in J": [np.linspace(1.0, 2.0, 101)]})
+    ax = np.ravel(ax)[0]
+    assert_allclose(ax.collections[0].get_segments()[0][:, 0], [1.1, 1.9])
+    assert_allclose(ax.lines[0].get_xdata(), 1.5)
+
+
+def test_theory_and_run_of_one_axis_have_one_name():
+    error = np.column_stack([1e-3 * T, 2e-3 * T])
+    ax = plotting.plot_slow_error(T, error, 1.1 * error)
+    for word, factor in (("x", 1.0), ("y", 2.0)):
+        assert_allclose(y_of(ax, f"run, {word}"), factor * T)
+        assert_allclose(y_of(ax, f"theory, {word}"), 1.1 * factor * T)
+
+
+def test_the_fast_direction_keeps_more_of_a_gain_than_the_slow_one():
+    """What is left of a gain of the driven joints: eigenvalues of N_J I_a N_J that are not zero."""
+    ax = plotting.plot_effective_gain(PATH, np.diag([1.0, 1, 1, 0, 0, 0]))
+    N_J = rk.nullspace_projector(ROBOT, PATH.q)[..., :3]
+    shares = np.linalg.eigvalsh(N_J @ N_J.mT)[:, -2:]
+    assert_allclose(y_of(ax, "slow direction"), shares[:, 0], atol=1e-9)
+    assert_allclose(y_of(ax, "fast direction"), shares[:, 1], atol=1e-9)
+
+
+def test_predicted_points_stand_at_their_times():
+    y = 1e-3 * np.exp(-T)
+    lines = named(plotting.plot_step_response(T, {"run": y}, {"theory": y}))
+    points = xy(lines["predicted, theory"])
+    assert_allclose(points[:, 1], np.exp(-points[:, 0]))
+    assert_allclose(lines["simulated, run"].get_ydata(), np.exp(-T))
+
+
+def test_distance_from_a_circle_leaves_the_turn_of_the_platform_out():
+    from rapkm_lite.lessons.lesson12 import four_rrr
+
+    motion = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
+    poses = np.array([[[3e-3, 4e-3, 7.0]] * 3])
+    assert_allclose(plotting.plot_swing(motion, poses, ["PD"]).lines[0].get_ydata(), 5.0)
+
+
+def test_gaps_and_sizes_have_their_units():
+    assert_allclose(y_of(plotting.plot_loop_gaps([0.0, 1.0], {"a": [1e-6, 1e-4]}), "a"), [1e-3, 0.1])
+    ax = plotting.plot_complement_size(PATH, [(0, 1)])
+    F = rk.orthogonal_complement(ROBOT, PATH.q, (0, 1))
+    largest = np.sqrt(np.linalg.eigvalsh(F.mT @ F)[:, -1])
+    assert_allclose(ax.lines[0].get_ydata(), largest, rtol=1e-9)
+
+
+def test_meters_of_the_workshop_show_the_energy_of_their_runs(monkeypatch):
+    """Half way along an edge the arms hold work that they give back on the rest of it, much of it under a load."""
+    from rapkm_lite.lessons.lesson00 import figures
+
+    told, half, loaded = {}, 850, ROBOT.replace(load=3.0)
+    monkeypatch.setattr(figures, "film", lambda draw, steps, alt, **rest: told.update(draw=draw, alt=alt))
+    figures.film_workshop(loaded, OFFSET, frames=2)
+    axes = plt.subplots(1, 2)[1]
+    told["draw"](axes, half)
+    lap = rk.triangle(loaded)
+    for ax, offset in zip(axes, (0 * OFFSET, OFFSET), strict=True):
+        run = rk.simulate(loaded, rk.PD(7.05, 0.225), lap, offset)
+        heat = 0.611 / 0.0259**2 * run.dt * np.sum(run.c[:half] ** 2)
+        work = np.sum(run.c[:half] * (run.q_a[1 : half + 1] - run.q_a[:half]))
+        assert next(text.get_text() for text in ax.texts) == f"{heat + work:.1f} J" and work > 0.1
+
+
+# Marks of the canvas.
+def test_bars_of_drives_stand_about_the_number_of_their_drive():
+    picture = explore.Picture({"a": {"ylim": (0, 2)}})
+    explore.bars(picture, "a", [([1.0, 2.0], {}), ([1.5, 0.5], {"alpha": 0.4})])
+    bars = np.array([mark.data for mark in picture.marks if mark.kind == "bar"]).reshape(2, 2, 4, 2)
+    middle = bars[..., 0].mean(axis=-1)
+    assert_allclose(middle.mean(axis=0), [1.0, 2.0])
+    words = [mark for mark in picture.marks if mark.kind == "label"]
+    assert_allclose([mark.data[0, 0] for mark in words], middle.ravel())
+    assert [float(mark.words) for mark in words] == [1.0, 2.0, 1.5, 0.5]
+    picture.bar("a", 3.0, 1.0, 0.5)
+    assert picture.marks[-1].data.tolist() == [[2.75, 0], [3.25, 0], [3.25, 1], [2.75, 1]]
+
+
+def test_limits_of_x_leave_those_of_y():
+    picture = explore.Picture({"a": {"xlim": (0, 1), "ylim": (2, 3)}})
+    picture.limits("a", x=(-5, 5))
+    assert picture.xlim("a") == (-5, 5) and picture.ylim("a") == (2, 3)
+
+
+def test_a_line_without_a_line_has_no_width_on_the_canvas():
+    from rapkm_lite.figures.marks.palette import canvas_style
+
+    assert canvas_style("line", (("linestyle", "none"), ("marker", "o"), ("linewidth", 3.0)))["width"] == 0.0
+    assert canvas_style("line", (("linewidth", 3.0),))["width"] == 3.0
+
+
+def test_the_middle_of_two_drives_is_that_of_three_at_equal_distances():
+    from rapkm_lite.figures.marks import middle
+
+    five_bar = rk.Manipulator(base=[[-0.2, 0.1], [0.2, 0.1]], lengths=0.3, masses=0.1)
+    third = five_bar.base.mean(axis=0) + [0.0, 0.4 * np.sqrt(3) / 2]
+    assert_allclose(middle(five_bar), np.mean([*five_bar.base, third], axis=0))
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    plt.close("all")
