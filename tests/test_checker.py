@@ -311,3 +311,113 @@ def test_what_check_hands_on_is_no_answer_however_it_is_called(capsys):
 def test_a_limit_that_is_met_exactly_is_met_whatever_rounding_says():
     assert Measured("way", 0.3 - 0.1, "m", 0.2, at_most=False).holds
     assert Measured("way", 0.1 + 0.2, "m", 0.3).holds and not Measured("way", 0.3001, "m", 0.3).holds
+
+
+def machines(rng):
+    testbed = rk.load()
+    k_t, R_el = rng.uniform(0.02, 0.1, 4), rng.uniform(0.2, 3.0, 4)
+    return [
+        (testbed.replace(resistance=R, torque_constant=k), rng.normal(size=3)) for k, R in zip(k_t, R_el, strict=True)
+    ]
+
+
+def heat(robot, c):
+    return robot.resistance[0] / robot.torque_constant[0] ** 2 * np.sum(c**2)
+
+
+def tables(rng):
+    return [(rng.normal(size=(k, 2)),) for k in (3, 5, 8)]
+
+
+def systems(rng):
+    return [(rng.normal(size=(3, 3)) + 3 * np.eye(3), rng.normal(size=3)) for _ in range(4)]
+
+
+def solved(M, v):
+    return np.linalg.solve(M, np.cos(v))
+
+
+@pytest.mark.parametrize(
+    ("reference", "cases", "answer", "words"),
+    [
+        (heat, machines, lambda robot, c: np.sum(c**2), "the factor R_el/k_t^2 is missing"),
+        (heat, machines, lambda robot, c: np.sum(c**2) / robot.torque_constant[0] ** 2, "the factor R_el is missing"),
+        (lambda X: X.mean(axis=0), tables, lambda X: X.sum(axis=0), "the factor length of X is one too many"),
+        (lambda X: X.sum(axis=0), tables, lambda X: X.mean(axis=0), "the factor length of X is missing"),
+        (solved, systems, lambda M, v: np.cos(v), "the factor M is one too many"),
+        (solved, systems, lambda M, v: np.linalg.solve(M, solved(M, v)), "the factor M is missing"),
+    ],
+)
+def test_a_factor_is_told_by_its_name_and_whether_it_is_there(reference, cases, answer, words):
+    said = judged(Exercise(reference, ("a", "b", "c"), "J", cases), answer).sentence
+    assert words in said and "beside" not in said
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (1e3, "1000 times too large"), (1e-3, "1000 times too small"), (1e6, "10^6 times too large"),
+        (1e-6, "10^6 times too small"), (1e2, "100 times too large"), (1e-2, "100 times too small"),
+        (2, "is twice the right one"), (1 / 2, "is half the right one"), (4, "4 times too large"),
+        (1 / 4, "4 times too small"), (60, "60 times too large"), (1 / 60, "60 times too small"),
+        (np.degrees(1), "180/pi times too large"), (np.radians(1), "180/pi times too small"),
+        (np.pi, "is pi times too large"), (1 / np.pi, "is pi times too small"), (2 * np.pi, "2 pi times too large"),
+        (1 / (2 * np.pi), "2 pi times too small"), ((2 * np.pi) ** 2, "4 pi^2 times too large"),
+    ],
+)  # fmt: skip
+def test_a_factor_with_a_meaning_is_told_in_its_direction(factor, words):
+    exercise = Exercise(scaled, ("a", "b", "c"), "N m", cases)
+    assert words in judged(exercise, lambda *case: factor * scaled(*case)).sentence
+
+
+@pytest.mark.parametrize("degrees", [30, -30, 90, 180])
+def test_an_angle_of_turned_vectors_counts_against_the_clock(degrees):
+    exercise = Exercise(lambda X: np.sin(X), ("a", "b", "c"), "m", tables)
+    turn = np.radians(degrees)
+    matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    said = judged(exercise, lambda X: np.sin(X) @ matrix.T).sentence
+    assert f"turned by {degrees} degrees" in said or (degrees == 180 and "opposite sign" in said)
+
+
+@pytest.mark.parametrize(("axis", "word"), [(0, "row"), (1, "column")])
+def test_a_row_is_no_column(axis, word):
+    def wrong(change):
+        def answer(M, v):
+            X = np.moveaxis(np.sin(M), axis, 0)
+            X[2] = change(X[2])
+            return np.moveaxis(X, 0, axis)
+
+        return answer
+
+    exercise = Exercise(lambda M, v: np.sin(M), ("a", "b", "c"), "m", systems)
+    assert f"the sign of {word} 2 (counted from 0) is opposite" in judged(exercise, wrong(np.negative)).sentence
+    assert f"only {word} 2 (counted from 0) is wrong" in judged(exercise, wrong(np.cos)).sentence
+
+
+def test_a_deviation_counts_against_its_own_case_or_against_the_usual_one_if_that_is_larger():
+    def sizes(rng):
+        return [(np.array([size, 0.3 * size]),) for size in (1.0, 1.0, 1.0, 100.0)]
+
+    exercise = Exercise(lambda v: v, ("a", "b", "c"), "m", sizes, close=0.02)
+    for off, word in ((1.0, "close"), (3.0, "wrong")):
+        assert judged(exercise, lambda v, off=off: v + off * (v[0] > 10) * np.array([1.0, 0.0])).word == word
+    for off, word in ((0.4, "close"), (0.6, "wrong")):  # of a mean size of 25.75
+        assert judged(exercise, lambda v, off=off: v + off * (v[0] < 10) * np.array([0.0, 1.0])).word == word
+
+
+def test_a_miss_is_a_share_of_the_limit():
+    assert Measured("way", 2.2, "m", 2.0).miss == pytest.approx(0.1)
+    assert Measured("way", 1.8e-3, "m", 2e-3, at_most=False).miss == pytest.approx(0.1)
+    assert Measured("way", 1.8, "m", 2.0).miss == Measured("way", 2.2, "m", 2.0, at_most=False).miss == 0.0
+
+
+@pytest.mark.parametrize(("size", "grows"), [(5.0, True), (1e6, False)])
+def test_a_wrong_answer_is_in_the_picture_unless_it_is_far_beyond_it(size, grows, capsys):
+    check("04.filtered_torques", lambda A, c: c)
+    _, ax = plt.subplots()
+    ax.set_ylim(0, 1)
+    ax.plot([0, 1], [0.2, 0.8])
+    ax.autoscale()
+    draw_own("04.filtered_torques", lambda f: ([0.0, 1.0], [0.0, size]), ax)
+    assert (ax.get_ylim()[1] > size) == grows and len(ax.lines) == 2
+    plt.close("all")

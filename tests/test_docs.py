@@ -175,3 +175,29 @@ def test_links_on_the_site_have_words_where_the_repository_has_names_of_files():
     for path in pages:
         named = re.search(r"\[\w+\.(md|ipynb)\]\(", text(path))
         assert not named, f"{path.name}: {named[0]}"
+
+
+@pytest.mark.parametrize(("size", "wide"), [((768, 307), True), ((844, 288), True), ((403, 480), False)])
+def test_a_film_of_several_panels_is_as_wide_as_the_page(size, wide):
+    from pages.lessons import _outputs
+
+    film = f'<picture><img alt="Words" width="{size[0]}" height="{size[1]}"></picture>'
+    cell = {"metadata": {}, "outputs": [{"data": {"image/png": "", "text/html": film}}]}
+    _outputs(cell, "")
+    assert ("wide-picture" in cell["outputs"][0]["data"]["text/html"]) == wide
+    assert cell["metadata"]["mystnb"]["image"]["alt"] == "Words"
+
+
+def test_the_start_page_knows_the_testbed_its_law_and_the_corners_of_its_path():
+    from pages import start
+
+    known, robot = start.values(), rk.load()
+    assert (known["K_P"], known["K_D"], known["duration"]) == (7.05, 0.225, 5.0)
+    for name, value in known["machine"].items():
+        np.testing.assert_array_equal(value, getattr(robot, name))
+    corners = np.array(known["corners"])
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    path = rk.triangle(robot)
+    length = np.linalg.norm(np.diff(path.x, axis=0), axis=1).sum()
+    np.testing.assert_allclose(sides, length / 3, rtol=1e-6)
+    np.testing.assert_array_equal(known["table1"], rk.measured_energies())

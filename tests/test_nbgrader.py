@@ -133,3 +133,12 @@ def test_nbgrader_makes_the_assignment_and_grades_it(course):
     for name, full in points.items():
         assert scores["blank", name] == 0.0
         assert scores["mixed", name] == (0.0 if name == "04-filtered_torques" else full)
+
+
+def test_a_lesson_that_there_is_not_is_refused_and_nothing_is_written(tmp_path):
+    from workshop import nbgrader
+
+    with pytest.raises(ValueError, match="lesson = '99'; allowed: 0"):
+        nbgrader.export(tmp_path / "course", ["04", "99"])
+    assert not (tmp_path / "course").exists()
+    assert [path.stem for path in nbgrader.export(tmp_path / "course", ["04"])] == [LESSON]

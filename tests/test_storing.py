@@ -272,3 +272,13 @@ def test_blanking_is_the_builders():
     build = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(build)
     assert build.blank is storing.blank and build.figure_list is layout.figure_list
+
+
+def test_a_picture_of_twice_the_pixels_is_shown_at_its_own_size():
+    output = picture()
+    output.metadata = nbformat.from_dict({"image/png": {"width": 30, "height": 20}})
+    pictures.tell(output, "Words.")
+    assert 'width="30" height="20"' in output.data["text/html"]
+    plain = picture()
+    pictures.tell(plain, "Words.")
+    assert 'width="60" height="40"' in plain.data["text/html"]

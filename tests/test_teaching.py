@@ -13,6 +13,7 @@ import pytest
 
 import rapkm_lite as rk
 from rapkm_lite.checks import exercises
+from rapkm_lite.lessons.lesson03 import tasks as lesson03
 from rapkm_lite.lessons.lesson07 import tasks as lesson07
 from rapkm_lite.lessons.lesson09 import tasks as lesson09
 from rapkm_lite.lessons.lesson10 import tasks as lesson10
@@ -458,3 +459,57 @@ def test_slides_of_a_lesson_that_is_not_there():
     script = ROOT / "notebooks" / "slides.py"
     done = subprocess.run([sys.executable, script, "77"], capture_output=True, text=True)
     assert done.returncode == 2 and "allowed: 00, 01" in done.stderr
+
+
+def test_offsets_that_betray_nothing_have_to_do_so_at_every_place():
+    """Without offsets nothing shifts; offsets along the null vector fight, and shift nothing."""
+
+    def elsewhere(robot, x):
+        return lesson03.unseen_offsets(robot, x)
+
+    def nothing(robot, x):
+        return np.zeros(robot.n_arms)
+
+    def fighting(robot, x):
+        return 5e-3 * rk.null_vector(robot, rk.inverse_kinematics(robot, x))
+
+    def but_for(wrong):
+        return lambda robot, x: (wrong if np.allclose(x, [0.0, 0.08]) else elsewhere)(robot, x)
+
+    shift, torque, size = lesson03.betrayal(elsewhere)
+    assert shift.holds and torque.holds and size.holds and shift.value == pytest.approx(2.2, abs=0.05)
+    shift, torque, _ = lesson03.betrayal(but_for(nothing))
+    assert torque.holds and shift.value < 1e-6 and not shift.holds
+    shift, torque, _ = lesson03.betrayal(but_for(fighting))
+    assert torque.value > 5.0 and not torque.holds
+
+
+def test_a_machine_of_a_student_is_measured_in_the_units_of_its_limits():
+    base = np.array([[-0.24, -0.14], [0.24, -0.14], [0.0, 0.25]])
+    answer = rk.Manipulator(base=base, lengths=[0.2, 0.24], masses=0.1)
+    torque, _, reach = lesson12.behaviour(answer)
+    # What all get: rods of 0.67 kg/m, half a kilogram, rotors.
+    own = answer.replace(masses=0.67 * answer.lengths, load=0.5, rotor_inertia=3.35e-6, centers=None, inertias=None)
+    path = rk.triangle(own)
+    most = np.abs(rk.inverse_dynamics(own, path.q, path.qd, path.qdd)).max()
+    assert (torque.unit, reach.unit[:2]) == ("mN m", "mm")
+    assert torque.value == pytest.approx(1e3 * most, rel=1e-9)
+    assert reach.value == pytest.approx(1e3 * np.hypot(0.24, 0.14))
+
+
+def test_a_ripple_is_what_is_left_at_the_end_of_a_rest():
+    """Behind the first jolt, by which the machine that is not its drawing finds its place of rest."""
+    found = {measured.what: measured for measured in lesson10.survives(lesson10.spare_law)}
+    built, drawing = lesson10.machine()
+    path = rk.hold(drawing, [0.03, 0.02], 1.0, 2e-3)
+    law, limit = lesson10.spare_law(drawing), [rk.TorqueLimit(0.15)]  # N m, as the lesson says
+    run = rk.simulate(built, law, path, encoder=2000, model=drawing, faults=limit)
+    late = run.c[run.t > run.t[-1] - 0.5]
+    assert found["ripple at rest"].value == pytest.approx(1e3 * late.std(axis=0).max(), rel=1e-6)
+    slow = rk.triangle(drawing, 0.12, duration=2.5, dt=2e-3)
+    run = rk.simulate(built, law, slow, encoder=2000, model=drawing, faults=limit)
+    assert found["energy of the healthy triangle"].value == pytest.approx(run.energy.sum(), rel=1e-9)
+    broken = [*limit, rk.DeadDrive(0, 0.5)]
+    run = rk.simulate(built, law, slow, encoder=2000, model=drawing, faults=broken)
+    off = 1e3 * np.linalg.norm(run.x - slow.x, axis=1).max()
+    assert found["drive 1 dead: largest error"].value == pytest.approx(off, rel=1e-9)
