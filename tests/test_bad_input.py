@@ -485,3 +485,18 @@ def test_what_a_decorator_and_a_calibration_ask_for_is_looked_at_once():
     refused(rk.compiled, "memory", memory=-1)
     for bad in (-7.0, 0.0, [7.0, 7.0]):
         refused(rk.calibrate, "K_P", TESTBED, Q[:, :3], K_P=bad)
+
+
+@pytest.mark.parametrize("skew", [1e-7, 1e-10])
+def test_a_gain_that_is_hardly_symmetric_is_not(skew):
+    """Ten digits are written by hand, rounding leaves fifteen."""
+    gain, tilt = np.diag([7.0, 8.0, 9.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="K_P is not symmetric"):
+        rk.simulate(TESTBED, rk.PD(gain + 7.0 * skew * tilt, 0.2), PATH)
+    rk.simulate(TESTBED, rk.PD(gain + 1e-15 * tilt, 0.2), PATH)
+
+
+def test_a_tolerance_is_below_one():
+    with pytest.raises(ValueError, match="tolerance = 1; allowed"):
+        rk.degree_of_actuation(TESTBED, Q[0], tolerance=1.0)
+    assert rk.degree_of_actuation(TESTBED, Q[0], tolerance=1e-3) == 2

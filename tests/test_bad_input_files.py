@@ -262,3 +262,37 @@ def test_a_path_ends_in_toml(tmp_path):
     with pytest.raises(ValueError, match=r"source: the file .* cannot be read"):
         rk.load(tmp_path / "folder.toml")
     assert rk.load(Path(rk.data_path("testbed.toml"))) == rk.load()
+
+
+@pytest.mark.parametrize("t", [[0.0, 0.1, 0.1], [0.0, 0.1, 0.05]])
+def test_no_two_records_of_a_log_have_one_time(t):
+    with pytest.raises(ValueError, match=r"t\[2\] = .* follows 0\.1 s; allowed: increasing"):
+        rk.Log("mine", t, *np.zeros((3, 3, 3)))
+
+
+def test_units_of_a_data_file_are_coherent_and_have_no_prefix():
+    """SI: power R (c / k_t)^2 in W and energy f_c q in J come out without a factor; none is milli, degree or hour."""
+    kg, m, s, ampere = np.eye(4)
+    base = {"kg": kg, "m": m, "s": s, "A": ampere, "rad": 0 * m, "1": 0 * m}
+    base |= {"N": kg + m - 2 * s, "ohm": kg + 2 * m - 3 * s - 2 * ampere}
+
+    def dimension(unit):
+        parts = [(sign, part) for sign, side in zip((1, -1), unit.split("/"), strict=False) for part in side.split()]
+        powers = [(sign, *part.partition("^")[::2]) for sign, part in parts]
+        return sum(sign * int(power or 1) * base[word] for sign, word, power in powers)
+
+    of = {key: dimension(unit) for keys in UNITS_OF.values() for key, unit in keys.items() if unit}
+    torque, rate = dimension("N m"), -s
+    for key in ("base", "lengths", "centers", "side", "centre"):
+        assert np.array_equal(of[key], m), key
+    for key in ("dt", "duration", "rest", "velocity_filter", "time", "start", "stop"):
+        assert np.array_equal(of[key], s), key
+    for key in ("friction", "limit"):
+        assert np.array_equal(of[key], torque), key
+    assert np.array_equal(of["masses"], kg) and np.array_equal(of["load"], kg)
+    assert np.array_equal(of["resistance"] - 2 * of["torque_constant"], torque + rate - 2 * torque)  # W/(N m)^2
+    assert np.array_equal(of["torque_constant"], torque - ampere)
+    assert np.array_equal(of["inertias"], torque + 2 * s) and np.array_equal(of["rotor_inertia"], of["inertias"])
+    assert np.array_equal(of["K_P"], torque) and np.array_equal(of["K_D"], torque - rate)
+    assert np.array_equal(of["friction_velocity"], rate) and np.array_equal(of["gravity"], m - 2 * s)
+    assert not any(map(np.any, (of[key] for key in ("offset", "jump", "angle", "encoder", "drive", "mode"))))

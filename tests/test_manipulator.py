@@ -250,3 +250,13 @@ def test_arms_may_meet_where_no_two_of_their_circles_cross():
     """The outer circle of the second arm lies whole within the ring of the first, 0.8 to 1.2 m."""
     robot = rk.Manipulator(base=[[0.0, 0.0], [0.05, 0.0]], lengths=[[1.0, 0.2], [0.5, 0.49]], masses=0.1)
     assert rk.reachable(robot, [0.0, 0.95])
+
+
+def test_an_arm_with_all_its_mass_far_out_may_be_light_elsewhere():
+    """Two masses on a light arm: of one kilogram at the tip, and of a milligram at the elbow, by which it turns."""
+    values = {"base": [[-0.2, 0.0], [0.2, 0.0]], "lengths": 0.25, "masses": [1e-6, 1.0], "centers": 0.25}
+    robot = rk.Manipulator(**values, inertias=0.0)
+    q = rk.inverse_kinematics(robot, [0.0, 0.2])
+    assert np.linalg.eigvalsh(rk.mass_matrix(robot, q)).min() > 0.0
+    with pytest.raises(ValueError, match="let an arm move freely"):
+        rk.Manipulator(**values | {"masses": [1e-16, 1.0]}, inertias=0.0)

@@ -364,3 +364,9 @@ def test_no_law_of_the_package_takes_an_attribute():
     for law in (rk.APD(7.0, 0.2), rk.CTC(400.0, 40.0), rk.RedundantCTC(400.0, 40.0)):
         with pytest.raises(FrozenInstanceError):
             law.label = "mine"
+
+
+@pytest.mark.parametrize("size", [3, 6])
+def test_gains_of_six_joints_print_as_they_are_typed(size):
+    law = rk.RedundantAPD(np.diag(np.arange(1.0, size + 1)), 0.2) if size == 6 else rk.PD(np.eye(3), 0.2)
+    assert eval(repr(law), vars(rk)) == law
