@@ -15,6 +15,8 @@ from .detectors import named, where
 from .exercise import Case, Exercise, Measured
 from .seen import Seen, alike, largest, ratio_of
 
+_OWN = " (is it the robot of the arguments, and does robot.n_arms or robot.n_joints stand where it counts?)"
+
 
 def judged(exercise: Exercise, answer: Any) -> Result:
     """The verdict on one answer, whatever it is and does."""
@@ -102,7 +104,7 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
             if end.result.sentence == NOTHING and got:
                 raise Ended("wrong", f"{NOTHING}; some other case has one", "none") from None
             if all(labels[: k + 1]) and label not in labels[:k] and k > 0:
-                own = " (is it the robot of the arguments?)" * any(isinstance(v, Manipulator) for v in cases[k])
+                own = _OWN * any(isinstance(v, Manipulator) for v in cases[k])
                 end.add_note(f"; for {label}, while it goes through for {labels[0]}{own}")
             raise
     return got

@@ -89,9 +89,7 @@ EXERCISES = {
             "the mean compliance is used; each one counts with eta_i^2": _mu(lambda n, k: np.mean(1 / k)),
             "eta is not squared in the sum of compliances": _mu(lambda n, k: np.sum(n / k)),
             "eta is not squared in the sum of compliances, only its size": _mu(lambda n, k: np.sum(np.abs(n) / k)),
-            "only the softest drive is counted; it limits the tension, but the others give way too": (
-                _mu(lambda n, k: 1 / k.min())
-            ),
+            "only the softest drive is counted; the others give way too": (_mu(lambda n, k: 1 / k.min())),
             "only the first gain is used: right for equal gains only": _mu(lambda n, k: 1 / k[0]),
             "this is the number mu alone; the factor eta is missing, c = mu eta": (
                 lambda eta, gains, offset: -(eta @ offset) / np.sum(eta**2 / gains)

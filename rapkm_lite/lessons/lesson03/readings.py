@@ -12,9 +12,8 @@ from . import tasks
 def _log_mistakes(name: str) -> dict:
     """Wrong readings of a log with three rests, as functions of nothing."""
     read = {
-        "these are the measured errors of a rest, not the offsets: the machine has moved by the rest of them": (
-            lambda n, e, c: e[0]
-        ),
+        "these are the measured errors of a rest, or the smallest offsets that explain them, which is nearly the same: "
+        "one place tells one number, and by the rest of the offsets the machine has moved": lambda n, e, c: e[0],
         "these are the measured errors of a rest, averaged over the places: not the offsets": (
             lambda n, e, c: e.mean(axis=0)
         ),
