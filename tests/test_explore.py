@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import ipywidgets as widgets
@@ -871,3 +872,26 @@ def test_curves_of_a_law_that_works_are_seen():
 def test_only_whole_numbers_play(widget):
     with pytest.raises(ValueError, match="play = 'a'; allowed: the name of a slider with whole numbers"):
         explore.explorer(lambda picture, a: None, {"a": widget}, {"panel": {}}, play="a")
+
+
+def test_a_picture_is_drawn_by_one_thread(monkeypatch):
+    """A kernel may answer a hand on the picture in one thread while a cell sets a control in another."""
+    explorer = explore.machine()
+    usual, sent, done = (len(explorer.picture.marks), len(explorer.picture.handles)), [], threading.Event()
+    monkeypatch.setattr(explorer, "_watched", True)
+    monkeypatch.setattr(
+        explorer, "_post", lambda message, marks: sent.append((len(marks), len(explorer.picture.handles)))
+    )
+
+    def hand():
+        while not done.is_set():
+            explorer._message({"kind": "grab", "by": {"x": 1}})
+            explorer._message({"kind": "grab", "by": {"x": -1}})
+
+    page = threading.Thread(target=hand)
+    page.start()
+    for k in range(60):
+        explorer.set(y=k % 3)
+    done.set()
+    page.join()
+    assert len(sent) > 60 and set(sent) == {usual}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
-from collections.abc import Collection, Hashable
+from collections.abc import Callable, Collection, Hashable
 
 import ipywidgets as widgets
 import numpy as np
@@ -134,6 +135,20 @@ def player(widget) -> widgets.Box:
     speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
     widgets.jslink((play, "value"), (widget, "value"))
     return widgets.HBox([play, speed]).add_class("rapkm-player")
+
+
+def alone(method: Callable) -> Callable:
+    """A method of an explorer that waits for the others.
+
+    A kernel may answer the page in one thread while a cell runs in another; a picture that both draw would be mixed.
+    """
+
+    @functools.wraps(method)
+    def waiting(self, *arguments, **named):
+        with self._alone:
+            return method(self, *arguments, **named)
+
+    return waiting
 
 
 class Shown(widgets.VBox):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -17,7 +18,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, follow, moved, moving, parts, player, put, ranges, snap, tidied
+from .controls import Shown, alone, follow, moved, moving, parts, player, put, ranges, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -85,6 +86,7 @@ class Explorer:
         of_kind("picture", picture, Picture, "a Picture")
         self.draw, self.controls, self.picture = draw, dict(controls), picture
         self.numbers: dict[str, str] = {}
+        self._alone = threading.RLock()
         # The draw function of a ready-made explorer is local to the function that bears its name.
         self.name = draw.__qualname__.split(".")[0]
         maker = getattr(sys.modules[draw.__module__], self.name, draw)
@@ -131,6 +133,7 @@ class Explorer:
         """The picture as it is stored."""
         return png(self.picture, self.problem)
 
+    @alone
     def set(self, **values) -> Explorer:
         """Move controls from code and redraw once.
 
@@ -163,6 +166,7 @@ class Explorer:
             self._player.children[0].playing = False
         self.set(**self._first)
 
+    @alone
     def update(self) -> None:
         """Draw the present setting; a setting that cannot be computed is explained in the picture."""
         self.picture.begin()
@@ -194,6 +198,7 @@ class Explorer:
         finally:
             self._held = False
 
+    @alone
     def _changed(self, change) -> None:
         said, value = "", tidied(change["new"])
         # A browser rounds to steps of its own and sends back a value that differs in the last digit.
@@ -217,6 +222,7 @@ class Explorer:
             self.problem, self.numbers = f"The picture cannot be drawn: {type(error).__name__}: {error}", {}
         self.widget.remove_class("rapkm-busy")
 
+    @alone
     def _message(self, content: dict) -> None:
         """A page asks: "hello" from a new view, "grab" with values or steps for controls from a hand on a handle."""
         if content.get("kind") == "hello":
@@ -251,6 +257,7 @@ class Explorer:
         header, buffers = encode(self.picture, marks, self._told)
         self.canvas.send(message | header, buffers)
 
+    @alone
     def stored(self) -> dict:
         """The picture and its words as a MIME bundle, for readers without a kernel."""
         said = [repr(self), self.problem, *(f"{name}: {text}" for name, text in self.numbers.items())]

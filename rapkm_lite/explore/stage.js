@@ -128,11 +128,11 @@ class Panel {
 
   /** Title and legend are words of the page, which wrap by themselves; written anew only when they change. */
   entitle({ words = this.spec.title, style: { color, bold = true } = {} } = {}, legend = []) {
-    const { theme, heading, canvas } = this, told = JSON.stringify([legend, theme.dark]);
+    const { theme, heading, canvas } = this;
     if (heading.words !== words)
       canvas.ariaLabel = rich(heading, (heading.words = words)).textContent.trim() || canvas.ariaLabel;
     Object.assign(heading.style, { color: theme.colour(color) ?? "", fontWeight: bold ? 700 : 400 });
-    if (told === this.told) return;
+    if (this.told === (this.told = JSON.stringify([legend, theme.dark]))) return;
     this.head.replaceChildren(heading, make("div"));
     this.head.lastChild.append(...legend.map(([words, { color, width, dash, alpha }]) => {
       const entry = rich(make("span"), words), dashes = dash.map((d) => d * width * POINT).join(" ");
@@ -140,7 +140,6 @@ class Panel {
       entry.insertAdjacentHTML("afterbegin", `<svg><line x2="26" y1="5" y2="5" ${look} opacity="${alpha}"/></svg>`);
       return entry;
     }));
-    this.told = told;
   }
 
   /** Call paint(text, left, up) for each piece of words in its font; returns the width. */
@@ -476,8 +475,10 @@ export function mount(el, scene, link) {
       control.onkeydown = (event) => event.isTrusted || event.stopPropagation(); // JupyterLab would take the focus
       if (label?.textContent.includes("_")) rich(label, name);
     }
-    for (const part of around()?.querySelectorAll(".widget-play button") ?? [])
-      part.ariaLabel = part.querySelector("i")?.className.replace(/.*fa-/, "").replace("retweet", "repeat") ?? "";
+    for (const part of around()?.querySelectorAll("button") ?? []) {
+      const sign = part.querySelector(".widget-play i")?.className.replace(/.*fa-/, "").replace("retweet", "repeat");
+      Object.assign(part, sign && { ariaLabel: sign }).dataset.lmSuppressShortcuts = "true";
+    }
   }
 
   // A number typed beside a slider may lie between two of its steps; one that is left counts as entered.
@@ -520,8 +521,7 @@ function page(event) {
   const way = { PageDown: 1, PageUp: -1 }[event.key], written = event.target.closest?.("textarea, .cm-content");
   if (!way || !screens.length || written) return;
   event.preventDefault(), event.stopImmediatePropagation();
-  const now = screens.findLastIndex((screen) => screen.getBoundingClientRect().top < innerHeight / 2);
-  screens[now + way]?.scrollIntoView({ block: "start" });
+  screens[way + screens.findLastIndex((one) => one.getBoundingClientRect().top < innerHeight / 2)]?.scrollIntoView();
 }
 
 export default {

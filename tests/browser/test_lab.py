@@ -18,6 +18,12 @@ SMALL = """() => [...document.querySelectorAll('.rapkm-screen *')].filter(e => e
     && !e.closest('.rapkm-sentence') && parseFloat(getComputedStyle(e).fontSize) < 16)
     .map(e => e.className + ': ' + e.textContent)"""
 
+# Of each screen: the lower end of its lowest panel, the upper end of what is written below, the width of the picture.
+PLACES = """() => [...document.querySelectorAll('.rapkm-screen .rapkm')].map(root => {
+    const ends = [...root.querySelectorAll('.rapkm-panel')].map(panel => panel.getBoundingClientRect().bottom);
+    const below = root.querySelector('.rapkm-numbers').getBoundingClientRect().top;
+    return [Math.max(...ends), below, root.clientWidth]; })"""
+
 
 @pytest.fixture
 def open_notebook(browser, laboratory):
@@ -88,4 +94,17 @@ def test_dashboard_is_a_sequence_of_screens_for_a_projector(open_notebook):
     for seen, word in ((False, "Show"), (True, "Hide"), (False, "Show")):
         answer.wait_for(state="visible" if seen else "hidden", timeout=5000)
         first.get_by_role("button", name=f"{word} the answer").click()
+    notebook.check()
+
+
+@pytest.mark.parametrize("width, height", [(1024, 768), (700, 500)])
+def test_screens_of_a_small_window_leave_the_numbers_below_the_picture(width, height, open_notebook):
+    notebook = open_notebook("dashboard")
+    notebook.page.set_viewport_size({"width": width, "height": height})
+    notebook.run_all()
+    notebook.wait("() => document.querySelectorAll('.rapkm.live').length === 7", 60)
+    places = notebook.ask(PLACES)
+    assert len(places) == 7
+    for inside, below, wide in places:
+        assert inside <= below and wide > 240
     notebook.check()

@@ -386,6 +386,20 @@ def test_setting_is_copied_as_code_and_a_rounded_number_says_so(shown):
     notebook.wait(f"() => stage.root().querySelector('[aria-live]').textContent.includes('({x}, 30) mm')", 10)
 
 
+@pytest.mark.parametrize("name", ["copy this setting", "Reset"])
+def test_keys_on_a_button_do_not_edit_the_notebook(name, shown):
+    """In JupyterLab's command mode m makes text of a cell, b adds one, dd takes it away, arrows leave it."""
+    notebook = shown("machine")
+    button = notebook.page.get_by_role("button", name=name)
+    button.click()
+    cells = "() => document.querySelectorAll('.jp-Cell').length"
+    before = notebook.ask(cells)
+    for key in ("ArrowDown", "m", "b", "d", "d"):
+        notebook.page.keyboard.press(key)
+    assert button.evaluate("button => button === document.activeElement")
+    assert notebook.ask(cells) == before and notebook.ask("() => document.querySelectorAll('.rapkm.live').length") == 1
+
+
 @pytest.mark.parametrize("part", [".noUi-handle", ".widget-readout", "select", ".rapkm-knob"])
 def test_saving_is_saving_wherever_the_focus_is(part, shown):
     """Arrow keys are the explorer's; Ctrl+S is JupyterLab's."""
