@@ -270,29 +270,33 @@ def test_no_two_records_of_a_log_have_one_time(t):
         rk.Log("mine", t, *np.zeros((3, 3, 3)))
 
 
-def test_units_of_a_data_file_are_coherent_and_have_no_prefix():
-    """SI: power R (c / k_t)^2 in W and energy f_c q in J come out without a factor; none is milli, degree or hour."""
+def dimension(unit):
+    """Powers of kg, m, s and A in a unit, (4,)."""
     kg, m, s, ampere = np.eye(4)
     base = {"kg": kg, "m": m, "s": s, "A": ampere, "rad": 0 * m, "1": 0 * m}
     base |= {"N": kg + m - 2 * s, "ohm": kg + 2 * m - 3 * s - 2 * ampere}
+    parts = [(sign, part) for sign, side in zip((1, -1), unit.split("/"), strict=False) for part in side.split()]
+    powers = [(sign, *part.partition("^")[::2]) for sign, part in parts]
+    return sum(sign * int(power or 1) * base[word] for sign, word, power in powers)
 
-    def dimension(unit):
-        parts = [(sign, part) for sign, side in zip((1, -1), unit.split("/"), strict=False) for part in side.split()]
-        powers = [(sign, *part.partition("^")[::2]) for sign, part in parts]
-        return sum(sign * int(power or 1) * base[word] for sign, word, power in powers)
 
+def test_units_of_a_data_file_are_coherent_and_have_no_prefix():
+    """SI: power R (c / k_t)^2 in W and energy f_c q in J come out without a factor; none is milli, degree or hour."""
     of = {key: dimension(unit) for keys in UNITS_OF.values() for key, unit in keys.items() if unit}
-    torque, rate = dimension("N m"), -s
-    for key in ("base", "lengths", "centers", "side", "centre"):
-        assert np.array_equal(of[key], m), key
-    for key in ("dt", "duration", "rest", "velocity_filter", "time", "start", "stop"):
-        assert np.array_equal(of[key], s), key
-    for key in ("friction", "limit"):
-        assert np.array_equal(of[key], torque), key
-    assert np.array_equal(of["masses"], kg) and np.array_equal(of["load"], kg)
-    assert np.array_equal(of["resistance"] - 2 * of["torque_constant"], torque + rate - 2 * torque)  # W/(N m)^2
-    assert np.array_equal(of["torque_constant"], torque - ampere)
-    assert np.array_equal(of["inertias"], torque + 2 * s) and np.array_equal(of["rotor_inertia"], of["inertias"])
-    assert np.array_equal(of["K_P"], torque) and np.array_equal(of["K_D"], torque - rate)
-    assert np.array_equal(of["friction_velocity"], rate) and np.array_equal(of["gravity"], m - 2 * s)
-    assert not any(map(np.any, (of[key] for key in ("offset", "jump", "angle", "encoder", "drive", "mode"))))
+    expected = {
+        "m": ("base", "lengths", "centers", "side", "centre"),
+        "s": ("dt", "duration", "rest", "velocity_filter", "time", "start", "stop"),
+        "kg": ("masses", "load"),
+        "N m": ("friction", "limit", "K_P"),
+        "N m s": ("K_D",),
+        "N m s^2": ("inertias", "rotor_inertia"),
+        "N m/A": ("torque_constant",),
+        "1/s": ("friction_velocity",),
+        "m/s^2": ("gravity",),
+        "1": ("offset", "jump", "angle", "encoder", "drive", "mode"),
+    }
+    for unit, keys in expected.items():
+        for key in keys:
+            assert np.array_equal(of.get(key, np.zeros(4)), dimension(unit)), key
+    heat = of["resistance"] - 2 * of["torque_constant"] + 2 * dimension("N m")
+    assert np.array_equal(heat, dimension("N m/s"))
