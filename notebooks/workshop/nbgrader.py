@@ -35,7 +35,7 @@ PAGES = ("equations.md", "errata.md")
 CONFIG = """c = get_config()
 c.CourseDirectory.course_id = "rapkm_lite"
 c.ExecutePreprocessor.timeout = 120
-c.ClearSolutions.code_stub = {"python": "..."}
+c.ClearSolutions.code_stub = {"python": "# YOUR CODE HERE\\n..."}
 """
 
 
