@@ -268,7 +268,7 @@ def test_two_five_bars_disagree_only_with_offsets(size):
 
 def test_one_picture_per_working_mode():
     axes = np.ravel(plotting.plot_working_modes(rk.load(), [0.03, 0.02]))
-    assert len({ax.get_title() for ax in axes}) == len(axes) == 8
+    assert len({ax.get_title("left") + ax.get_title() for ax in axes}) == len(axes) == 8
 
 
 def test_workspace_grid_keeps_off_the_boundary():
