@@ -94,6 +94,9 @@ EXERCISES = {
             "the inertia is missing: these are roots of stiffnesses": (
                 lambda robot, q, K_P: _frequencies(_terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1]))
             ),
+            "K_P is missing: A^T A is the stiffness of drives of 1 N m/rad": (
+                lambda robot, q, K_P: tasks.pd_frequencies(robot, q, np.ones(robot.n_arms))
+            ),
             "the gains are averaged: unequal gains turn and split the two modes": (
                 lambda robot, q, K_P: tasks.pd_frequencies(robot, q, np.full(robot.n_arms, np.mean(K_P)))
             ),
@@ -146,6 +149,7 @@ EXERCISES = {
             "friction and gravity (Q) are missing": _without("Q"),
             "the acceleration is missing: an unknown mass matters where the motion accelerates": _without("G"),
             "these are forces in N, before the inertia is divided out": _force,
+            "the inertia is not divided out: these are forces over K_P": lambda *case: _force(*case) / case[-1],
         },
     ),
     "11.gain_for_bandwidth": GAIN_FOR_BANDWIDTH,
