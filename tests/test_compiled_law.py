@@ -314,6 +314,16 @@ REFUSED = {
 }
 
 
+class Table(dict):
+    def __call__(self, t, q_a, qd_a, d):
+        return -7.0 * (q_a - d.q_a)
+
+
+def test_an_object_is_no_function_that_can_be_compiled():
+    with pytest.raises(ValueError, match=r"the law Table cannot be compiled \(it is no function but an object\)"):
+        rk.simulate(ROBOT, rk.compiled(Table()), PATH)
+
+
 def test_a_compiled_law_that_was_copied_remembers_as_much():
     law = rk.compiled(lambda t, q_a, qd_a, d, memory: -7.0 * (q_a - d.q_a), memory=3)
     make, arguments = law.__reduce__()

@@ -565,3 +565,14 @@ def test_a_controller_without_dt_samples_at_a_millisecond():
     controller = rk.Controller(rk.PID(K_P=1.0, K_I=8.0, K_D=0.1), ROBOT)
     first, second = (controller(t, hold.q_a[0] + e, hold.qd_a[0], hold[0]) for t in (0.0, 1e-3))
     assert_allclose(second - first, -8.0 * e * 1e-3, rtol=1e-6)
+
+
+class Shifts(rk.Law):
+    def step(self, memory, sample):
+        sample.q_a = sample.q_a + 0.1
+        return np.zeros(3), memory
+
+
+def test_no_law_can_shift_what_was_measured_for_a_filter_around_it():
+    with pytest.raises(AttributeError, match="q_a of a Sample cannot be set"):
+        rk.simulate(ROBOT, rk.AntagonismFilter(Shifts()), PATH)

@@ -214,6 +214,30 @@ def test_faults_that_are_not_to_blame_are_not_named():
         assert "unstable gain" in error.reason and "acts" not in error.reason
 
 
+def pushes(t, q_a, qd_a, desired):
+    return pd(t, q_a, qd_a, desired) if t < 0.3 else np.array([5.0, 0.0, 0.0])
+
+
+def test_a_fault_that_ended_long_ago_is_not_named():
+    """The law throws the machine out, with or without it; named it is as long as it may have."""
+    path = rk.hold(ROBOT, [0.0, 0.0], 0.5)
+    for broken in ([], [rk.EncoderDropout(0, 0.02, 0.021)]):
+        error = lost(ROBOT, pushes, path, faults=broken)
+        assert error.time > 0.35 and "look at gains" in error.reason and "acts" not in error.reason
+    error = lost(ROBOT, pushes, path, faults=[rk.EncoderDropout(0, 0.02, 0.3)])
+    assert "EncoderDropout(0, 0.02, 0.3) acts from t = 0.02 s to 0.3 s" in error.reason
+
+
+@pytest.mark.parametrize("inner", [pd, PD], ids=["a function", "of the package"])
+def test_a_lost_pose_is_laid_to_the_fault_that_changes_readings(inner):
+    """A dead drive alone costs no run, the jump alone does."""
+    path, law = rk.hold(ROBOT, [0.0, 0.0], 0.3), rk.AntagonismFilter(inner)
+    dead, jump = rk.DeadDrive(0, 0.05), rk.OffsetJump(2, 0.1, 2.0)
+    assert len(rk.simulate(ROBOT, law, path, faults=[dead])) == len(path)
+    for broken in ([jump], [dead, jump]):
+        assert f"({jump!r} acts from" in lost(ROBOT, law, path, faults=broken).reason
+
+
 def test_angles_that_fit_no_pose():
     far = 2.5 * np.array([1.0, -1.0, 1.0])
     still = rk.hold(ROBOT, [0.0, 0.0], 0.01)
@@ -380,6 +404,11 @@ def test_a_bad_first_answer_is_no_failed_row():
             rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", chunk=chunk)
         assert "first sample of run 2" in caught.value.__notes__[-1]
         assert caught.value.partial.failed.tolist() == [True, False, True]
+
+
+def test_truth_values_are_no_torques_that_mask_a_row():
+    with pytest.raises(ValueError, match="is not numeric; allowed: real numbers"):
+        rk.sweep(ROBOT, lambda t, q_a, qd_a, d: q_a > 0.0, PATH, OFFSET, failed="mask")
 
 
 def no_number_at_zero(t, q_a, qd_a, desired):

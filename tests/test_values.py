@@ -58,6 +58,8 @@ def test_values_are_equal_by_value():
         assert value != other
     assert Sample(np.ma.masked_less([1.0, 2.0], 1.5)) != Sample(np.ma.masked_less([1.0, 2.0], 0.5))
     assert Sample(np.array(7)) == Sample(7.0) and hash(Sample(np.array(7))) == hash(Sample(7.0))
+    assert Sample(np.nan) == Sample(-np.float64("nan")) and hash(Sample(np.nan)) == hash(Sample(-np.float64("nan")))
+    assert Sample(float("nan")) == Sample(float("nan")) and hash(Sample(float("nan"))) == hash(Sample(float("nan")))
 
 
 def test_nan_of_either_sign_is_one_key():
@@ -154,7 +156,7 @@ def test_no_law_can_shift_the_path_through_its_sample():
         with pytest.raises(ValueError, match="read-only"):
             array += 0.01
         assert np.array_equal(array, getattr(PATH, name)[17])
-    assert PATH[17] is sample and PATH[np.int64(17)] == sample and PATH[-1] == PATH[100]
+    assert PATH[17] == sample and PATH[np.int64(17)] == sample and PATH[-1] == PATH[100]
     assert [d.q_a[0] for d in PATH] == PATH.q_a[:, 0].tolist()
     with pytest.raises(IndexError):
         PATH[101]

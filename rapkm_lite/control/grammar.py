@@ -201,7 +201,7 @@ def _fits(c, shape: tuple) -> bool:
         c = np.asarray(c)
     except (TypeError, ValueError):
         return False
-    return c.shape == shape and c.dtype.kind in "biuf"
+    return c.shape == shape and c.dtype.kind in "iuf"
 
 
 def ask(law, memory, sample) -> tuple[np.ndarray, object]:

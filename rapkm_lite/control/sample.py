@@ -55,9 +55,15 @@ class Sample:
         sample._fill(*known)
         return sample
 
-    def _fill(self, keeper, t, q_a, qd_a, desired, truth):
-        self.t, self.dt, self.model, self.q_a, self.qd_a, self.desired = t, keeper.dt, keeper.model, q_a, qd_a, desired
-        self._keeper, self._truth, self._found = keeper, truth, {}
+    def _fill(self, *known):
+        keeper, t, q_a, qd_a, desired, truth = known
+        # As `__slots__` lists them.
+        values = {}, keeper, truth, desired, keeper.dt, keeper.model, q_a, qd_a, t
+        for put, value in zip(_SLOTS, values, strict=True):
+            put(self, value)
+
+    def __setattr__(self, name, value):
+        raise AttributeError(f"{name} of a Sample cannot be set, others read it, too; allowed: a name of your own")
 
     def errors(self) -> tuple[np.ndarray, np.ndarray]:
         """Measured minus desired base angles and rates, (N,) each."""
@@ -104,6 +110,9 @@ class Sample:
         here = at(model, inverse_kinematics(model, found))
         A = here.A
         return here, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
+
+
+_SLOTS = [getattr(Sample, name).__set__ for name in Sample.__slots__]
 
 
 class Controller:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import namedtuple
+from collections.abc import Hashable
 from inspect import isfunction
 from typing import Any
 
@@ -27,12 +28,27 @@ def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
     return start, start + memory, start + memory + N
 
 
-@functools.lru_cache(maxsize=64)
 def pointer(function, N: int, matrices: bool, memory: int):
     """The law ``function(t, q_a, qd_a, d[, at][, memory]) -> c`` as a C function of the buffer.
 
     Raises ValueError with a sentence on what is not allowed when it does not compile.
     """
+    if not isinstance(function, Hashable):
+        raise ValueError(_cannot(function, N, matrices or memory > 0, "it is no function but an object"))
+    return _pointer(function, N, matrices, memory)
+
+
+def _cannot(function, N: int, asks: bool, words: str) -> str:
+    name = getattr(function, "__name__", type(function).__name__)
+    plain = "a rk.Law whose step calls it" if asks else "the same function without @compiled"
+    return (
+        f"the law {name} cannot be compiled ({words}); allowed: a function of numbers and NumPy arrays that "
+        f"returns c ({N},), or {plain}, which runs in Python"
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _pointer(function, N: int, matrices: bool, memory: int):
     from numba import cfunc, njit, types
     from numba.core import errors
 
@@ -118,9 +134,4 @@ def pointer(function, N: int, matrices: bool, memory: int):
     except Exception as error:
         found = [signature.return_type for signature in getattr(law, "nopython_signatures", ())]
         words = refusal(function, error, found[0] if found else None)
-        name = getattr(function, "__name__", type(function).__name__)
-        plain = "a rk.Law whose step calls it" if matrices or memory else "the same function without @compiled"
-        raise ValueError(
-            f"the law {name} cannot be compiled ({words}); allowed: a function of numbers and NumPy arrays that "
-            f"returns c ({N},), or {plain}, which runs in Python"
-        ) from error
+        raise ValueError(_cannot(function, N, matrices or memory > 0, words)) from error

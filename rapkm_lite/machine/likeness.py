@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import types
 from typing import Any
 
@@ -52,7 +53,7 @@ def key(value: Any) -> Any:
     if _decides(value):
         try:
             hash(value)
-            return value
+            return math.nan if isinstance(value, float) and value != value else value
         except Exception:
             pass
     return type(value)  # an object may change, its hash may not

@@ -10,7 +10,6 @@ import numpy as np
 from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
-from . import sampling
 from .kinematics import unit_vector
 from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic, sample_times, slow_edges, slow_turns
 
@@ -93,22 +92,15 @@ class Trajectory(Desired):
     def __getitem__(self, k) -> Desired:
         rows = chosen(len(self), k)
         if isinstance(rows, int | np.integer):  # also of an array without axes
-            return self._samples.get(int(rows)) or self._sample(rows)
+            # Made for who asks: an array that is read-only can still be given another shape in place.
+            k, sample = range(len(self))[rows], object.__new__(Desired)
+            row = {name: getattr(self, name)[k] for name in (*_MOTION, "q_a", "qd_a", "qdd_a")}
+            sample.__dict__.update(row, n_arms=self.n_arms)
+            return sample
         return Desired(self.n_arms, *(getattr(self, name)[rows] for name in _MOTION))
 
     def __iter__(self):
         return map(self.__getitem__, range(len(self)))
-
-    @cached_property
-    def _samples(self) -> dict[int, Desired]:
-        """Samples that were asked for: a loop asks for each, as often as it runs; those of long paths are not kept."""
-        return {}
-
-    def _sample(self, k) -> Desired:
-        k, sample = range(len(self))[k], object.__new__(Desired)
-        row = {name: getattr(self, name)[k] for name in (*_MOTION, "q_a", "qd_a", "qdd_a")}
-        sample.__dict__.update(row, n_arms=self.n_arms)
-        return self._samples.setdefault(k, sample) if len(self) <= sampling.PART else sample
 
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles).

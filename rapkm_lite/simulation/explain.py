@@ -22,7 +22,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .codes import FILTERS, FORMS
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
-from .faults import Fault, TorqueLimit, blank_table
+from .faults import DeadDrive, EncoderDropout, Fault, TorqueLimit, begins, blank_table, described
 from .growth import growth, inner_law, magnified, swung
 from .loop import closed_loop
 from .setup import Setup
@@ -56,7 +56,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         name = getattr(getattr(written, "function", written), "__name__", None) or short(written)
         return f"the law {name} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
-    words = next(_causes(setup, law, k, written is None, c), f"look at gains{_too(setup)} and the path")
+    words = next(_causes(setup, law, status, k, written is None, c), f"look at gains{_too(setup)} and the path")
     return f"{REASONS[status]} ({words})"
 
 
@@ -89,12 +89,12 @@ def _library(file: str) -> bool:
     return "site-packages" in path.parts or any(path.is_relative_to(folder) for folder in _FOREIGN)
 
 
-def _causes(setup: Setup, law, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
+def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:
     """What may have been the cause, the surest first."""
-    begun = sorted((fault for fault in setup.broken if _begin(fault) <= setup.trajectory.t[k]), key=_begin)
+    begun = sorted((fault for fault in setup.broken if begins(fault) <= setup.trajectory.t[k]), key=begins)
     setup = _with(setup, begun) if setup.broken else setup  # what comes later is not to blame, nor in any repetition
     if not ours:
-        yield from _seen(setup, begun, c)
+        yield from _seen(setup, _suspects(setup, begun, status, k), c)
         return
     factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
     yield from _model(setup, law, k, factor)
@@ -133,10 +133,10 @@ def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
     dt, felt = setup.trajectory.dt, [fault for fault in begun if fault.felt(c)]
     for fault in felt:
         # A machine that flies apart swings, whatever the cause; a limit may be what an unstable gain leads to.
-        before = c[: math.ceil(_begin(fault) / dt)]
+        before = c[: math.ceil(begins(fault) / dt)]
         if len(before) > 12 and not isinstance(fault, TorqueLimit) and not swung(before, dt):
-            yield _words(fault)
-    yield from filter(None, [swung(c, dt), *map(_words, felt)])
+            yield described(fault)
+    yield from filter(None, [swung(c, dt), *map(described, felt)])
     if np.abs(setup.sensors.offset).max() > 0.1:
         yield f"{_offsets(setup)}, is large"
     count, delay = setup.sensors.count, setup.sensors.velocity_filter
@@ -146,20 +146,27 @@ def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
         yield f"velocity_filter = {delay:g} s delays the rates by many samples"
 
 
+def _suspects(setup: Setup, begun: list[Fault], status: int, k: int) -> list[Fault]:
+    """Faults but for those that ended long before sample k; of a lost pose those first that change readings."""
+    now = setup.trajectory.t[k]
+    lasting = [fault for fault in begun if not isinstance(fault, EncoderDropout) or fault.stop > now - 0.1]
+    return sorted(lasting, key=lambda fault: status == NO_POSE and isinstance(fault, DeadDrive | TorqueLimit))
+
+
 def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
     """Faults that have begun, the first one first, and a limit of the law's own."""
     for fault in begun:
         if _runs(_with(setup, [f for f in begun if f is not fault]), law, k):
-            yield f"{_words(fault)}; without that it is not lost"
+            yield f"{described(fault)}; without that it is not lost"
     if len(begun) > 1 and _runs(_with(setup, []), law, k):
-        yield f"{_words(begun[0])}, and other faults with it; without them it is not lost"
+        yield f"{described(begun[0])}, and other faults with it; without them it is not lost"
     inner = inner_law(law)
     if isinstance(inner, PID) and np.isfinite(inner.limit).any():
         free, own = _replaced(law, limit=math.inf), f"the law's own limit of {inner.limit.min():g} N m"
         if _runs(setup, free, k):
             yield f"{own}; without it it is not lost"
         if begun and _runs(_with(setup, []), free, k):
-            yield f"{_words(begun[0])}, and {own}; without both it is not lost"
+            yield f"{described(begun[0])}, and {own}; without both it is not lost"
 
 
 def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
@@ -229,15 +236,6 @@ def _difference(model: Manipulator, robot: Manipulator) -> str:
         if off > 0.0:
             parts.append(f"{name} that are off by {f'{100 * off / size:.3g} %' if size > 0.0 else f'{off:g}'}")
     return " and ".join(parts)
-
-
-def _begin(fault: Fault) -> float:
-    return float(getattr(fault, "time", getattr(fault, "start", 0.0)))
-
-
-def _words(fault: Fault) -> str:
-    since = "" if isinstance(fault, TorqueLimit) else f" from t = {_begin(fault):g} s on"
-    return f"{fault!r} acts{since}"
 
 
 def _with(setup: Setup, faults: list[Fault]) -> Setup:

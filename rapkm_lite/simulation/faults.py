@@ -168,6 +168,22 @@ def _from(t: np.ndarray, time: float) -> np.ndarray:
     return t >= time - 1e-6 * t[1]
 
 
+def begins(fault: Fault) -> float:
+    """When a fault begins, in s."""
+    return float(getattr(fault, "time", getattr(fault, "start", 0.0)))
+
+
+def described(fault: Fault) -> str:
+    """What a fault does, for a sentence.
+
+    >>> described(EncoderDropout(0, 0.5, 0.7)), described(TorqueLimit(0.3))
+    ('EncoderDropout(0, 0.5, 0.7) acts from t = 0.5 s to 0.7 s', 'TorqueLimit(0.3) acts')
+    """
+    until = f"to {fault.stop:g} s" if isinstance(fault, EncoderDropout) else "on"
+    since = "" if isinstance(fault, TorqueLimit) else f" from t = {begins(fault):g} s {until}"
+    return f"{fault!r} acts{since}"
+
+
 def blank_table(t: np.ndarray, N: int) -> FaultTable:
     """The table of a healthy machine."""
     shape = len(t), N
