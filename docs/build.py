@@ -105,7 +105,8 @@ def prepare(notebooks: Path, repository: str) -> None:
     write(WORK / "lessons/equations.md", lessons.index_page(index, reference.page_of()))
     write(WORK / "lessons/errata.md", lessons.errata_page((notebooks / "errata.md").read_text(encoding="utf-8")))
     # In the repository a README, on the site the first page for teachers, in a folder beside the teaching pages.
-    instructor = (notebooks / "README.md").read_text(encoding="utf-8").replace("](../docs/teaching/", "](../teaching/")
+    readme = next(folder / "README.md" for folder in (notebooks, ROOT / "notebooks") if (folder / "README.md").exists())
+    instructor = readme.read_text(encoding="utf-8").replace("](../docs/teaching/", "](../teaching/")
     write(WORK / "lessons/instructor.md", lessons.linked(instructor))
     reference.write(WORK / "reference")
     develop = pages(HERE, "develop")
@@ -160,6 +161,8 @@ def main() -> int:
     parser.add_argument("--repository", default="", help="owner/name on GitHub, for links to hosted sessions")
     parser.add_argument("--strict", action="store_true", help="fail on a warning")
     options = parser.parse_args()
+    if not (options.lessons / "equations.md").exists():
+        parser.error(f"--lessons {options.lessons}: no equations.md there; allowed: a copy of notebooks")
     prepare(options.lessons.resolve(), options.repository)
     shutil.rmtree(SITE, ignore_errors=True)
     with tempfile.TemporaryDirectory() as doctrees:

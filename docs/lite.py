@@ -1,14 +1,16 @@
 """Put the lessons into the browser: python docs/lite.py --pyodide FOLDER, after docs/build.py.
 
-Needs docs/requirements.txt and docs/requirements-lite.txt.  FOLDER is an unpacked distribution of Pyodide with NumPy,
-SciPy and Matplotlib.  The result, docs/_site/lite, asks for nothing from elsewhere: our wheel and what it needs stand
-in the distribution's lock file, so that `import rapkm_lite` installs them, and the notebooks stay as they are.
+Needs docs/requirements.txt and docs/requirements-lite.txt.  FOLDER is an unpacked full distribution of Pyodide, with
+NumPy, SciPy and Matplotlib.  The result, docs/_site/lite, asks for nothing from elsewhere: our wheel and what it needs
+stand in the distribution's lock file, so that `import rapkm_lite` installs them, and the notebooks stay as they are.
+Unlike the other pages it needs a server, such as python -m http.server -d docs/_site.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
+import importlib.util
 import json
 import re
 import shutil
@@ -32,14 +34,29 @@ NEEDED = (
     "ipywidgets", "comm", "widgetsnbextension", "jupyterlab-widgets", "anywidget", "psygnal", "typing-extensions",
     "sympy", "mpmath",
 )  # fmt: skip
+# What the kernel and the package ask the distribution for.
+BROUGHT = "micropip", "packaging", "numpy", "scipy", "matplotlib"
 PLUGIN = "@jupyterlite/pyodide-kernel-extension:kernel"
 SITE = {
     "jupyter-lite-schema-version": 0,
     "jupyter-config-data": {"litePluginSettings": {PLUGIN: {"pyodideUrl": "./static/pyodide/pyodide.js"}}},
 }
 FIRST = "00_start_here"
+FROM_DISK = """\
+if (location.protocol === "file:") for (const link of document.querySelectorAll(".on-wide, .on-narrow"))
+  link.onclick = () => alert("Lessons that run need a server: python -m http.server, in this site's folder.") ?? false;
+"""
 MINUTE = "the first start takes a minute"
 SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
+
+
+def lacking(pyodide: Path) -> list[str]:
+    """What a distribution must have and has not; its core, without packages, is not enough."""
+    missing = [name for name in ("pyodide.js", "pyodide-lock.json") if not (pyodide / name).is_file()]
+    if missing:
+        return missing
+    packages = json.loads((pyodide / "pyodide-lock.json").read_text(encoding="utf-8")).get("packages", {})
+    return [name for name in BROUGHT if not (pyodide / packages.get(name, {}).get("file_name", "/")).is_file()]
 
 
 def run(*command: object) -> None:
@@ -103,10 +120,11 @@ def distribution(source: Path, target: Path) -> None:
 def ways(lite: str, lesson: str, words: str) -> str:
     """A link to a lesson that runs: JupyterLab, or on a narrow screen, where it leaves no room, the notebook alone."""
     place = f"index.html?path={lesson}.ipynb"
-    return "".join(
+    links = (
         f'<a class="{screen}" href="{lite}/{form}/{place}">{words}</a>'
         for screen, form in (("on-wide", "lab"), ("on-narrow", "notebooks"))
     )
+    return "".join(links) + f"<script>{FROM_DISK}</script>"
 
 
 def link(lite: Path) -> None:
@@ -131,10 +149,16 @@ def link(lite: Path) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pyodide", type=Path, required=True, help="folder with pyodide.js and pyodide-lock.json")
-    parser.add_argument("--output", type=Path, default=HERE / "_site/lite")
+    parser.add_argument("--output", type=Path, default=HERE / "_site/lite", help="an empty folder, or one made before")
     options = parser.parse_args()
-    if not (options.pyodide / "pyodide-lock.json").exists():
-        parser.error(f"--pyodide {options.pyodide}: no pyodide-lock.json there; allowed: an unpacked distribution")
+    if missing := lacking(options.pyodide):
+        whole = "an unpacked full distribution of Pyodide"
+        parser.error(f"--pyodide {options.pyodide}: no {', '.join(missing)} there; allowed: {whole}")
+    if not importlib.util.find_spec("jupyterlite_core"):
+        parser.error("JupyterLite is not installed; needed: python -m pip install -r docs/requirements-lite.txt")
+    if options.output.exists() and not (options.output / "jupyter-lite.json").exists():
+        if not options.output.is_dir() or any(options.output.iterdir()):
+            parser.error(f"--output {options.output}: not made by this; allowed: an empty folder, or one made before")
     shutil.rmtree(options.output, ignore_errors=True)
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
@@ -148,7 +172,7 @@ def main() -> int:
     distribution(options.pyodide, options.output / "static/pyodide")
     link(options.output)
     size = sum(path.stat().st_size for path in options.output.rglob("*") if path.is_file())
-    print(f"{options.output}: {size / 1e6:.0f} MB")
+    print(f"{options.output}: {size / 1e6:.0f} MB; to run it: python -m http.server -d {options.output.parent}")
     return 0
 
 

@@ -555,6 +555,27 @@ def test_reset_stops_what_plays():
     assert isinstance(play, widgets.Play) and play.playing is False
 
 
+def test_steps_under_way_when_reset_stops_a_player_are_not_taken():
+    """A browser has sent them before it hears of the reset."""
+    explorer = explore.animation().set(time=800)
+    explorer._player.play.playing = True
+    explorer.reset()
+    explorer.controls["time"].value = 920
+    assert explorer.values["time"] == 400
+    explorer.controls["filter"].value = explorer.controls["filter"].options[-1]
+    assert explorer.values["filter"] != explorer._first["filter"]
+
+
+@pytest.mark.parametrize("message", ["still", "hello"])
+def test_a_view_that_goes_stops_what_plays_and_a_new_one_does_not(message):
+    explorer = explore.animation()
+    explorer._player.play.playing = True
+    explorer._message({"kind": message})
+    assert explorer._player.play.playing is (message == "hello")
+    explorer.controls["time"].value = 920
+    assert explorer.values["time"] == 920
+
+
 def test_reset_goes_back_to_what_was_shown_first(capsys):
     explorer = light().set(slope=0.5)
     explorer._ipython_display_()

@@ -151,6 +151,27 @@ def test_pages_of_a_site_lead_to_lessons_that_run_in_it_as_wide_as_the_screen(tm
         assert "pictures are still:" not in made
 
 
+def test_lessons_in_the_browser_need_a_full_distribution_and_overwrite_nothing(tmp_path, monkeypatch, capsys):
+    """Nothing of a folder that was not made by it is lost; a lock file names what its core does not hold."""
+    lite, pyodide, mine = module("lite.py"), tmp_path / "pyodide", tmp_path / "mine"
+    pyodide.mkdir()
+    assert lite.lacking(pyodide) == ["pyodide.js", "pyodide-lock.json"]
+    (pyodide / "pyodide.js").touch()
+    wheels = {name: {"file_name": f"{name}.whl"} for name in lite.BROUGHT}
+    (pyodide / "pyodide-lock.json").write_text(json.dumps({"packages": wheels}), encoding="utf-8")
+    assert lite.lacking(pyodide) == list(lite.BROUGHT)
+    for row in wheels.values():
+        (pyodide / row["file_name"]).touch()
+    assert not lite.lacking(pyodide)
+    mine.mkdir()
+    (mine / "thesis.txt").write_text("years of work", encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", ["lite.py", "--pyodide", str(pyodide), "--output", str(mine)])
+    monkeypatch.setattr(lite.importlib.util, "find_spec", lambda name: name)
+    with pytest.raises(SystemExit):
+        lite.main()
+    assert "allowed: an empty folder" in capsys.readouterr().err and (mine / "thesis.txt").exists()
+
+
 def test_every_public_name_has_its_place_in_the_reference(tmp_path):
     module("pages/reference.py").write(tmp_path / "reference")
     pages = "\n".join(path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.rst"))

@@ -78,5 +78,6 @@ def write(folder: Path) -> None:
     ]
     for part, (title, module, source, names) in parts.items():
         (folder / f"{part}.rst").write_text(_page(title, module, source, names), encoding="utf-8")
-        lines += [title, "-" * len(title), "", *(_line(module, source, name) for name in names), ""]
+        lines += [title, "-" * len(title), "", f".. currentmodule:: {module}", ""]
+        lines += [*(_line(module, source, name) for name in names), ""]
     (folder / "index.rst").write_text("\n".join(lines), encoding="utf-8")

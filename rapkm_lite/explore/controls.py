@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import math
+import time
 from collections.abc import Callable, Collection, Hashable
 
 import ipywidgets as widgets
@@ -127,14 +128,28 @@ def parts(draw, controls, play, live, about) -> None:
         )
 
 
-def player(widget) -> widgets.Box:
+class Player(widgets.HBox):
     """A play button for a slider, with its speed."""
-    ends = {"min": widget.min, "max": widget.max, "step": widget.step, "interval": 80}
-    play = widgets.Play(widget.value, **ends, layout={"width": "120px"})
-    # A step of 80 ms every 80 ms would be real time.
-    speed = widgets.HTML(f"plays at {widget.step / 80:g} × real time" if " in ms" in widget.description else "")
-    widgets.jslink((play, "value"), (widget, "value"))
-    return widgets.HBox([play, speed]).add_class("rapkm-player")
+
+    def __init__(self, slider):
+        ends = {"min": slider.min, "max": slider.max, "step": slider.step, "interval": 80}
+        self.play = widgets.Play(slider.value, **ends, layout={"width": "120px"})
+        # A step of 80 ms every 80 ms would be real time.
+        speed = widgets.HTML(f"plays at {slider.step / 80:g} × real time" if " in ms" in slider.description else "")
+        widgets.jslink((self.play, "value"), (slider, "value"))
+        super().__init__([self.play, speed])
+        self.add_class("rapkm-player")
+        self.slider, self._back = slider, -math.inf
+
+    def stop(self, back: bool = False) -> None:
+        """Stop what plays; back : and take no more steps of it, of which some are under way."""
+        if self.play.playing:
+            self.play.playing = False
+            self._back = time.monotonic() if back else -math.inf
+
+    def late(self, slider) -> bool:
+        """Is what a slider tells one of those steps?"""
+        return slider is self.slider and time.monotonic() < self._back + 1.0
 
 
 def alone(method: Callable) -> Callable:

@@ -18,7 +18,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Shown, alone, follow, moved, moving, parts, player, put, ranges, snap, tidied
+from .controls import Player, Shown, alone, follow, moved, moving, parts, put, ranges, snap, tidied
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -96,7 +96,7 @@ class Explorer:
         named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
         self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, **named})
         self.canvas.on_msg(lambda _, content, buffers: self._message(content))
-        cells, self._player = [], player(controls[play]) if play else None
+        cells, self._player = [], Player(controls[play]) if play else None
         for name, widget in self.controls.items():
             if hasattr(widget, "continuous_update"):
                 widget.continuous_update = live and _CONTINUOUS
@@ -148,7 +148,7 @@ class Explorer:
     def screen(self, question: str, answer: str) -> Explorer:
         """Show it as one screen of a projector: a question, the controls beside the picture, the answer on demand."""
         bar, canvas = self.widget.children
-        bar.layout.grid_template_columns = "1fr"
+        bar.layout.grid_template_columns = "minmax(0, 1fr)"
         show = widgets.ToggleButton(description="Show the answer", layout={"width": "auto"})
         said = widgets.HTML(f"<p>{answer}</p>", layout={"display": "none"})
         show.observe(lambda change: setattr(said.layout, "display", "block" if change["new"] else "none"), "value")
@@ -162,8 +162,8 @@ class Explorer:
 
     def reset(self) -> None:
         """Back to the first setting, as it was shown first; what plays stops."""
-        if self._player is not None:
-            self._player.children[0].playing = False
+        if self._player:
+            self._player.stop(back=True)
         self.set(**self._first)
 
     @alone
@@ -204,6 +204,8 @@ class Explorer:
         # A browser rounds to steps of its own and sends back a value that differs in the last digit.
         if self._held or value == tidied(change["old"]):
             return
+        if self._player and self._player.late(change["owner"]):
+            return self.reset()
         near = snap(change["owner"], value)
         if near != value:
             said = f"{value:g} was rounded to {near:g}"
@@ -224,12 +226,14 @@ class Explorer:
 
     @alone
     def _message(self, content: dict) -> None:
-        """A page asks: "hello" from a new view, "grab" with values or steps for controls from a hand on a handle."""
+        """A page asks: "hello" from a new view, "still" from one that goes, "grab" with a hand's values or steps."""
         if content.get("kind") == "hello":
             self._told.clear()
             self._watched = True
             self._post({"kind": "fixed"}, self.picture.fixed)
             self._send()
+        elif content.get("kind") == "still" and self._player:
+            self._player.stop()
         elif content.get("kind") == "grab":
             question = {"from": content.get("from"), "seq": content.get("seq")}
             try:

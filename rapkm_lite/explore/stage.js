@@ -1,7 +1,7 @@
 // A picture of recorded marks on canvases, and handles to take it by.  One module, nothing to build, no dependency.
 // mount(el, scene, link) shows a picture; scene = {panels, layout, widths, size, name, about, labels, ranges, code};
 // link = {send(message), receive(callback(message, buffers))} reaches whoever computes, a kernel or a script.
-//   to it:   {kind: "hello"} | {kind: "grab", from, seq, to: {control: value}, by: {control: steps}}
+//   to it:   {kind: "hello" | "still"} | {kind: "grab", from, seq, to: {control: value}, by: {control: steps}}
 //   from it: {kind: "fixed" | "picture" | "lost", from?, seq?, marks, styles, images, frames, handles, numbers, ...}
 // A mark is [kind, panel, style, points, words?]: style a number in `styles` or an object, points how many pairs of the
 // first buffer, or an array of numbers.  Lengths in styles are points (1/72 inch), colours "#rrggbb" for white paper.
@@ -179,8 +179,7 @@ class Panel {
     const plan = layout(this.spec, palette, frame, [wide, high], font, (words) => this.pieces(words, font));
     const { box, bar: [x, y, w, h], aside } = Object.assign(this, plan);
     [this.ylabel, this.head].forEach((e, k) => (e.style.translate = `${k ? 0 : aside[0]}px ${aside[1] * (k + 1)}px`));
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.clearRect(0, 0, wide, high);
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0), ctx.clearRect(0, 0, wide, high);
     for (const [style, points] of plan.strokes) stroke(this, points, style);
     for (const text of plan.texts) this.write(text);
     const colours = palette?.[theme.dark ? "dark" : "light"] ?? [];
@@ -397,7 +396,6 @@ export function mount(el, scene, link) {
     if (scene.code !== false) setTimeout(pump, PATIENCE, seq); // else there is no kernel to be busy or gone
     link.send(message);
   }
-
   function receive(message, buffers = []) {
     if (message.from === me) open.delete(message.seq);
     const marks = message.marks && decode(message, buffers, known);
@@ -447,8 +445,7 @@ export function mount(el, scene, link) {
     const { plot } = panel;
     plot.onpointerdown = (event) => {
       if (held?.panel.plot.hasPointerCapture(held.id) || event.button !== 0 || !(held = under(panel, event))) return;
-      event.preventDefault();
-      plot.setPointerCapture(event.pointerId);
+      event.preventDefault(), plot.setPointerCapture(event.pointerId);
       knobs[state.handles.indexOf(held.handle)].focus({ preventScroll: true });
       if (held.handle.at[1] === null && event.pointerType === "mouse") move(event);
     };
@@ -461,7 +458,6 @@ export function mount(el, scene, link) {
     plot.onlostpointercapture = ({ pointerId }) => held?.id === pointerId && (held = null);
     plot.addEventListener("touchstart", (event) => held?.handle.at[1] != null && event.preventDefault()); // no scroll
   }
-
   copy.onclick = () => say(state.code) && navigator.clipboard?.writeText(state.code).catch(() => {});
 
   // What is seen, in words; names for sliders, which have none for readers of the screen; subscripts for labels.
@@ -503,12 +499,15 @@ export function mount(el, scene, link) {
   for (const node of [document.documentElement, document.body]) watch.observe(node, { attributes: true });
   const sizes = new ResizeObserver(paint), gone = new AbortController(), here = { signal: gone.signal, capture: true };
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
-  for (const m of ["(prefers-color-scheme: dark)", "print"]) matchMedia(m).addEventListener("change", paint, here);
+  const media = ["(prefers-color-scheme: dark)", "(forced-colors: active)", "print"].map((query) => matchMedia(query));
+  for (const one of media) one.addEventListener("change", paint, here);
+  window.addEventListener("resize", paint, here); // a zoom changes the pixels, and not always the size
+  matchMedia("(prefers-reduced-motion: reduce)").addEventListener("change", () => link.send({ kind: "still" }), here);
   window.addEventListener("keydown", page, here); // JupyterLab listens on the document
   for (const name of ["beforeinput", "blur", "keydown"]) document.addEventListener(name, typed, here);
   link.receive(receive);
   link.send({ kind: "hello" });
-  return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove()), { say });
+  return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove(), link.send({ kind: "still" })), { say });
 }
 
 /** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts.
@@ -526,7 +525,8 @@ function page(event) {
 
 export default {
   render({ model, el }) {
-    const link = { send: (message) => model.send(message), receive: (callback) => model.on("msg:custom", callback) };
+    const send = (message) => { try { model.send(message); } catch { /* the kernel has gone */ } };
+    const link = { send, receive: (callback) => model.on("msg:custom", callback) };
     const leave = mount(el, model.get("scene"), link);
     model.on("comm_live_update", () => leave.say("The kernel has gone: run the cell again."));
     return leave;

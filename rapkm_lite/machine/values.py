@@ -128,11 +128,11 @@ class Value:
     """Base of the frozen dataclasses of this package: read-only arrays, compared by value, printed as typed.
 
     `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
-    pickling, ``copy.copy`` and ``copy.deepcopy``.  (NumPy lets you give a read-only array another shape in place,
-    ``a.shape = ...``, and that changes the value; ``a.reshape`` does not.)  Two values are equal when they have the same type and equal fields
-    (equal shapes and numbers; NaN equals NaN; functions and objects of a user as `likeness.equal` says); equal values
-    have equal hashes, computed once.  What a user's class sets besides its fields is compared, copied and printed with
-    them, and stays as it is.
+    pickling, ``copy.copy`` and ``copy.deepcopy``.  (One thing NumPy allows with a read-only array: ``a.shape = ...``
+    gives it another shape in place, and so changes the value; use ``a.reshape``.)  Two values are equal when they have
+    the same type and equal fields (equal shapes and numbers; NaN equals NaN; functions and objects of a user as
+    `likeness.equal` says); equal values have equal hashes, computed once.  What a user's class sets besides its fields
+    is compared, copied and printed with them, and stays as it is.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]

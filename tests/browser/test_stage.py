@@ -528,6 +528,31 @@ def test_wrong_setting_is_a_sentence_and_reset_goes_back(shown):
     assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
 
 
+def test_reset_while_playing_goes_back_and_a_cell_run_again_leaves_nothing_playing(shown):
+    """Steps that are under way when it stops are not taken; a player whose view has gone asks for no more pictures."""
+    notebook = shown("animation")
+    first = notebook.ask("() => stage.places()")
+    for _ in range(3):
+        notebook.page.locator(".rapkm-explorer .widget-play button").first.click()
+        notebook.wait(f"() => stage.places().time > {first['time'] + 300}", 20)
+        notebook.page.get_by_role("button", name="Reset").press("Enter")
+        notebook.page.wait_for_timeout(1500)
+        assert notebook.ask("() => stage.places()") == first
+    notebook.page.locator(".rapkm-explorer .widget-play button").first.click()
+    notebook.wait(f"() => stage.places().time > {first['time']}", 20)
+    notebook.ask("i => lab.runOnly(i)", list(CELLS).index("animation"))
+    notebook.wait("() => stage.drawn() > 0 && stage.named()", 60)
+    busy = """() => new Promise((done) => {
+        const kernel = jupyterapp.shell.currentWidget.sessionContext.session.kernel;
+        let count = 0;
+        const counted = (_, status) => (count += status === "busy");
+        kernel.statusChanged.connect(counted);
+        setTimeout(() => (kernel.statusChanged.disconnect(counted), done(count)), 2000);
+    })"""
+    notebook.page.wait_for_timeout(1000)
+    assert notebook.ask(busy) == 0
+
+
 @pytest.mark.parametrize("name", ["decentralized_run", "calibration", "allocation", "steady_state"])
 def test_no_number_lies_over_a_bar(name, shown):
     notebook = shown(name)

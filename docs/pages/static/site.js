@@ -1,3 +1,6 @@
+// Words that a search marks are not looked for in the titles of icons, where nothing can be marked.
+for (const title of document.querySelectorAll("svg title")) title.classList.add("nohighlight");
+
 // What the theme leaves open for the keyboard and for readers of the screen.
 function names() {
   for (const heading of document.querySelectorAll('[role="heading"]')) heading.setAttribute("aria-level", "2");
