@@ -167,7 +167,7 @@ OTHER: dict[tuple[str, str], Any] = {
     ("plot_torque_steps", "friction"): 0.02, ("plot_joint_moves", "start"): [-0.05, 0.0],
     ("plot_joint_moves", "stop"): [0.05, 0.0], ("plot_energies", "rows"): {"a": [1.0, 2.0, 3.0]},
     ("plot_placement", "values"): np.ones((12, 12)), ("lines_per_drive", "values"): RUN.c,
-    
+
     ("plot_effective_gain", "K"): 400.0, ("switching_map", "rule"): "cross",
     ("plot_pair_curves", "pairs"): [(0, 1)], ("film", "draw"): lambda ax, s: ax.plot([0, 1], [0, s]),
     ("plot_landscape", "values"): ALONG, ("plot_landscape", "theory"): np.ones((12, 12, 12)),

@@ -239,6 +239,34 @@ def test_a_new_fault_is_one_class():
     assert np.abs(rk.simulate(ROBOT, PD, PATH, OFFSET, faults=[Weak()]).c).max() == 0.05
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Pair(Fault):
+    """Two drives die."""
+
+    first: int
+    second: int
+    time: float
+
+    def __post_init__(self):
+        self._check()
+        super().__post_init__()
+
+    def mark(self, table, t):
+        table.alive[t >= self.time, self.first] = table.alive[t >= self.time, self.second] = False
+
+
+def test_a_new_fault_of_two_drives_has_its_times_checked():
+    both, each = Pair(0, 2, 0.1), [rk.DeadDrive(0, 0.1), rk.DeadDrive(2, 0.1)]
+    assert np.array_equal(rk.simulate(ROBOT, PD, PATH, faults=[both]).c, rk.simulate(ROBOT, PD, PATH, faults=each).c)
+    with pytest.raises(ValueError, match="time"):
+        Pair(0, 2, -1.0)
+
+
+def test_the_first_samples_of_a_run_have_the_first_rows_of_every_entry_of_the_table():
+    setup = prepare(ROBOT, PATH, Sensors(0.0), None, [rk.EncoderDropout(0, 0.0, 0.1)]).begin(50)
+    assert {len(rows) for name, rows in setup.faults._asdict().items() if name != "limit"} == {50}
+
+
 class Weaker(Fault):
     """No dataclass: it is told apart by what it has set."""
 

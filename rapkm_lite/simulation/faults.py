@@ -52,7 +52,8 @@ class Fault(Value):
     def _check(self) -> None:
         """Drive and times of a fault, each a plain number."""
         given = self._fields()
-        self._set(drive=whole_number("drive", given["drive"], 0))
+        if "drive" in given:
+            self._set(drive=whole_number("drive", given["drive"], 0))
         for name in ("time", "start", "stop", "jump"):
             if name in given:
                 value = exact_array(name, given[name])

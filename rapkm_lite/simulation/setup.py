@@ -48,7 +48,7 @@ class Setup(NamedTuple):
         path, faults, rows = self.trajectory, self.faults, slice(max(samples, 2))
         motion = {name: getattr(path, name)[rows] for name in ("x", "xd", "xdd", "q", "qd", "qdd", "t")}
         if faults is not None:
-            faults = faults._replace(alive=faults.alive[rows], held=faults.held[rows], jump=faults.jump[rows])
+            faults = faults._replace(**{k: v[rows] for k, v in faults._asdict().items() if k != "limit"})
         return self._replace(trajectory=path._changed(**motion), faults=faults)
 
 
