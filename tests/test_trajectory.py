@@ -1,5 +1,7 @@
 """Paths: geometry, boundary values, derivatives against finite differences."""
 
+import warnings
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -43,7 +45,9 @@ def test_samples_belong_to_who_asks():
     """NumPy lets everybody give a read-only array another shape in place: nobody else may meet it."""
     path = rk.hold(TESTBED, [0.0, 0.0], 1.0)
     mine = path[7]
-    mine.q_a.shape = (3, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of newer versions of NumPy
+        mine.q_a.shape = (3, 1)
     assert path[7].q_a.shape == (3,) and path[7] == path[7] is not path[7]
 
 
