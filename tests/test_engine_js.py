@@ -85,6 +85,16 @@ def test_runs_agree_with_the_package(name, friction):
         assert max(x, angle) <= 1e-13 and energy <= 1e-11, h
 
 
+def test_a_pose_is_found_from_the_last_one_where_the_parabola_leads_too_far():
+    """Large offsets move the first estimates by centimetres; what goes on smoothly from there misses the machine."""
+    robot = rk.load().replace(friction=0.0, mode=[-1, 1, 1])
+    path, law = rk.triangle(robot, 0.1, duration=1.5), rk.PD(7.05, 0.225)
+    offsets = [0.113, -0.067, -0.219], [-0.098, -0.21, -0.03], [-0.12, -0.046, -0.283]
+    how = [{"K_P": 7.05, "K_D": 0.225, "offset": o, "filter": "measured", "encoder": None} for o in offsets]
+    for h, torque, *_ in deviation(robot, path, law, triangle_of(0.1), how):
+        assert torque.max() <= 1e-12, h
+
+
 @machines
 def test_runs_with_stepped_angles_differ_in_a_few_samples_at_most(robot):
     """A rounding error at a threshold may turn a count, and the run goes on from there; elsewhere they agree."""

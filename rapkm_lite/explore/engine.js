@@ -190,8 +190,8 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
     if (filter === "measured") {
       // The pose moves on smoothly, unless angles are stepped: a parabola through the last three.
       const px = thought.x, py = thought.y, smooth = encoder === null ? 1 : 0;
-      const found = thought.at(px + smooth * (2 * px - 3 * x1 + x2), py + smooth * (2 * py - 3 * y1 + y2));
-      if (!found || !thought.estimate(read)) return { ...run, lost: k * dt };
+      const guess = [px + smooth * (2 * px - 3 * x1 + x2), py + smooth * (2 * py - 3 * y1 + y2)];
+      if (![guess, [px, py]].some((p) => thought.at(...p) && thought.estimate(read))) return { ...run, lost: k * dt };
       x2 = x1, y2 = y1, x1 = px, y1 = py;
     }
     if (filter !== "off") (filter === "true" ? pose : thought).filter(c);
