@@ -118,6 +118,12 @@ def test_a_log_written_is_the_log_read_to_the_last_bit(tmp_path, N):
     assert rk.read_log(str(tmp_path / "own.csv")) == log
 
 
+@pytest.mark.parametrize("key", ["K_P", "K_D"])
+def test_gains_of_another_number_of_drives_are_refused_when_a_file_is_read(said, key):
+    sentence = said(text({("control", key): "[7.0, 7.0]"}))
+    assert key in sentence and "(2,)" in sentence
+
+
 @pytest.mark.parametrize("target", ["", "no/such/folder/own.csv", ".", "a\0b", None, 3, b"own.csv"])
 def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target):
     monkeypatch.chdir(tmp_path)
@@ -130,11 +136,20 @@ def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("shape", [(0, 3), (1, 0)])
+def test_a_log_has_a_record_and_a_drive(shape):
+    with pytest.raises(ValueError, match=r"allowed: \(k,\) and \(k, N\) with k, N >= 1"):
+        rk.Log("empty", np.zeros(shape[0]), *np.zeros((3, *shape)))
+
+
 def test_a_gap_of_a_log_is_half_a_step_too_long(tmp_path):
     t = np.array([0.0, 0.01, 0.02, 0.03, 0.044])
     rk.write_log(rk.Log("late", t, *np.zeros((3, 5, 3))), tmp_path / "late.csv")
     assert rk.read_log(tmp_path / "late.csv").t[-1] == 0.044
-    t[-1] = 0.047
+    t = np.array([0.0, 0.25, 0.5, 0.75, 1.125])  # 1.5 steps to the last bit: only what is over it is a gap
+    rk.write_log(rk.Log("late", t, *np.zeros((3, 5, 3))), tmp_path / "late.csv")
+    assert rk.read_log(tmp_path / "late.csv").t[-1] == 1.125
+    t = np.array([0.0, 0.01, 0.02, 0.03, 0.047])
     with pytest.raises(ValueError, match=r"line 6, column 1: after 0\.03 s"):
         rk.write_log(rk.Log("gap", t, *np.zeros((3, 5, 3))), tmp_path / "gap.csv")
 

@@ -381,6 +381,25 @@ def test_offsets_far_from_zero_are_found_or_refused(size, least):
     assert found >= least
 
 
+@pytest.mark.parametrize("level", [-0.5, 0.0, 1.0, 1.5])
+def test_a_level_of_confidence_is_a_share(level):
+    """Nothing holds the offsets for certain: the interval of level 1 is endless, beyond there is none."""
+    found = rk.calibrate(TESTBED, rk.mystery_run("offset_a"))
+    with pytest.raises(ValueError, match=r"level = .*; allowed: "):
+        found.interval(level)
+
+
+@pytest.mark.parametrize("seed", [4, 7, 10, 13, 16])
+def test_a_machine_seen_in_a_mirror_has_the_opposite_offsets(seed):
+    """Also where they are far from zero, so that the first steps towards them are large, in either direction."""
+    rng = np.random.default_rng(seed)
+    offset, x = rng.uniform(-0.45, 0.45, 3), rng.uniform(-0.06, 0.06, (60, 2))
+    q_a = rk.inverse_kinematics(TESTBED, x)[:, :3] + offset
+    mirrored = TESTBED.replace(base=TESTBED.base * [1.0, -1.0], mode=-TESTBED.mode)
+    assert_allclose(rk.calibrate(TESTBED, q_a).offset, offset, rtol=0, atol=1e-11)
+    assert_allclose(rk.calibrate(mirrored, -q_a).offset, -offset, rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize("unknowns", ["offsets+lengths", "all"])
 def test_a_noisy_log_of_few_places_is_refused_with_what_it_says(unknowns):
     for seed in range(6):

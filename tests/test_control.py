@@ -609,8 +609,30 @@ def test_one_pose_beside_many_measurements_has_as_many_torques(law):
 def test_the_estimate_of_a_controller_is_not_changed_from_outside():
     path = rk.hold(ROBOT, [0.02, 0.03], 0.1)
     one, other = (rk.Controller(rk.CTC(400.0, 40.0, None), ROBOT) for _ in range(2))
+    assert one.x is None, "nothing was measured yet"
     for t in (0.0, 1e-3):
         same = [c(t, path.q_a[0], path.qd_a[0], path[0]) for c in (one, other)]
         assert_allclose(*same, rtol=0, atol=0)
         one.x[:] = 0.0
     assert_allclose(one.x, other.x, rtol=0, atol=0)
+
+
+def test_a_pose_of_a_law_is_measured_or_true():
+    plain = rk.PD(7.0, 0.2)
+    for kind, given in (
+        (rk.APD, (7.0, 0.2)), (rk.CTC, (400.0, 40.0)), (rk.SwitchedCTC, (400.0, 40.0)), (rk.RedundantAPD, (5.0, 0.2)),
+        (rk.RedundantCTC, (400.0, 40.0)), (rk.AntagonismFilter, (plain,)), (rk.CommandFilter, (plain,)),
+    ):  # fmt: skip
+        assert kind(*given, pose="true").pose == "true"
+        with pytest.raises(ValueError, match="pose = 'desired'; allowed: 'measured', 'true'"):
+            kind(*given, pose="desired")
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_a_controller_is_told_one_instant_at_a_time(wrong):
+    """Also where a torque could be computed for many: its memory is that of one instant."""
+    path = rk.hold(ROBOT, [0.02, 0.03], 0.1)
+    given = [path.q_a[0], path.qd_a[0]]
+    given[wrong] = np.tile(given[wrong], (2, 1))
+    with pytest.raises(ValueError, match=f"{('q_a', 'qd_a')[wrong]} has shape \\(2, 3\\); allowed: \\(3,\\)"):
+        rk.Controller(rk.PD(7.0, 0.2), ROBOT)(0.0, *given, path[0])

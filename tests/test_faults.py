@@ -1,6 +1,7 @@
 """Faults of drives and encoders, against their definitions in a few NumPy lines on what a run recorded."""
 
 import copy
+import dataclasses
 import pickle
 from dataclasses import dataclass
 
@@ -90,6 +91,30 @@ def test_torque_limit(limit):
         observed([rk.TorqueLimit(limit), rk.TorqueLimit(1.0), rk.TorqueLimit(limit)])[0].c,
         observed([rk.TorqueLimit(np.minimum(limit, 1.0))])[0].c,
     )
+
+
+def test_a_run_that_names_no_model_had_the_machine_itself():
+    run = rk.simulate(ROBOT, PD, PATH, OFFSET)
+    assert dataclasses.replace(run, model=None) == run and run.model == ROBOT
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_times_of_a_run_are_finite(wrong):
+    run = rk.simulate(ROBOT, PD, PATH, OFFSET)
+    with pytest.raises(ValueError, match=r"t = .*; allowed: an array of finite numbers"):
+        dataclasses.replace(run, t=np.append(run.t[:-1], wrong))
+
+
+def test_drives_that_may_give_nothing_are_all_dead():
+    """A limit of zero is one: the rest of the path is the motion of a machine without torques, which stands still."""
+    path = rk.hold(ROBOT, [0.03, -0.02], 0.1)
+    runs = [
+        rk.simulate(ROBOT, PD, path, OFFSET, faults=faults)
+        for faults in (rk.TorqueLimit(0.0), rk.TorqueLimit([0.0, 0.0, 0.0]), [rk.DeadDrive(i, 0.0) for i in range(3)])
+    ]
+    for run in runs:
+        assert not run.c.any() and not run.energy.any()
+        assert_allclose(run.x, path.x, rtol=0, atol=1e-12)
 
 
 def test_a_limit_is_felt_where_a_torque_of_any_drive_reaches_it():
@@ -518,3 +543,10 @@ def test_mistakes_in_a_data_file(tmp_path, text, message):
 def test_bad_faults_and_sensors(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("offset", [np.zeros((2, 3)), np.zeros((1, 3)), [], np.zeros((0, 3))])
+def test_offsets_of_sensors_are_those_of_one_machine(offset):
+    """Those of many runs are given to `sweep`."""
+    with pytest.raises(ValueError, match=r"offset has shape .*; allowed: one number or \(N,\), one per drive"):
+        Sensors(offset)

@@ -330,3 +330,18 @@ def test_the_pose_is_found_far_from_the_origin(far):
     law = rk.AntagonismFilter(rk.PD(7.0, 0.2))
     run = rk.simulate(moved, law, rk.circle(moved, 0.05 * size, 0.2, centre=shift), offset)
     assert_allclose(run.c, rk.simulate(near, law, rk.circle(near, 0.05 * size, 0.2), offset).c, atol=1e2 * coarse)
+
+
+def test_of_many_poses_the_one_whose_loops_stay_open_is_named():
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.03])
+    for poses in ([q, q + np.array([0, 0, 0, 2.5, 2.5, -2.5])], [q + np.array([0, 0, 0, 2.5, 2.5, -2.5]), q]):
+        with pytest.raises(rk.ConvergenceError) as caught:
+            rk.close_loops(TESTBED, poses, iterations=3)
+        assert float(re.search(r"the closure error is (\S+) m", str(caught.value))[1]) > 0.01
+
+
+def test_an_arm_of_equal_links_reaches_its_own_base_point():
+    """Folded, at distance zero, which is the least that its links leave; an arm of unequal links does not get there."""
+    robot = rk.Manipulator(base=[[-0.25, 0.125], [0.25, 0.0]], lengths=0.5, masses=0.1)
+    assert rk.reachable(robot, robot.base).tolist() == [True, True]
+    assert rk.reachable(robot.replace(lengths=[[0.5, 0.25], [0.5, 0.5]]), robot.base).tolist() == [False, True]

@@ -204,3 +204,29 @@ def test_one_force_serves_many_motions():
     assert_allclose(Q2, np.tile(many.F[0].T @ alone, (4, 1)), rtol=0, atol=1e-14)
     with pytest.raises(ValueError, match=r"G|C|Q"):
         rk.minimal_terms(many.F, many.F_dot, many.G, many.C, np.zeros((3, robot.n_joints)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_lost_rank_is_seen_whatever_the_signs_of_the_constraints(sign):
+    """h = 0 and -h = 0 are the same constraint; the second row is thrice the first, but for rounding."""
+    row = np.array([0.1, 0.7, 1.1])
+    with pytest.raises(ValueError, match="J has lost rank"):
+        rk.projector(sign * np.stack([row, 3.0 * row]))
+    independent = sign * np.stack([row, [0.2, 0.3, 0.9]])
+    assert_allclose(rk.projector(independent) @ np.cross(*independent), np.cross(*independent), rtol=0, atol=1e-15)
+
+
+def test_a_drive_without_any_direction_changes_no_common_sign():
+    """A^T n does not hold its n_i, which may be anything: what counts is whether the others balance."""
+    left, right = [[-1.0, 1.0], [-1.0, -1.0]], [[0.0, 1.0], [-1.0, -0.5], [1.0, -0.5]]
+    for rows, possible in ((left, False), (right, True)):
+        for still in ([], [[0.0, 0.0]], [[0.0, 0.0], [-0.0, 0.0]]):
+            assert bool(rk.common_sign([*rows, *still])) == possible
+
+
+def test_the_closed_form_of_the_null_vector_is_that_of_three_arms():
+    """Its cyclic products are a null vector of A^T for no other number of arms; `null_basis` has one for each."""
+    for name in ("five_bar", "four_arms"):
+        robot = rk.load(name)
+        with pytest.raises(ValueError, match=r"robot has [24] arms; allowed: 3 \(null_basis takes any number\)"):
+            rk.null_vector(robot, rk.inverse_kinematics(robot, [0.01, 0.02]))

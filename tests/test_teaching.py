@@ -15,6 +15,7 @@ import rapkm_lite as rk
 from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.lesson03 import tasks as lesson03
 from rapkm_lite.lessons.lesson07 import tasks as lesson07
+from rapkm_lite.lessons.lesson08 import tasks as lesson08
 from rapkm_lite.lessons.lesson09 import tasks as lesson09
 from rapkm_lite.lessons.lesson10 import tasks as lesson10
 from rapkm_lite.lessons.lesson11 import tasks as lesson11
@@ -484,6 +485,74 @@ def test_offsets_that_betray_nothing_have_to_do_so_at_every_place():
     assert torque.value > 5.0 and not torque.holds
 
 
+def test_offsets_that_betray_nothing_must_not_be_large_at_any_place():
+    """Offsets of a machine that stands far beside its place do not fight: the limit of their size forbids them."""
+
+    def far(robot, x):
+        there = rk.inverse_kinematics(robot, np.add(x, [0.0, 9e-3]))
+        return (rk.inverse_kinematics(robot, x) - there)[: robot.n_arms]
+
+    shift, torque, size = lesson03.betrayal(
+        lambda robot, x: (far if np.allclose(x, [0.04, -0.05]) else lesson03.unseen_offsets)(robot, x)
+    )
+    assert shift.holds and torque.holds and size.unit == "mrad" and not size.holds
+    assert size.value == pytest.approx(1e3 * np.abs(far(rk.load(), [0.04, -0.05])).max())
+
+
+def test_the_one_number_of_a_log_of_one_place_has_the_sign_of_eta_which_is_ours_to_choose():
+    (eta,), (error,), _ = lesson03.rests("offset_c")
+    for answer in (eta @ error, -eta @ error, np.array([eta @ error])):
+        assert lesson03.refusal(answer).word == "ok"
+
+
+def test_a_drive_of_the_carriage_may_not_be_overloaded_for_a_moment():
+    """A short push of 90 mN m makes hardly any heat, keeps all signs and the path: the limit of torque forbids it."""
+
+    def pushing(A, f):
+        c, n = lesson09.quiet_gears(A, f), rk.null_basis(A)[:, 0]
+        i = np.argmax(np.abs(c))
+        return c + (np.abs(c[i]) > 76e-3) * (np.copysign(90e-3, c[i]) - c[i]) / n[i] * n
+
+    most, *others = lesson09.carried(pushing)
+    assert most.value == pytest.approx(90.0) and most.unit == "mN m" and not most.holds
+    assert all(measured.holds for measured in others)
+
+
+def test_a_carriage_whose_drives_push_too_little_leaves_its_path():
+    """Three fifths of the force keep all signs, torques and the heat: the limit of the error forbids them."""
+    *others, error = lesson09.carried(lambda A, f: lesson09.quiet_gears(A, 0.6 * f))
+    assert error.unit == "mm" and error.value > 0.3 and not error.holds
+    assert all(measured.holds for measured in others)
+
+
+def test_one_law_for_three_duties_may_not_jump():
+    """A push of 5 mN m along eta moves nothing and costs little: only the limit of the jumps forbids it."""
+
+    class Pushing(rk.Law):
+        law = exercises()["11.one_law"].reference(rk.load())
+
+        def step(self, memory, sample):
+            c, memory = self.law.step(memory, sample)
+            return c + 5e-3 * (sample.t >= 1.0) * rk.null_vector(sample.model, sample.pose()[0]), memory
+
+    *others, jump = lesson11.three_duties(lambda robot: Pushing())
+    assert jump.unit == "mN m" and not jump.holds and all(measured.holds for measured in others)
+    # The encoders of the lesson: 2000 counts per turn, with rates smoothed over 5 ms.
+    robot, path, _ = lesson11.duties()
+    rough = rk.simulate(robot, Pushing(), path, [4e-3, -2e-3, 5e-3], encoder=2000, velocity_filter=5e-3)
+    assert others[1].value == pytest.approx(rough.energy.sum(), rel=1e-9)
+
+
+def test_places_to_calibrate_at_are_apart_as_the_lesson_says():
+    """On a circle of radius r two places are 2 r sin(half the angle between them) apart; 20 mm are asked for."""
+    for gap, holds in ((15e-3, False), (21e-3, True)):
+        places = lesson08.best_places(rk.load())
+        places[1] = lesson08.ring(55.0 + 2 * np.degrees(np.arcsin(gap / 2 / 0.12)), 0.12)
+        far, apart, condition = lesson08.known(lambda robot, places=places: places)
+        assert far.holds and condition.holds and apart.holds == holds
+        assert apart.value == pytest.approx(1e3 * min(gap, 0.24 * np.sin(np.radians(5.0))))
+
+
 def test_a_machine_of_a_student_is_measured_in_the_units_of_its_limits():
     base = np.array([[-0.24, -0.14], [0.24, -0.14], [0.0, 0.25]])
     answer = rk.Manipulator(base=base, lengths=[0.2, 0.24], masses=0.1)
@@ -509,7 +578,8 @@ def test_a_ripple_is_what_is_left_at_the_end_of_a_rest():
     slow = rk.triangle(drawing, 0.12, duration=2.5, dt=2e-3)
     run = rk.simulate(built, law, slow, encoder=2000, model=drawing, faults=limit)
     assert found["energy of the healthy triangle"].value == pytest.approx(run.energy.sum(), rel=1e-9)
-    broken = [*limit, rk.DeadDrive(0, 0.5)]
-    run = rk.simulate(built, law, slow, encoder=2000, model=drawing, faults=broken)
-    off = 1e3 * np.linalg.norm(run.x - slow.x, axis=1).max()
-    assert found["drive 1 dead: largest error"].value == pytest.approx(off, rel=1e-9)
+    for drive in range(3):
+        broken = [*limit, rk.DeadDrive(drive, 0.5)]
+        run = rk.simulate(built, law, slow, encoder=2000, model=drawing, faults=broken)
+        off = 1e3 * np.linalg.norm(run.x - slow.x, axis=1).max()
+        assert found[f"drive {drive + 1} dead: largest error"].value == pytest.approx(off, rel=1e-9)

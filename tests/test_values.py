@@ -68,6 +68,12 @@ def test_nan_of_either_sign_is_one_key():
     assert equal(minus, plus) and key(minus) == key(plus)
 
 
+def test_nan_equals_nan_and_no_number_and_a_tuple_no_list():
+    nan = float("nan")
+    assert not equal([1.0], (1.0,)) and not equal((1.0,), [1.0]) and not equal({0: 1.0}, (1.0,))
+    assert equal(nan, float("nan")) and not equal(nan, 1.0) and not equal(1.0, nan) and not equal(nan, None)
+
+
 def test_what_a_mask_hides_does_not_count_and_the_mask_does():
     hidden, shown = np.ma.array([1.0, 0.0], mask=[0, 1]), np.ma.array([1.0, 0.0], mask=[0, 0])
     assert equal(hidden, np.ma.array([1.0, 5.0], mask=[0, 1]))
