@@ -136,6 +136,18 @@ def test_a_log_is_written_to_a_file_or_not_at_all(tmp_path, monkeypatch, target)
     assert not list(tmp_path.iterdir())
 
 
+def test_the_first_column_too_many_is_named(tmp_path):
+    file = tmp_path / "own.csv"
+    rk.write_log(rk.Log("own", [0.0, 0.1], *np.zeros((3, 2, 3))), file)
+    file.write_text(re.sub("(?m)$", ",temperature", file.read_text("utf-8").strip()), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"line 1, column 11 holds 'temperature'; allowed: the header t in s"):
+        rk.read_log(file)
+
+
+def test_a_log_says_how_long_it_is():
+    assert ", 2 records, 9 s, 3 drives)" in repr(rk.Log("late", [1000.0, 1009.0], *np.zeros((3, 2, 3))))
+
+
 @pytest.mark.parametrize("shape", [(0, 3), (1, 0)])
 def test_a_log_has_a_record_and_a_drive(shape):
     with pytest.raises(ValueError, match=r"allowed: \(k,\) and \(k, N\) with k, N >= 1"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageColor
 
 from rapkm_lite import plotting
 from rapkm_lite.figures.style import ARM_COLOURS, ARM_TEXT_COLOURS
@@ -95,6 +95,22 @@ def test_a_film_moves_stops_and_speaks():
     bundle = film._repr_mimebundle_()
     assert 'alt="A hand &quot;turns&quot;."' in bundle["text/html"] and bundle["text/plain"] == film.alt
     assert "prefers-reduced-motion" in bundle["text/html"]
+
+
+def test_pale_lines_of_the_arms_keep_their_colours_in_a_film():
+    """Springs are drawn half as strong; in few colours for many tones each has one that is nearest to its own."""
+
+    def springs(ax, step):
+        for i in range(3):
+            ax.plot([0, 1], [i, i + 0.2 * step], color=plotting.arm_colour(i), alpha=0.55, lw=1.2)
+        ax.imshow(np.linspace(0, 1, 900).reshape(30, 30), cmap="cividis", extent=(0, 1, 3, 5), aspect="auto")
+        ax.set(ylim=(-1, 5))
+
+    moving = Image.open(io.BytesIO(plotting.film(springs, [0.0, 1.0], "Three springs.", figsize=(4, 3)).moving))
+    shown = np.unique(np.asarray(moving.convert("RGB")).reshape(-1, 3), axis=0).astype(int)
+    for i in range(3):
+        pale = 255 - 0.55 * (255 - np.array(ImageColor.getrgb(plotting.arm_colour(i))))
+        assert np.abs(shown - pale).max(axis=1).min() < 30
 
 
 def test_the_poster_is_the_last_frame_and_paper_stays_white():

@@ -744,6 +744,34 @@ def test_a_machine_that_stands_elsewhere_has_the_same_numbers(name):
     }
 
 
+@pytest.mark.parametrize("name", ["imperfections", "controller_choice", "via_points"])
+def test_drives_above_one_another_are_no_machine_without_width(name):
+    """A five-bar turned by a quarter has a base of no extent along x; its path is as large as before."""
+    robot = rk.load("five_bar").replace(friction=0.0)
+    turned = robot.replace(base=robot.base @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    for shown in (getattr(explore, name)(turned), getattr(explore, name)(robot)):
+        assert not shown.problem
+        energy = shown.numbers["electric energy"] if "electric energy" in shown.numbers else shown.numbers["energy"]
+        assert float(re.match(r"[\d.]+", energy)[0]) > 0.0
+
+
+def test_a_drive_in_the_middle_of_the_others_has_a_place_too():
+    square = 0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
+    assert not explore.own_machine(rk.Manipulator(base=square, lengths=[0.25, 0.3], masses=0.1)).problem
+
+
+def test_the_feedback_of_a_heavy_machine_is_in_the_picture():
+    """Links ten times as long and a hundred times as heavy: the norm of the feedback grows with the inertia."""
+    robot = rk.load().replace(friction=0.0)
+    heavy = robot.replace(
+        base=10 * robot.base, lengths=10 * robot.lengths, centers=None, inertias=None, masses=100 * robot.masses
+    )
+    for machine in (robot, heavy):
+        shown = explore.computed_torque(machine)
+        low, high = shown.picture.ylim("map")
+        assert low < float(re.match(r"[\d.e+]+", shown.numbers["largest feedback map"])[0]) < high
+
+
 def test_a_failure_in_the_kernel_blocks_nobody():
     def shy(picture, slope):
         if slope > 2:

@@ -181,6 +181,25 @@ def test_arms_are_told_without_colour():
     # In greyscale by their dashes; colours are held apart in test_colours.
     dashes = [plotting.arm_line(i)["linestyle"] for i in range(4)]
     assert len(set(dashes)) == 4
+    assert len({tuple(map(str, plotting.arm_line(i).values())) for i in range(12)}) == 12
+
+
+@pytest.mark.parametrize("mode", rk.working_modes(rk.load()))
+def test_an_arc_is_drawn_once(mode):
+    """Either the contour of the cross product finds it, whose sign changes there, or `touching_arcs`."""
+    robot = rk.load()
+    for k, pair in enumerate(rk.drive_pairs(robot)):
+        for arc in plotting.touching_arcs(robot, pair, mode):
+            middle = robot.base[list(pair)].mean(axis=0)
+            sides = middle + np.array([0.99, 1.01])[:, None, None] * (arc - middle)
+            sides = sides[:, rk.reachable(robot, sides).all(axis=0)]
+            inner, outer = rk.distal_cross_products(robot, rk.inverse_kinematics(robot, sides, mode))[..., k]
+            assert np.all(inner * outer > 0.0)
+
+
+def test_a_space_of_base_angles_takes_three_of_them():
+    with pytest.raises(ValueError, match="robot has 2 arms; allowed: 3 or more"):
+        plotting.plot_configuration_space(rk.load("five_bar"), [(1, 1)])
 
 
 @pytest.fixture(scope="module")

@@ -152,7 +152,7 @@ def test_imperfections_are_those_of_the_built_machine_and_the_drawings_law(filte
     law = rk.AntagonismFilter(rk.PD(7.05, 0.225)) if filter else rk.PD(7.05, 0.225)
     run = rk.simulate(built, law, path, model=robot, faults=[rk.TorqueLimit(0.12)])
     off = 1e3 * np.linalg.norm(run.x - path.x, axis=1).max()
-    assert said(explorer, "farthest from the path")[0] == pytest.approx(off, abs=6e-3)
+    assert said(explorer, "farthest from the wanted place")[0] == pytest.approx(off, abs=6e-3)
     pressing = least_and_prestress(rk.control_matrix(built, run.q[-1:]), run.c[-1:])[1][0]
     assert_allclose(said(explorer, "torque that only presses, at the end"), 1e3 * pressing, atol=0.051)
 
@@ -323,4 +323,4 @@ def test_a_curve_that_leaves_the_picture_says_how_far_it_goes():
     picture = explore.Picture({"a": {}})
     curves(picture, "a", np.arange(3.0), np.array([[1.0], [-321.0], [5.0]]), 5.0, most=100.0)
     assert picture.ylim("a") == (-100.0, 100.0)
-    assert [m.words for m in picture.marks if m.kind == "words"] == ["goes on to 321"]
+    assert [m.words for m in picture.marks if m.kind == "words"] == ["goes on to −321"]

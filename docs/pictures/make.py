@@ -27,7 +27,16 @@ def main() -> None:
     def draw(axes, k):
         plane, *others = axes
         plane.plot(*path.x[:, :2].T, color=plotting.NEUTRAL, linewidth=0.8, linestyle="--")
-        plotting.plot_machine(robot, runs["with filter"].q[k], plane)
+        plotting.plot_machine(robot, runs["with filter"].q[k], plane, labels=False)
+        for i, beside in enumerate([(-6, 13), (14, -13), (0, 10)]):
+            look = {
+                "color": plotting.arm_text_colour(i),
+                "ha": "center",
+                "va": "center",
+                "fontsize": 9,
+                "weight": "bold",
+            }
+            plane.annotate(f"drive {i + 1}", robot.base[i], beside, textcoords="offset points", **look)
         plane.set(xlim=(-0.37, 0.33), ylim=(-0.29, 0.33), xticks=[], yticks=[], xlabel="", ylabel="", title="")
         plane.set_aspect("equal")
         for ax, (name, run) in zip(others, runs.items(), strict=True):

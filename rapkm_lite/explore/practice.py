@@ -31,6 +31,7 @@ from .shared import (
     gain_slider,
     over_time,
     ready_made,
+    size,
     usual_gains,
 )
 
@@ -45,13 +46,13 @@ OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, k
 
 @ready_made
 def imperfections(robot: Manipulator | None = None) -> Explorer:
-    """Distance from the path and torques that act, with links too long, weak drives and one fault.
+    """Distance from the wanted place and torques that act, with links too long, weak drives and one fault.
 
     >>> imperfections().set(longer=0).numbers["largest torque"]
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5, dt=2e-3)
+    path = central_triangle(robot, 120 * size(robot), duration=2.5, dt=2e-3)
     needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
     usual = usual_gains(robot)
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
@@ -70,7 +71,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         if lost:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
-            "farthest from the path": f"{off.max():.2f} mm{lost}",
+            "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
             "largest torque": f"{np.abs(torque).max():.0f} of {limit:.0f} mN m",
             "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1) + " mN m",
             "electric energy": f"{run.energy.sum():.2f} J",
@@ -88,13 +89,13 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
 @ready_made
 def controller_choice(robot: Manipulator | None = None) -> Explorer:
-    """Distance from the path and torques under a law of one's choice, with offsets, a payload and coarse encoders.
+    """Distance from the wanted place and torques under a law of choice, with offsets, a payload and coarse encoders.
 
     >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
     '1.19 mm'
     """
     robot = frictionless(robot)
-    path = central_triangle(robot, 300 * np.ptp(robot.base[:, 0]), duration=2.5)
+    path = central_triangle(robot, 120 * size(robot), duration=2.5)
     mass = carried(robot)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
@@ -145,7 +146,9 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     N, centre = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - centre
     away = np.linalg.norm(along, axis=1)
-    out = along / away[:, None]
+    # A drive in the middle has no direction; it goes to the right.
+    out = np.where(away[:, None] > 1e-9 * robot.lengths.max(), along, [1.0, 0.0])
+    out /= np.linalg.norm(out, axis=1)[:, None]
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
     offset, side = np.resize(OFFSET, N), 0.24 if N > 2 else 0.16
     way = triangle(load(), side, dt=0.02).x

@@ -147,7 +147,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},
         "torque": over_time("torque in mN m", robot=robot, title="Torque"),
-        "error": over_time("path error in mm", title="Distance from the path"),
+        "error": over_time("path error in mm", title="Distance from the wanted place"),
     }
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
@@ -167,7 +167,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     # The lower edge of the triangle of `central_triangle`, or as much of it as all arms reach.
-    wide = np.ptp(robot.base[:, 0]) / (0.4 if robot.n_arms > 2 else 0.6)
+    wide = size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
     line, middle = wide * np.linspace([-0.12, -0.07], [0.12, -0.07], 49), marks.middle(robot)
     parts = (part for part in np.linspace(1.0, 0.1, 19) if reachable(robot, middle + 1.1 * part * line).all())
     ends = middle + next(parts, 0.1) * line[[0, -1]]
@@ -196,7 +196,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
         return {
             "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",
-            "farthest from the edge": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
+            "farthest from the wanted place": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
             "electric energy": f"{energy:.2f} J, of which antagonism {lost:.3f} J",
             "at the end": marks.per_drive(pressing[-1], 1) + " mN m",
         }

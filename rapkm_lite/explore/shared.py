@@ -137,18 +137,19 @@ def curves(picture, panel: str, t, values, least: float, most: float = np.inf) -
 
 def beyond(picture, panel: str, values) -> None:
     """A word where values leave the picture."""
-    if (most := np.abs(values).max()) > picture.ylim(panel)[1]:
-        words = f"goes on to {most:.0f}"
+    most = np.ravel(values)[np.argmax(np.abs(values))]
+    if abs(most) > picture.ylim(panel)[1]:
+        words = f"goes on to {most:.0f}".replace("-", "−")
         picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
 
 
 def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN m") -> dict:
     """The panels of `draw_distance`."""
-    return {"error": over_time("distance from the path in mm", end), "torque": over_time(torque, end, robot)}
+    return {"error": over_time("distance from the wanted place in mm", end), "torque": over_time(torque, end, robot)}
 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of a run from its path (k,) in mm, and torques (k, N) in mN m, with the least limits of both panels."""
+    """Distance of a run from the wanted place (k,) in mm, and torques (k, N) in mN m; least: limits of both panels."""
     off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
     picture.fit("error", off, symmetric=False, least=least[0])

@@ -17,7 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, length_slider, over_time, ready_made, size
+from .shared import central_triangle, curves, frictionless, length_slider, over_time, ready_made, size, usual_gains
 
 
 def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
@@ -81,7 +81,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         other = redundant(side)
         times, norm = (t.t[::5], other) if law == "redundant coordinates" else (t.t, norms(law, side))
         picture.line("map", t.t[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
-        picture.line("map", times, np.minimum(norm, 1e6), color=AFTER)
+        picture.line("map", times, np.minimum(norm, 1e6 * heavier), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
@@ -107,7 +107,8 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     low, high = (f(np.vstack([end, reach]), axis=0) for f, end in ((np.nanmin, low), (np.nanmax, high)))
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
     both = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
-    feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3, 1e2), "legend": both}
+    heavier = usual_gains(robot)[0] / 7.05
+    feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3 * heavier, 1e2 * heavier), "legend": both}
     panels = {
         "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])},
         "map": over_time("norm in N m s²/rad", **feedback),

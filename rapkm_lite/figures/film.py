@@ -95,9 +95,11 @@ def _moving(shots: list[Image.Image], seconds: float, rest: float, loops: int) -
     each = round(1000 * seconds / len(shots))
     durations = [each] * (len(shots) - 1) + [each + round(1000 * rest)]
     some = [np.asarray(shot) for shot in shots[:: max(1, len(shots) // 6)] + shots[-1:]]
-    # Thin lines have few pixels: without a stripe of its own an arm's colour would be merged with another one.
-    stripes = np.array([ImageColor.getrgb(colour) for colour in ARM_COLOURS], dtype=np.uint8)
-    stripes = np.resize(np.repeat(stripes, 40, axis=0), (len(some[0]) // 4, some[0].shape[1], 3))
+    # Thin lines have few pixels: without a stripe of its own an arm's colour, full or half as strong, would be merged
+    # with another one.
+    full = np.array([ImageColor.getrgb(colour) for colour in ARM_COLOURS])
+    stripes = np.concatenate([full, np.round(255 - 0.55 * (255 - full))]).astype(np.uint8)
+    stripes = np.resize(np.repeat(stripes, 20, axis=0), (len(some[0]) // 4, some[0].shape[1], 3))
     sheet = Image.fromarray(np.concatenate([*some, stripes]))
     for colours in (48, 24):
         palette = sheet.quantize(colours, dither=Image.Dither.NONE)

@@ -151,10 +151,16 @@ def touching_arcs(robot, pair, mode=None) -> list[np.ndarray]:
     if not np.isclose(np.linalg.norm(between), l1.sum(), rtol=1e-9) or not np.isclose(*l2, rtol=1e-9):
         return []
     turn = np.linspace(0, 2 * np.pi, 361)
-    circle = base[0] + l1[0] / l1.sum() * between + l2[0] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    middle, around = base[0] + l1[0] / l1.sum() * between, l2[0] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    circle, k = middle + around, drive_pairs(robot).index(tuple(pair))
     on = reachable(robot, circle)
-    crossed = distal_cross_products(robot, inverse_kinematics(robot, circle[on], mode))
-    on[on] = np.abs(crossed[:, drive_pairs(robot).index(tuple(pair))]) < 1e-6
+    on[on] = np.abs(distal_cross_products(robot, inverse_kinematics(robot, circle[on], mode))[:, k]) < 1e-6
+    # In other modes the sign does change there, and the contour has drawn the circle already.
+    inner, outer = middle + np.array([0.98, 1.02])[:, None, None] * around
+    both = on & reachable(robot, inner) & reachable(robot, outer)
+    sides = inverse_kinematics(robot, np.stack([inner, outer])[:, both], mode)
+    if np.any(np.prod(distal_cross_products(robot, sides)[..., k], axis=0) < 0.0):
+        return []
     return [circle[part] for part in np.ma.clump_unmasked(np.ma.array(turn, mask=~on)) if part.stop - part.start > 1]
 
 

@@ -54,7 +54,7 @@ class Log(Value):
         return self.q_a - self.q_a_desired
 
     def __repr__(self):
-        return f"Log({self.name!r}, {len(self.t)} records, {self.t[-1]:g} s, {self.c.shape[1]} drives)"
+        return f"Log({self.name!r}, {len(self.t)} records, {self.t[-1] - self.t[0]:g} s, {self.c.shape[1]} drives)"
 
 
 def columns(n_arms: int) -> list[str]:
@@ -141,7 +141,8 @@ def _names(path: Path, header: list[str]) -> list[str]:
     wanted = columns(max(N, 1))
     header = [name.strip() for name in header]
     if rest or header != wanted:
-        wrong = next((k for k, pair in enumerate(zip(header, wanted, strict=False)) if len(set(pair)) > 1), len(header))
+        pairs = enumerate(zip(header, wanted, strict=False))
+        wrong = next((k for k, pair in pairs if len(set(pair)) > 1), min(len(header), len(wanted)))
         got = repr(header[wrong]) if wrong < len(header) else "nothing"
         raise ValueError(
             f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"

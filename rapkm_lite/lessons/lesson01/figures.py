@@ -130,6 +130,8 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     >>> import rapkm_lite as rk
     >>> ax = plot_configuration_space(rk.load(), [(1, 1, 1)])
     """
+    if robot.n_arms < 3:
+        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 or more, whose base angles are the axes")
     if ax is None:
         with matplotlib.style.context(STYLE):
             ax = plt.figure(figsize=(6.4, 5.4)).add_subplot(projection="3d", computed_zorder=False)

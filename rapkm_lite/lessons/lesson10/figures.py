@@ -104,7 +104,7 @@ def plot_saturation(limit, shifts, ax=None):
 
 
 def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
-    """Distance of the end-effector from its path over time, in mm, a line for each of up to five runs (label -> Run).
+    """Distance of the end-effector from its wanted place over time, in mm, for each of up to five runs (label -> Run).
 
     The first run is the broad one; distances below `least` in mm are drawn there.
 
@@ -112,10 +112,10 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
     >>> ax = plot_faulty_runs({"healthy": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.4))
-    looks = (("#CCCCCC", "-"), (ALARM, "-"), (AFTER, (0, (5, 1.2))), (ALARM, (0, (1.5, 1.2))), (NEUTRAL, "-"))
+    looks = (("#CCCCCC", "-"), (ALARM, "-"), (AFTER, (0, (5, 1.2))), (ALARM, (0, (1.5, 1.2))), (NEUTRAL, "-."))
     for k, ((label, run), (colour, dash)) in enumerate(with_looks("runs", runs, looks)):
         off = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         ax.semilogy(run.t, np.maximum(off, least), color=colour, ls=dash, lw=1.5 if k else 5.0, label=label)
-    ax.set(xlabel="time in s", ylabel="distance from the path in mm", xlim=(0, None))
+    ax.set(xlabel="time in s", ylabel="distance from the wanted place in mm", xlim=(0, None))
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return ax
