@@ -212,7 +212,7 @@ def calibration() -> list[Number]:
         Number("08", "three places on 137 mm, least condition", lambda: three(0.137, 65), EXACT, "reach 1.01"),
         Number("08", "24 rests, small disc, worst offset, rad", lambda: rounding(0.03), EXACT, "4 mrad in the small"),
         Number("08", "24 rests, large disc, worst offset, rad", lambda: rounding(0.12), EXACT, "0.7 mrad"),
-        Number("08", "offsets from torques, wrong gain, rad", by_torques, 1e-6, "wrong by 1.6 mrad"),
+        Number("08", "offsets from torques, wrong gain, rad", by_torques, 1e-6, "miss by 1.6 mrad"),
         Number("08", "unknowns that stay unseen", unseen, EXACT, "Of 15 unknowns"),
     ]
 
@@ -336,7 +336,7 @@ def imperfections() -> list[Number]:
     filtered = rk.AntagonismFilter(pd)
     return [
         Number(
-            "10", "share that the filter leaves, links 0.1 % longer", still_fights, EXACT, "a permille of the torque"
+            "10", "share that the filter leaves, links 0.1 % longer", still_fights, EXACT, "a thousandth of the torque"
         ),
         Number("10", "leak of a prestress, links 0.1 % longer, 1/m", leak, EXACT, "10 mN for each N m"),
         Number("10", "fight, links 1 % longer, N m", lambda: _size(fight(7.05)), 1e-6),
