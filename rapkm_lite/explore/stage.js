@@ -405,7 +405,7 @@ export function mount(el, scene, link) {
     pump();
   }
   function show(message, marks) {
-    Object.assign(state, { marks, places: message.places ?? {}, code: message.code ?? "" });
+    Object.assign(state, { marks, places: message.places ?? {}, code: message.code ?? "", shown: Date.now() });
     // While there is a problem the last handles stay, as the way back.
     if (message.handles.length || !message.problem) state.handles = message.handles;
     rich(problem, minus(message.problem ?? "")).hidden = !message.problem;
@@ -419,8 +419,7 @@ export function mount(el, scene, link) {
     root.classList.add("live");
     paint();
     Object.assign(root.dataset, { drawn: ++state.drawn, places });
-    clearTimeout(rest);
-    rest = setTimeout(atRest, 700, message.sentence ?? ""); // read out when the hand rests, not at every step
+    clearTimeout(rest), (rest = setTimeout(atRest, 700, message.sentence ?? "")); // read out when the hand rests
   }
 
   // Taking hold of the nearest knob or line, else of a line that is pushed along the panel; one finger at a time.
@@ -499,15 +498,16 @@ export function mount(el, scene, link) {
   for (const node of [document.documentElement, document.body]) watch.observe(node, { attributes: true });
   const sizes = new ResizeObserver(paint), gone = new AbortController(), here = { signal: gone.signal, capture: true };
   for (const node of [root, ...panels.map((panel) => panel.plot)]) sizes.observe(node);
-  const media = ["(prefers-color-scheme: dark)", "(forced-colors: active)", "print"].map((query) => matchMedia(query));
-  for (const one of media) one.addEventListener("change", paint, here);
+  for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)", "print"])
+    matchMedia(query).addEventListener("change", paint, here);
   window.addEventListener("resize", paint, here); // a zoom changes the pixels, and not always the size
   matchMedia("(prefers-reduced-motion: reduce)").addEventListener("change", () => link.send({ kind: "still" }), here);
   window.addEventListener("keydown", page, here); // JupyterLab listens on the document
   for (const name of ["beforeinput", "blur", "keydown"]) document.addEventListener(name, typed, here);
-  link.receive(receive);
-  link.send({ kind: "hello" });
-  return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove(), link.send({ kind: "still" })), { say });
+  link.receive(receive), link.send({ kind: "hello" });
+  // Only what may be playing is stopped: each message makes Jupyter end the figures of a cell that runs just then.
+  const still = () => Date.now() < state.shown + 2000 && link.send({ kind: "still" });
+  return Object.assign(() => (gone.abort(), watch.disconnect(), root.remove(), still()), { say });
 }
 
 /** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts.
