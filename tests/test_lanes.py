@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from reference import reference
-from samples import MACHINES
+from samples import MACHINES, random_points
 
 import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED
@@ -229,6 +229,36 @@ def test_the_pose_of_mirrored_readings_is_on_the_axis_of_the_machine(size):
         assert_allclose(run.x[:, 0], 0.0, rtol=0, atol=1e-12)
         assert_allclose(run.c, -run.c[:, ::-1], rtol=0, atol=1e-10)
         assert_allclose(run.c, rk.simulate(robot, Textbook(law), path, offset).c, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_the_pose_of_readings_that_are_far_off_is_that_of_the_textbook(name):
+    """The engine's own search from a rough start against `estimate_pose`: torques, or no pose."""
+    robot, rng, found = MACHINES[name].replace(friction=0.0), np.random.default_rng(8), 0
+    law = rk.CTC(400.0, 40.0, None)
+    for x in random_points(robot, 40, seed=8, bend=0.2):
+        offset, path = rng.uniform(-1.2, 1.2, robot.n_arms), rk.hold(robot, x, 0.001)
+        first = []
+        for one in (law, Textbook(law)):
+            try:
+                first.append(rk.simulate(robot, one, path, offset).c[0])
+            except rk.SimulationError as error:
+                first.append(error.partial.c[0] if len(error.partial) else None)
+        assert (first[0] is None) == (first[1] is None)
+        if first[0] is not None:
+            assert_allclose(first[0], first[1], rtol=1e-6, atol=1e-6)
+            found += 1
+    assert found > 5
+
+
+def test_a_jump_at_the_first_sample_is_an_offset_also_where_angles_hardly_tell_the_pose():
+    """A five-bar's angles always fit: what a row is filled up with must not look like an error of theirs."""
+    robot = MACHINES["five_bar"].replace(friction=0.0)
+    path, size = rk.hold(robot, (0.17135016899900393, -0.037710297595029585), 0.002), -0.21710881417028727
+    law, jump = rk.CTC(40.0, 4.0, None), [rk.OffsetJump(1, 0.0, size)]
+    shifted, jumped = rk.simulate(robot, law, path, [0.0, size]), rk.simulate(robot, law, path, faults=jump)
+    assert len(jumped) == len(shifted) == len(path)
+    assert not rk.sweep(robot, law, path, [[0.0, 0.0]], faults=jump, failed="mask").failed.any()
 
 
 # Company.
