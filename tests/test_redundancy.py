@@ -149,6 +149,16 @@ def test_a_drive_without_practical_limit(limit):
         rk.minimax_torques(A, wrench, [1.0, 1e13, 1.0])
 
 
+def test_the_force_of_far_limits_is_right_to_rounding():
+    """A^T c = f, with limits up to twelve decades apart: the triangle of such shares alone is right to 1e-4."""
+    rng = np.random.default_rng(0)
+    for x in rng.uniform(-0.05, 0.05, (300, 2)):
+        A = rk.control_matrix(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, x))
+        wrench = A.T @ rng.normal(size=3)
+        c = rk.minimax_torques(A, wrench, 10.0 ** rng.choice([-6.0, -3.0, 0.0, 3.0, 6.0], 3))
+        assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-14 * np.abs(wrench).max())
+
+
 @pytest.mark.parametrize(("x", "gain"), [((0.0, 0.0), 4 / 3), ((-0.05, 0.0), 1.3013), ((-0.1, 0.0), 1.1437)])
 def test_the_force_polygon_is_larger_than_what_the_pseudoinverse_reaches(x, gain):
     """Areas: zonotope of the box against {w : |(A^T)^+ w| <= 1}; reference values, exactly 4/3 at the centroid."""
