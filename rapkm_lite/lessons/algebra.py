@@ -47,13 +47,14 @@ def _whole_factor(seen: Seen) -> str:
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
     if not all(ratios) or not seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
         return ""
+    steady = np.ptp(ratios) <= (1e-6 + 2 * seen.slack) * abs(ratios[0])
     for name, values in quantities(seen):
         if abs(values[0] - 1.0) <= 1e-6:
             continue
         for p in (-1.0, 1.0, -2.0, 2.0, -0.5, 0.5):
             rest = np.array(ratios) / np.asarray(values) ** p
-            # What does not vary explains a factor only if nothing else is left.
-            if np.ptp(values) < 1e-9 * abs(values[0]) and abs(abs(rest[0]) - 1.0) > 1e-6:
+            # What does not vary explains a factor, and is explained, only if nothing else is left.
+            if (steady or np.ptp(values) < 1e-9 * abs(values[0])) and abs(abs(rest[0]) - 1.0) > 1e-6:
                 continue
             if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]):
                 word = "is missing" if p < 0 else "is one too many"
@@ -143,7 +144,11 @@ def _mixed(M: np.ndarray, part: str) -> str:
     if not np.any(np.abs(M - np.diag(np.diag(M))) > 1e-4):
         rows = ", ".join(f"{i} ({f:.4g})" for i, f in enumerate(np.diag(M)) if abs(f - 1.0) > 1e-4)
         return f"a constant factor is wrong in {part} {rows}, counted from 0"
-    if np.all((np.abs(np.abs(M) - 1) < 1e-4).sum(axis=1) == 1) and np.all((np.abs(M) < 1e-4).sum(axis=1) == len(M) - 1):
+    one, zero = np.abs(np.abs(M) - 1) < 1e-4, np.abs(M) < 1e-4
+    if np.all(one.sum(axis=1) == 1) and np.all(zero.sum(axis=1) == len(M) - 1):
+        if np.any(one.sum(axis=0) > 1):
+            twice = np.flatnonzero(one.sum(axis=0) > 1)[0]
+            return f"the right {part} {twice} (counted from 0) stands in more than one place"
         return "the entries stand in another order, some with the opposite sign"
     return "the entries are a fixed mixture of the right ones: they are given in another basis or frame"
 
