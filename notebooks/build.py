@@ -44,7 +44,7 @@ def execute(path: Path, strict: bool) -> None:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
     folder = {"metadata": {"path": str(HERE)}}
-    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder, coalesce_streams=True).execute()
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder).execute()
     tidy(notebook)
     nbformat.write(notebook, path)
 

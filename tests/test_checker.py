@@ -384,7 +384,7 @@ def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):
         draw_own(name, lambda f: ([0, 1], [np.ravel(f(A, c)), np.ravel(f(A, 2 * c))]), ax, per_arm=True)
         assert len(ax.lines) == lines
         said = capsys.readouterr().out
-        assert ("Dashed: your own" in said and "lesson goes on" in said) == bool(lines)
+        assert ("Thick dots: your own" in said and "lesson goes on" in said) == bool(lines)
     check(name, lambda A, c: 1 / 0)
     capsys.readouterr()
     draw_own(name, lambda f: ([0], f(A, c)), plt.subplots()[1])
@@ -557,13 +557,13 @@ def test_arithmetic_in_place_reaches_nothing_that_a_function_is_given():
             assert array.all()
 
 
-def test_a_close_answer_is_drawn_dashed_too_with_copies(capsys):
+def test_a_close_answer_is_drawn_dotted_too_with_copies(capsys):
     name = "04.filtered_command"
     assert check(name, damped(-2)) is not None and capsys.readouterr().out.startswith("CLOSE")
     A, K_P, q = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.full(3, 7.0), np.array([0.1, 0.2, 0.3])
     _, ax = plt.subplots()
     draw_own(name, lambda f: ([0, 1, 2], f(A, K_P, q, 0.0 * q)), ax)
-    assert len(ax.lines) == 1 and "Dashed: your own 04.filtered_command (close)" in capsys.readouterr().out
+    assert len(ax.lines) == 1 and "Thick dots: your own 04.filtered_command (close)" in capsys.readouterr().out
 
     def spoiled(A, c):
         c *= 0.0

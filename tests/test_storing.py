@@ -51,6 +51,11 @@ def built(*cells):
     return one
 
 
+def test_what_is_printed_after_a_picture_is_stored_after_it():
+    one = built(code("plot()", text("before"), text(", too\n"), picture(), text("after\n"), alt="a disc"))
+    assert [o.get("text") for o in one.cells[0].outputs] == ["before, too\n", None, "after\n"]
+
+
 def test_answers_are_stored_closed_behind_a_neutral_line():
     one = built(code("print(42)", text("42\n"), tags=["hide-output"]), code("plot()", picture(), tags=["hide-output"]))
     for cell in one.cells:

@@ -93,6 +93,17 @@ def cover(cell: nbformat.NotebookNode) -> None:
         cell.outputs.insert(0, nbformat.v4.new_output("stream", name="stdout", text=COVER))
 
 
+def joined(outputs: list) -> list:
+    """The outputs in their order, with printed lines that follow one another as one."""
+    found: list = []
+    for output in outputs:
+        if found and output.get("name") is not None and found[-1].get("name") == output.name:
+            found[-1].text += output.text
+        else:
+            found.append(output)
+    return found
+
+
 def bare_widget(output: nbformat.NotebookNode) -> bool:
     """True for a widget with nothing but its repr beside it, of which nothing is left without a kernel."""
     data = output.get("data")
@@ -112,7 +123,7 @@ def tidy(notebook: nbformat.NotebookNode) -> None:
         cell.id = f"cell-{number:02d}"
         cell.metadata = nbformat.from_dict(kept(cell))
         if cell.cell_type == "code":
-            cell.outputs = [o for o in cell.outputs if not bare_widget(o)]
+            cell.outputs = joined([o for o in cell.outputs if not bare_widget(o)])
             for output in cell.outputs:
                 output.get("data", {}).pop(WIDGET, None)
             describe(cell)

@@ -58,13 +58,16 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
     if not far:
         return result
     try:
-        all_of_them = _numbers(exercise, answer, cases)
+        whole = _numbers(exercise, answer, cases)
     except Ended as end:
-        said = _failures(exercise, answer, far, end.result.sentence)
-        right = "it is right" if result.word == "ok" else "the method is right"
-        short = f"{right}, but not for {', '.join(said)}, where {next(iter(said.values()))}"
-        return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
-    return all_of_them if result.word == "ok" else result
+        whole = end.result
+    if whole.word == "ok" or whole.word == result.word:
+        return whole if result.word == "ok" else result
+    said = _failures(exercise, answer, far, whole.sentence)
+    right = "it is right" if result.word == "ok" else "the method is right"
+    words = next(iter(said.values())).partition(". To improve:")[0]
+    short = f"{right}, but not for {', '.join(said)}, where {words}"
+    return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
 
 
 def _failures(exercise: Exercise, answer: Any, cases: list[Case], sentence: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""A student's own wrong or close answer in the picture that it feeds: dashed, beside the package's in solid lines."""
+"""A student's own wrong or close answer in the picture that it feeds: thick dots, which no curve of a lesson has."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .checker import own_answer
 
 
 def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) -> None:
-    """Draw what the student's own answer gives, dashed, when it is wrong or close, and print which line is which.
+    """Draw what the student's own answer gives, dotted, when it is wrong or close, and print which line is which.
 
     name : of the exercise.
     curve : answer -> (x, y), as for ``ax.plot``; the answer is the student's value, or function, called with copies.
@@ -27,7 +27,7 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
     try:
         x, y = (np.asarray(v, dtype=float) for v in curve(own))
         limits = ax.get_xlim(), ax.get_ylim()
-        lines = ax.plot(x, y, dashes=(3, 2), color=ALARM, linewidth=1.4, zorder=5)
+        lines = ax.plot(x, y, linestyle=(0, (0.01, 1.6)), dash_capstyle="round", color=ALARM, linewidth=3.0, zorder=5)
     except Exception as error:
         print(f"Your own {name} cannot be drawn here ({type(error).__name__}); the lesson goes on with the package's.")
         return
@@ -37,4 +37,4 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
         for i, line in enumerate(lines):
             line.set_color(arm_colour(i))
     word = {"close": "close", "wrong": "not yet right"}[verdict]
-    print(f"Dashed: your own {name} ({word}). Solid: the package's, with which the lesson goes on.")
+    print(f"Thick dots: your own {name} ({word}). All other curves: the package's, with which the lesson goes on.")

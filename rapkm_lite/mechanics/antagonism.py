@@ -126,7 +126,7 @@ def null_direction(robot: Manipulator, q) -> np.ndarray:
 
 
 def common_sign(A) -> np.ndarray:
-    """Can a prestress load all drives with one sign, so that no gear feels its backlash?  Boolean (...,).
+    """Can a prestress load all drives with one sign, the surest way past the backlash of gears?  Boolean (...,).
 
     A : (..., m, delta), of any mechanism.
     A^T n = 0 with all n_i > 0 exists exactly where the rows of A do not fit into a half space (Stiemke): in the plane,

@@ -200,6 +200,10 @@ def inside(robot):
     return rk.AntagonismFilter(rk.RedundantCTC(1000.0, 60.0), W=np.diag(weights(robot)))
 
 
+def blind(robot):
+    return lambda t, q_a, qd_a, d: rk.inverse_dynamics(robot, d.q, d.qd, d.qdd, W=weights(robot))
+
+
 LEAN = [
     ("right", "weights", weighted(7.05, 0.225)),
     ("right", "stiffer", weighted(20.0, 0.4)),
@@ -207,6 +211,7 @@ LEAN = [
     ("right", "around computed torque", inside),
     ("right", "by hand", fed_forward),
     ("close", "a little too soft", weighted(4.8, 0.19)),
+    ("wrong", "fed forward without sensors", blind, "not used"),
     ("wrong", "PD", lambda robot: rk.PD(7.05, 0.225), "no filter"),
     ("wrong", "soft PD", lambda robot: rk.PD(2.0, 0.12), "no filter"),
     ("wrong", "no weights", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225)), "weights are forgotten"),

@@ -170,7 +170,7 @@ def unexplained_gain(gains):
 
 
 def refusal(answer) -> Result:
-    """The verdict on what `offset_c` tells: one number, eta.offset; no single offset."""
+    """The verdict on what `offset_c` tells: one number, to first order eta.offset; no single offset."""
     if isinstance(answer, str):
         raise Ended("wrong", "say it with numbers: three offsets, np.nan for each one that the log cannot tell")
     got = numbers(given(answer, ()))
@@ -178,12 +178,12 @@ def refusal(answer) -> Result:
     if got.shape in ((), (1,)) and not np.any(np.isnan(got)):
         off = abs(abs(float(got.reshape(()))) - abs(n @ error))
         if off < 4e-5:
-            return Result("ok", f"this is eta.offset, the one number that the log tells, within {1e3 * off:.1g} mrad")
-        raise Ended("wrong", "one number is right, eta.offset, but the log tells another one, by a quarter at least")
+            return Result("ok", f"the encoders contradict each other by this, all that is told, within {1e3 * off:.1g} mrad")
+        raise Ended("wrong", "one number is right, by which the encoders contradict each other, but the log tells another")
     if got.shape not in ((), (3,)):
         raise Ended("wrong", f"the answer has shape {got.shape}, expected (3,)", "another shape")
     if np.all(np.isnan(got)):
-        return Result("ok", "the log tells eta.offset only; no single offset can be told from it, and none is claimed")
+        return Result("ok", "the log tells one number only; no single offset can be told from it, and none is claimed")
     if np.any(np.isnan(got)):
         raise Ended("wrong", "no drive is better off than another: none of the three offsets can be told")
     raise Ended("wrong", *_claimed(got, n, n @ error))

@@ -8,7 +8,7 @@ from ...control.laws import PD, AntagonismFilter
 from ...machine.manipulator import load
 from ...mechanics.trajectory import triangle
 from ...simulation.runs import SimulationError, simulate
-from ..answers import given_law
+from ..answers import blind, given_law
 from ..checker import Exercise, Measured
 
 OFFSETS = ((4e-3, -2e-3, 5e-3), (-3e-3, -3e-3, -3e-3))
@@ -26,13 +26,14 @@ def lean_law(robot):
 
 
 def _runs(make) -> list[Measured]:
-    """The larger error and the larger bill of two runs with offsets that the law does not know."""
+    """The larger error and the larger bill of two runs with offsets, and with links that the law does not know."""
     robot = _machine()
+    real = robot.replace(masses=1.01 * robot.masses)
     path, error, energy = triangle(robot, dt=2e-3), 0.0, 0.0
     for offset in OFFSETS:
         law = given_law(make, robot)
         try:
-            run = simulate(robot, law, path, offset)
+            run = simulate(real, law, path, offset, model=robot)
         except SimulationError as lost:
             if lost.__cause__ is not None:
                 raise
@@ -73,6 +74,9 @@ LEAN_LAW = Exercise(
     close=0.03,
     improve="try another gain: a stiffer loop follows closer, and under a filter it costs nothing",
     mistakes={
+        "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
+            lambda make: blind(make(_machine()), triangle(_machine(), dt=2e-3)[300])
+        ),
         "there is no filter: the drives pay for their quarrel (the antagonism is not removed)": (
             lambda make: isinstance(make(_machine()), PD)
         ),

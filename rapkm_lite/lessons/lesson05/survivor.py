@@ -11,7 +11,7 @@ from ...mechanics.actuation import inverse_dynamics
 from ...mechanics.trajectory import triangle
 from ...simulation.faults import EncoderDropout
 from ...simulation.runs import SimulationError, simulate
-from ..answers import given_law
+from ..answers import blind, given_law
 from ..checker import Exercise, Measured
 
 OFFSET = (4e-3, -2e-3, 5e-3)
@@ -52,13 +52,6 @@ def _runs(make) -> list[Measured]:
     return found
 
 
-def _blind(make) -> bool:
-    """True for a function that gives the same torques whatever the encoders read."""
-    law, desired = make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)[300]
-    given = [law(0.6, desired.q_a + error, desired.qd_a + 10 * error, desired) for error in (0.0, 0.01, -0.02)]
-    return bool(np.ptp(np.array(given, dtype=float), axis=0).max() < 1e-12)
-
-
 def _kind(*kinds):
     return lambda make: isinstance(make(_model()), kinds)
 
@@ -82,7 +75,7 @@ DEAD_ENCODER = Exercise(
     improve="feed forward the torques of the motion, so that the feedback has less to do, or choose other gains",
     mistakes={
         "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
-            _blind
+            lambda make: blind(make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)[300])
         ),
         "PD follows the frozen reading: its drive pushes against an error that is not there (a dead encoder must be "
         "noticed)": _kind(PD),

@@ -86,7 +86,7 @@ EXERCISES = {
             "the projection comes before the delays: the rates contradict nothing, their products with delays do": (
                 lambda A, xd, delay, K_P: -K_P * delay * (prestress_projector(A) @ (A @ xd))
             ),
-            "milliseconds were read as seconds (units, a factor of 1000)": (
+            "1000 times too large (units): delays come in s, torques are in N m": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, 1e3 * delay, K_P)
             ),
         },

@@ -71,7 +71,7 @@ EXERCISES = {
             "these are six places evenly on a circle, three of which show what is known already: compare the "
             "null vectors of three places while you turn them": tasks.is_hexagon,
             "the places are given in mm; the unit is m": lambda answer: bool(
-                1.0 < np.abs(tasks.chosen(answer)).max() <= 120.0
+                20.0 <= np.abs(tasks.chosen(answer)).max() <= 120.0
             ),
         },
     ),
