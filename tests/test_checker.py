@@ -213,6 +213,20 @@ def test_what_fails_beyond_the_idea_is_close_and_the_label_is_said():
     assert judged(Exercise(scaled, ("a", "b", "c"), "N m", more), scaled).word == "ok"
 
 
+def test_what_is_only_close_beyond_the_idea_is_right_where_it_is():
+    def more(rng):
+        return [*cases(rng), Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)]
+
+    said = judged(
+        Exercise(scaled, ("a", "b", "c"), "N m", more, close=0.05),
+        lambda K, v, m: scaled(K, v, m) * (1.02 if len(K) == 4 else 1),
+    )
+    assert said.word == "close" and said.sentence.startswith(
+        "it is right, but not for four entries, where it is off by"
+    )
+    assert "the method is right" not in said.sentence and said.sentence.count("To improve") == 1
+
+
 def test_only_the_kinds_beyond_the_idea_that_fail_are_said():
     def more(rng):
         long = Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)

@@ -65,7 +65,7 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
         return whole if result.word == "ok" else result
     said = _failures(exercise, answer, far, whole.sentence)
     right = "it is right" if result.word == "ok" else "the method is right"
-    words = next(iter(said.values())).partition(". To improve:")[0]
+    words = next(iter(said.values())).partition(". To improve:")[0].replace("the method is right, off", "it is off")
     short = f"{right}, but not for {', '.join(said)}, where {words}"
     return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
 

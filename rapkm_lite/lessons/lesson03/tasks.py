@@ -178,8 +178,8 @@ def refusal(answer) -> Result:
     if got.shape in ((), (1,)) and not np.any(np.isnan(got)):
         off = abs(abs(float(got.reshape(()))) - abs(n @ error))
         if off < 4e-5:
-            return Result("ok", f"the encoders contradict each other by this, all that is told, within {1e3 * off:.1g} mrad")
-        raise Ended("wrong", "one number is right, by which the encoders contradict each other, but the log tells another")
+            return Result("ok", f"the encoders contradict each other by this number, within {1e3 * off:.1g} mrad")
+        raise Ended("wrong", "one number is right, what the encoders contradict each other by, but not this one")
     if got.shape not in ((), (3,)):
         raise Ended("wrong", f"the answer has shape {got.shape}, expected (3,)", "another shape")
     if np.all(np.isnan(got)):
