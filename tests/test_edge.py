@@ -103,6 +103,24 @@ def test_an_arm_that_leaves_the_edge_takes_no_energy_along(inside, speed, dt):
         np.testing.assert_allclose(np.diff(kinetic), work, rtol=0, atol=1e-6 * kinetic.max())
 
 
+@pytest.mark.parametrize("inside, dt, gain", [(2e-3, 8e-3, 15.0), (2e-3, 8e-3, 60.0), (1e-3, 4e-3, 400.0)])
+def test_a_machine_that_goes_to_the_edge_is_stopped_before_it_in_both_loops(inside, dt, gain):
+    """Left alone it would be lost in its first hold; with its drives it comes back, and takes their work along."""
+    robot = rk.load().replace(friction=0.0)
+    out = robot.base[0] / np.linalg.norm(robot.base[0])
+    x = np.tile(robot.base[0] - out * (robot.lengths[0].sum() - inside), (3, 1))
+    path = rk.follow(robot, dt * np.arange(3), x, -0.5 * out * [[1.0], [0.0], [0.0]], 0.0 * x)
+    idle = lost(rk.simulate, robot, lambda t, q_a, qd_a, want: np.zeros(3), path)
+    assert idle.time == 0.0
+    for one in (
+        rk.PD(gain, 0.01 * gain),
+        lambda t, q_a, qd_a, want: -gain * (q_a - want.q_a) - 0.01 * gain * (qd_a - want.qd_a),
+    ):
+        run = rk.simulate(robot, one, path, [0.3, 0.0, 0.0])
+        kinetic, work = rk.kinetic_energy(robot, run.q, run.qd), np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=-1)
+        np.testing.assert_allclose(np.diff(kinetic), work, rtol=0, atol=2e-6 * kinetic.max())
+
+
 def test_a_run_beside_one_at_the_edge_does_not_feel_it():
     path, offsets = rk.hold(HEAVY, [-0.04, -0.07], 0.1), np.array([[0.0, 0.0, 0.0], [4e-3, -2e-3, 5e-3]])
     weak, firm = rk.PD(1e-12, 1e-12), rk.PD(20.0, 0.5)

@@ -228,6 +228,8 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     """`hold` for a controller in Python: the state after the torques c (N,), and its status."""
     W = len(arms)
     put(arms, w, x, y, vx, vy)
+    # The hold before may have lost the machine: that of zero torques, by which `Plant` compiles, does where it falls.
+    w[of(STATUS, 0, W, 1)] = DONE
     begin(arms, w)
     far = sense(arms, extra, table, 0, w, dt) > 0
     if far:
@@ -237,6 +239,5 @@ def advance(arms, extra, table, x, y, vx, vy, w, c, dt):
     hold(arms, extra, w, dt, far)
     # The angles are those of the last sample that was looked at.
     move(W, w, OLD * W, w, Q * W)
-    w[of(STATUS, 0, W, 1)] = DONE
     judge(((),), arms, w, 0)
     return (w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)], w[of(STATUS, 0, W, 1)])
