@@ -144,6 +144,43 @@ def test_a_compiled_law_in_redundant_coordinates_is_that_of_the_package(name):
     assert_allclose(own.c, ours.c, rtol=0, atol=1e-12)
 
 
+def all_at_once(t, q_a, qd_a, d, at, memory):
+    """Matrices that depend on angles and rates, the pose, what was measured, time and memory."""
+    total = 0.0
+    for M in (at.F, at.F_dot, at.A_T_pinv, at.J_dot, at.N_dot, at.C, at.minimal[1], at.redundant[1], at.A_tilde_T_pinv):
+        for i in range(M.shape[0]):
+            for j in range(M.shape[1]):
+                total += 0.1 * M[i, j] * np.cos(0.37 * (5 * i + j))
+    for v in (at.x, at.xd, at.q, at.qd, at.Q, at.minimal[2], at.redundant[2]):
+        for i in range(v.shape[0]):
+            total += v[i] * np.cos(0.37 * i)
+    memory[0] += total
+    memory[1] = t + q_a[1]
+    c = -7.05 * np.sin(at.q[:3] - d.q_a) - 0.225 * (at.qd[:3] - d.qd_a) + 1e-3 * total
+    c[1] += 1e-4 * memory[0]
+    c[2] += 1e-2 * memory[1] + 1e-3 * qd_a[1]
+    return c
+
+
+@pytest.mark.parametrize("around", [lambda law: law, rk.AntagonismFilter], ids=["bare", "filter"])
+@pytest.mark.parametrize("source", ["measured", "true"])
+def test_pose_and_memory_of_a_law_with_both_are_those_of_its_run_in_python(source, around):
+    """Of a wrong model, by real encoders, one of which is a turn off, on a path that goes round the turn of a drive."""
+    model = ROBOT.replace(lengths=[[0.2, 0.201], [0.199, 0.2], [0.2, 0.2]], friction=3e-3, gravity=(0.3, -0.5))
+    circle = rk.circle(ROBOT, 0.12, 0.8)
+    crosses = int(np.abs(circle.q_a + np.pi).min(axis=1).argmin())
+    part = slice(crosses - 15, crosses + 16)
+    path = rk.follow(ROBOT, circle.t[:31], circle.x[part], circle.xd[part], circle.xdd[part])
+    own, offset = rk.compiled(all_at_once, at=source, memory=2), OFFSET + [0.0, 2 * np.pi, 0.0]
+    law, slow = around(own), around(InPython(own))
+    given = {"encoder": 4000, "model": model, "velocity_filter": 2e-3, "faults": rk.OffsetJump(2, 0.01, 3e-3)}
+    run, expected = (rk.simulate(ROBOT, one, path, offset, **given) for one in (law, slow))
+    assert_allclose(run.c, expected.c, rtol=0, atol=1e-10)
+    assert_allclose(run.x, expected.x, rtol=0, atol=1e-10)
+    study = rk.sweep(ROBOT, law, path, [-OFFSET, offset], **given)
+    assert_allclose(study.energies[1], expected.energy, rtol=0, atol=1e-10)
+
+
 @pytest.mark.parametrize("name", ["five_bar", "asymmetric", "four_arms"])
 def test_the_buffer_has_room_for_the_matrices_of_at_and_no_more(name):
     """Those that `at` finds, five matrices (2N, 2) between, and the desired motion; then memory and answer."""
