@@ -336,7 +336,26 @@ def square(t, q_a, qd_a, d):
     return np.zeros((3, 3))
 
 
+def summed(t, q_a, qd_a, d):
+    e = q_a - d.q_a
+    return -7.0 * np.einsum("i->i", e)
+
+
+def labelled(t, q_a, qd_a, d):
+    c = "7" + q_a
+    return c
+
+
+def imports(t, q_a, qd_a, d):
+    import math
+
+    return -7.0 * math.cos(t) * q_a
+
+
 REFUSED = {
+    summed: 'numpy.einsum is not known here, line # of test_compiled_law.py: return -7.0 * np.einsum("i->i", e)',
+    labelled: 'add(a string, an array) is not known here, line # of test_compiled_law.py: c = "7" + q_a',
+    imports: "unsupported opcode (IMPORT_NAME), line # of test_compiled_law.py: import math",
     words: "it returns a string",
     silent: "it returns nothing: is a return missing?",
     outside: 'table is of type dict, line # of test_compiled_law.py: return -table["gain"] * e',

@@ -23,7 +23,6 @@ _WORDS = (
     (r"Cannot bind 'args=", "arguments after * are not known here"),
     (r"Unsupported context manager", "such a with statement is not known here"),
     (r"(?:Use of )?(.+ not supported yet|unsupported opcode \(\w+\))", r"\1"),
-    (r"The decorated object is not a function", "it is not a function"),
 )
 _TYPES = (
     (r"Wanted\([^()]*(?:\([^()]*\)[^()]*)*\)", "d"),
