@@ -201,8 +201,8 @@ def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: 
     exact = all(isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < most for i in numbers)
     fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
     if not fits:
-        some = f"{count or 'two or more'} different {what} indices from 0 {'on' if n is None else f'to {n - 1}'}"
-        raise ValueError(f"{name} = {short(value)}; allowed: {some}")
+        some = f"a list of one {what} index" if count == 1 else f"{count or 'two or more'} different {what} indices"
+        raise ValueError(f"{name} = {short(value)}; allowed: {some} from 0 {'on' if n is None else f'to {n - 1}'}")
     return tuple(map(int, numbers))
 
 

@@ -138,14 +138,14 @@ def _names(path: Path, header: list[str]) -> list[str]:
     N, rest = divmod(len(header) - 1, 3)
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    wanted = columns(max(N, 1))
-    header = [name.strip() for name in header]
+    wanted, header = columns(max(N, 1)), [name.strip() for name in header]
     if rest or header != wanted:
         pairs = enumerate(zip(header, wanted, strict=False))
         wrong = next((k for k, pair in pairs if len(set(pair)) > 1), min(len(header), len(wanted)))
-        got = repr(header[wrong]) if wrong < len(header) else "nothing"
+        got = short(header[wrong]) if wrong < len(header) else "nothing"
         raise ValueError(
-            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header {', '.join(wanted)}"
+            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header "
+            + ", ".join(wanted if N < 9 else [*wanted[:8], "..."])
         )
     return header
 
@@ -164,7 +164,7 @@ def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> lis
             fine = False
         if not fine:
             raise ValueError(
-                f"the log {path.name!r}, line {number}, column {column} ({name}) holds {text!r}; allowed: numbers"
+                f"the log {path.name!r}, line {number}, column {column} ({name}) holds {short(text)}; allowed: numbers"
             )
     return row
 

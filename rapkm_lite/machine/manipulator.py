@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, drive_values, exact_array, joint_indices, of_kind, positive_number, real_array
+from .arguments import bounded, drive_values, exact_array, joint_indices, of_kind, positive_number, real_array, short
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
@@ -64,14 +64,14 @@ class Manipulator(Value):
         N = len(base)
         lengths = bounded("lengths", _per_link("lengths", self.lengths, N), 0.0, strict=True)
         if lengths.max() > 1e6:
-            raise ValueError(f"lengths = {lengths.tolist()} m; allowed: up to 1e6 m")
+            raise ValueError(f"lengths = {short(lengths.tolist())} m; allowed: up to 1e6 m")
         masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
         given: dict[str, Any] = {"base": base, "lengths": lengths, "masses": masses}
         inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
         given["inertias"] = bounded("inertias", inertias, 0.0, strict=False)
         given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
         if np.any((given["centers"] < 0.0) | (given["centers"] > lengths)):
-            raise ValueError(f"centers = {given['centers'].tolist()} m; allowed: on the link, 0 to {lengths.tolist()}")
+            raise ValueError(f"centers = {short(given['centers'].tolist())} m; allowed: on the link, 0 to its length")
         for key in ("rotor_inertia", "friction"):
             given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=False)
         for key in ("resistance", "torque_constant"):
@@ -87,13 +87,13 @@ class Manipulator(Value):
         J_a, J_d, P = self.arm_inertias.T
         if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(
-                f"inertias = {given['inertias'].tolist()} with masses, centers and load = {given['load']:g} let an arm "
-                "move freely; allowed: values with a positive definite mass matrix"
+                f"inertias = {short(given['inertias'].tolist())} with masses, centers and load = {given['load']:g} let "
+                "an arm move freely; allowed: values with a positive definite mass matrix"
             )
         if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
             raise ValueError(
-                f"lengths = {lengths.round(6).tolist()} let no point be reached by all {N} arms from base = "
-                f"{base.round(6).tolist()}; allowed: arms that can meet (longer links or closer base points)"
+                f"lengths = {short(lengths.round(6).tolist())} let no point be reached by all {N} arms from base = "
+                f"{short(base.round(6).tolist())}; allowed: arms that can meet (longer links or closer base points)"
             )
 
     @cached_property
@@ -195,7 +195,7 @@ def _base_points(value) -> np.ndarray:
     if base.ndim != 2 or len(base) < 2:
         raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
     if min(np.hypot(*(base[i] - base[j])) for i in range(len(base)) for j in range(i)) < 1e-50:
-        raise ValueError(f"base = {base.tolist()} holds one point twice, to 1e-50 m; allowed: N different points")
+        raise ValueError(f"base = {short(base.tolist())} holds one point twice, to 1e-50 m; allowed: different points")
     return base
 
 

@@ -236,9 +236,9 @@ def full_rank(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> tupl
     return Q, R
 
 
-def right_inverse(name: str, A: np.ndarray) -> np.ndarray:
+def right_inverse(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> np.ndarray:
     """(A^T)^+ = A (A^T A)^-1 = Q R^-T, (..., m, k), of a tall A with full rank."""
-    Q, R = full_rank(name, A)
+    Q, R = full_rank(name, A, where)
     return solve(R, Q.mT).mT
 
 

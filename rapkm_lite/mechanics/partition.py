@@ -20,8 +20,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     Its point: the only new inverse is (m - delta) x (m - delta), a number for three drives.  Every partition with
     regular A~_1 gives the same result.
     A_tilde : (..., m, n).  rows : the delta row indices of A~_1, (delta,) or (..., delta), with delta the rank of A~,
-    which is 2 for every `Manipulator`.
-    Raises ValueError where A~_1 has lost rank, or has fewer rows than the rank of A~.
+    which is 2 for every `Manipulator`.  Raises ValueError where A~_1 has lost rank, or fewer rows than the rank of A~.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.redundant_control_matrix(robot, q)
@@ -31,7 +30,8 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A_tilde = wide_matrix("A_tilde", A_tilde)
     first, others, back = _partition(rows, A_tilde)
     A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
-    A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT).mT
+    where = "dependent rows, or an input singularity; allowed: delta independent rows, as select_independent finds them"
+    A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
     if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):
         raise ValueError(f"rows holds {first.shape[-1]} rows, fewer than the rank of A_tilde; allowed: delta of them")
@@ -53,7 +53,7 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     if not isinstance(rows, np.ndarray) or rows.ndim < 2:
         rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
         count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
-        return _fixed_partition(joint_indices("rows", rows, m, count), m)
+        return _fixed_partition(joint_indices("rows", rows, m, count, "row"), m)
     rows = _row_choice(rows, A_tilde)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
     others = np.argsort(taken, axis=-1, kind="stable")[..., : m - rows.shape[-1]]
