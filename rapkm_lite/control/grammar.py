@@ -81,7 +81,7 @@ class Law:
         alone = type(self).start is Law.start and type(self).step is Law.step
         no = "gives neither torque nor step; needed: one of them"
         unasked = "has no torque without its memory; needed: start and step, as in simulate"
-        raise NotImplementedError(f"{self!r} {no if alone else unasked}")
+        raise NotImplementedError(f"{short(self)} {no if alone else unasked}")
 
     def coordinates(self, memory) -> tuple[int, int] | None:
         """The two independent joints that the law works in, given its memory; None where it has none."""
@@ -211,7 +211,7 @@ def ask(law, memory, sample) -> tuple[np.ndarray, object]:
     """
     answer = as_law(law).step(memory, sample)
     if type(answer) is not tuple or len(answer) != 2:
-        raise BadAnswer(f"{type(law).__name__}.step returned {answer!r}; allowed: the pair (c, memory)")
+        raise BadAnswer(f"{type(law).__name__}.step returned {short(answer)}; allowed: the pair (c, memory)")
     c, memory = answer
     # The cheap test first: it lets pass what is surely fine, and warns of no overflow.
     if type(c) is np.ndarray and c.dtype == float and c.shape == sample.q_a.shape and sum(map(abs, c.tolist())) < 1e100:

@@ -85,12 +85,12 @@ class PID(LawValue):
         super().__post_init__()
 
     def start(self, model, dt):
-        manipulator(model, "model")
+        N = manipulator(model, "model").n_arms
         for name in ("K_P", "K_I", "K_D", "limit"):
-            value = getattr(self, name)
-            if value.shape not in ((), (model.n_arms,), (model.n_arms, model.n_arms)):
-                raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({model.n_arms},)")
-        return np.zeros(model.n_arms)
+            if (shape := getattr(self, name).shape) not in ((), (N,), (N, N)):
+                shapes = f" or ({N},)" if name == "limit" else f", ({N},) or ({N}, {N})"
+                raise ValueError(f"{name} has shape {shape}; allowed: one number{shapes}")
+        return np.zeros(N)
 
     def step(self, memory, sample):
         e, ed = seen(sample).errors()

@@ -26,11 +26,11 @@ def sample_times(duration: float, dt: float) -> np.ndarray:
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
     if dt < 1e-12:
         raise ValueError(f"dt = {dt:g} s; allowed: 1e-12 s or more")
-    steps = round(min(duration / dt, 1e9))
+    steps = round(duration / dt)
+    if steps > MOST:
+        raise ValueError(f"duration = {duration:g} s has {steps:.9g} samples of dt = {dt:g} s; allowed: up to {MOST}")
     if steps < 1 or abs(steps * dt - duration) > 1e-9 * duration:
         raise ValueError(f"dt = {dt:.12g} s; allowed: a whole fraction of duration = {duration:.12g} s")
-    if steps > MOST:
-        raise ValueError(f"duration = {duration:g} s has {steps} samples of dt = {dt:g} s; allowed: up to {MOST}")
     return np.arange(steps + 1) * (duration / steps)
 
 

@@ -90,7 +90,7 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
 
 
 def _per(name: str, value, size: int) -> np.ndarray:
-    value = np.asarray(value, dtype=float)
-    if value.shape not in ((), (size,)):
-        raise ValueError(f"{name} has shape {value.shape}; allowed: one number or ({size},)")
-    return np.full(size, value)
+    if (shape := np.shape(value)) not in ((), (size,)):
+        shapes = f" or ({size},)" if name == "limit" else f", ({size},) or ({size}, {size})"
+        raise ValueError(f"{name} has shape {shape}; allowed: one number{shapes}")
+    return np.full(size, value, dtype=float)

@@ -206,7 +206,7 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
         if _marked(fault, table, t) is not None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
         if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
-            raise ValueError(f"{fault!r} writes what is no finite number into table.jump or table.limit")
+            raise ValueError(f"{fault!r} writes NaN or an infinite table.jump; allowed: finite jumps, limits >= 0")
         if table.limit.min() < 0.0:
             raise ValueError(f"{fault!r} writes table.limit = {table.limit.min():g} N m; allowed: 0 or more")
     return table
@@ -248,7 +248,7 @@ def _instead(wrong) -> str:
 def read_fault(table) -> Fault:
     """A fault from a table of a TOML file: its `kind` and its arguments."""
     if not isinstance(table, dict) or "kind" not in table:
-        raise ValueError(f"fault = {table!r}; allowed: a table with kind = one of {', '.join(kinds())}")
+        raise ValueError(f"fault = {short(table)}; allowed: a table with kind = one of {', '.join(kinds())}")
     values = {key: value for key, value in table.items() if key != "kind"}
     known("kind of fault", [table["kind"]], kinds())
     kind = kinds()[table["kind"]]

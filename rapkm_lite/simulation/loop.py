@@ -10,6 +10,7 @@ import copy
 import numpy as np
 
 from ..control.sample import Controller, NoPose
+from ..machine.arguments import short
 from .compiled import DONE, LAW_FAILED, LEFT_WORKSPACE, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup, blank
@@ -19,15 +20,12 @@ LOST = 1e9
 
 
 def own_copy(law):
-    """The law that a run may change: objects are copied, and so start every run as they were given.
-
-    Raises ValueError when that is impossible.
-    """
+    """A copy that a run may change, so that each starts with the law as it was given; raises ValueError without one."""
     try:
         return copy.deepcopy(law)
     except Exception as error:
         raise ValueError(
-            f"law = {law!r} cannot be copied ({error}), and so its runs would depend on each other; "
+            f"law = {short(law)} cannot be copied ({error}), and so its runs would depend on each other; "
             "allowed: an object that copy.deepcopy copies, or a function"
         ) from error
 

@@ -116,7 +116,7 @@ class Sweep(Value):
 
     def __array__(self, dtype=None, copy=None):
         if self.failed.any():
-            raise ValueError(f"{int(self.failed.sum())} runs failed; take the masked array `energies` instead")
+            raise ValueError(f"{self.failed.sum()} of {len(self)} runs failed; take the masked `energies` instead")
         return np.array(self.energies, dtype=dtype)
 
     def __repr__(self):
