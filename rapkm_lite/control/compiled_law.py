@@ -115,7 +115,7 @@ def _asked(at, memory) -> int:
 
 
 def compiled(function=None, *, at: str | None = None, memory: int = 0):
-    """Decorator: a law that you write runs inside the compiled loop, thirty to eighty times as fast as in Python.
+    """Decorator: a law of yours runs inside the compiled loop, some fifty times as fast as in Python, more with `at`.
 
     The function takes t in s, the measured base angles q_a and rates qd_a (N,), and d, the desired motion with
     x, xd, xdd (2,), q, qd, qdd (2N,) and q_a, qd_a, qdd_a (N,); it returns the torques c (N,) in N m.

@@ -73,9 +73,9 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
 
     K_P : as in `RedundantAPD`; with the gains (29), (m,), it has rank m of 2N, and V is positive definite on errors
         tangent to V only, where the degree of actuation is delta.  eps : in 1/s, not negative.
-    At a fixed desired pose V with eps = 0 falls under `RedundantAPD` at the rate -ed^T K_D ed: not at all where ed = 0.
-    With eps > 0 it falls there too, at the rate -eps e^T D K_P e / 2; that a small eps makes the tracking exponential
-    is what the chapter states.
+    At a fixed desired pose V with eps = 0 falls under `RedundantAPD`, dV/dt = -ed^T K_D ed: not at all where ed = 0.
+    With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that a small eps makes the tracking exponential is
+    what the chapter states.
     Raises ValueError for arguments that do not fit.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

@@ -1,7 +1,7 @@
 """Actuation: control matrix, degree of actuation (8)-(10), inverse dynamics and prestress (11).
 
 m = N drives act on delta = 2 degrees of freedom.  What needs only a matrix takes any A (..., m, delta) of full rank.
-What takes a pose raises ValueError where its loops are open, as `At` does.
+What takes a pose raises ValueError where its loops are open, as `At` does, but for `distal_cross_products`.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 
     As in the first line of (11); on V it is the left-hand side Gbar q2dd + Cbar q2d + Qbar of (6), with the
     end-effector position as q2.
-    Raises ValueError for open loops, and where an arm is stretched or folded.
+    Raises ValueError for open loops, for a qd that opens them, and where an arm is stretched or folded.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> bool(abs(rk.required_wrench(robot, q, 0 * q, 0 * q)).max() < 1e-12)

@@ -212,7 +212,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
     each drive.
     Raises ValueError at input singularities, where an arm is stretched or folded, for values out of range, and for
-    gains so unequal that there are too many counts to try (one a million times another, say).
+    gains so unequal that there are too many counts to try (one ten million times all others, say).
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)

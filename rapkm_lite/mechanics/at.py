@@ -246,8 +246,8 @@ def at(robot: Manipulator, q, qd=None) -> At:
     Checked once, each quantity computed when asked for and kept.  Its attributes are the symbols of the notation table:
     J, J_dot, F, F_dot, A, A_T_pinv, minimal (Gbar, Cbar, Qbar), G, C, Q, N, N_dot, A_tilde, A_tilde_T_pinv, redundant
     (G~, C~, Q~), and x, xd, a, d.  ``.using((0, 1))`` takes the joints 0 and 1 as independent coordinates instead of
-    the end-effector position.  A qd that opens the loops is taken as it is, as a law may measure it; `forward_dynamics`
-    and `inverse_dynamics`, whose results are motions, refuse it.
+    the end-effector position.  A qd that opens the loops is taken as it is, as a law may measure it; it is refused by
+    `forward_dynamics`, `inverse_dynamics` and `required_wrench`, which are about motions.
     Raises ValueError when q or qd is not finite, has another last axis, or leading axes do not fit together.
 
     >>> from rapkm_lite import load, inverse_kinematics

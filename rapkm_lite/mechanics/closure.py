@@ -20,7 +20,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     Lagrangian, I + sum_k lambda_k Hess h_k, where that is positive definite on the tangent space of V.  The minimum is
     a local one: from a q more than half a radian off, another configuration may be nearer.
 
-    tolerance : largest closure error relative to the link length, and largest tangential remainder in rad; where the
+    tolerance : largest closure error relative to the longest link, and largest tangential remainder in rad; where the
         base is so far from the origin that its coordinates are rounded more coarsely, that rounding.
     Raises ConvergenceError with the residual and the pose.
 

@@ -1,8 +1,8 @@
 """Motion equations: tree with multipliers (2), minimal coordinates (4)-(7), redundant coordinates (22)-(24).
 
 Sign convention, as in (2):  G qdd + C qd + Q + J^T lambda = u,  u = (c, 0),  c (..., N) the drive torques in N m.
-Poses whose loops are open raise ValueError, as with `At`, but in `mass_matrix`, `coriolis_matrix` and
-`generalized_forces`, which belong to the tree.
+Where F or N_J enters, poses whose loops are open raise ValueError, as with `At`; the rank of J, the energies, and mass
+matrix, Coriolis matrix and forces of the tree are there for any pose.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray
 
     Rows follow the joint order, columns follow `independent`, two 0-based joint indices; None takes the end-effector
     position as q2 (then in rad/m).
-    Raises ValueError naming the pair and its measure (smallest singular value of J1 over the largest of J) where the
-    choice is singular.
+    Raises ValueError where the choice is singular, naming the pair and its measure (smallest singular value of J1 over
+    the largest of J), or the arm that is stretched or folded, and where q leaves the loops open.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.orthogonal_complement(robot, q, independent=(0, 1))[:2]
@@ -165,7 +165,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
 
     The multipliers are the cut-joint reactions: -lambda_i is the force in N that the end-effector exerts on the tip of
     the cut arm i (1, 3, ..., N; arm 2 is not cut and carries the load).
-    Raises ValueError at c-space singularities, and for rates that open the loops.
+    Raises ValueError at c-space singularities, for a q that leaves the loops open, and for rates that open them.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> qdd, reactions = rk.forward_dynamics(robot, q, 0 * q, [0.1, 0.0, 0.0])

@@ -67,7 +67,7 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
     mode : working mode (..., N), e.g. ``working_modes(robot)`` for all at once; default ``robot.mode``.
     pair : two 0-based drives that alone are to act, for the first three measures; default all drives.  The zeros are
         then the parameterization singularities of the pair.
-    Raises ValueError for an unknown measure, pair, mode or box.
+    Raises ValueError for an unknown measure, pair, mode or box, and for a prestress of two arms or of a pair.
 
     >>> from rapkm_lite import load, working_modes
     >>> x, y, sigma = actuation_map(load(), mode=working_modes(load()), n=20)

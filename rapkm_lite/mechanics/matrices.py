@@ -33,7 +33,7 @@ def complement(J, independent) -> np.ndarray:
 def complement_dot(J, J_dot, independent) -> np.ndarray:
     """dF/dt of `complement`, (..., n, n - r); from J F = 0 the dependent rows are -J1^-1 Jdot F.
 
-    J_dot : (..., r, n), dJ/dt.
+    J_dot : (..., r, n), dJ/dt.  Raises ValueError where J1 is singular.
 
     >>> complement_dot([[1.0, 1.0, 0.0]], [[0.0, 2.0, 0.0]], independent=(1, 2))
     array([[-2., -0.],

@@ -221,7 +221,7 @@ def triangle(
 ) -> Trajectory:
     """The triangle of fig. 4; our choice: equilateral, one corner up, from the lower left corner, counter-clockwise.
 
-    side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s, see `polygon`.
+    side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s and errors, see `polygon`.
 
     >>> from rapkm_lite import load
     >>> triangle(load())
@@ -240,7 +240,7 @@ def circle(
 ) -> Trajectory:
     """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s.
 
-    turns : how often around, above 0; 0.5 is half of it.
+    turns : how often around, above 0; 0.5 is half of it.  Raises ValueError when the path leaves the workspace.
 
     >>> import rapkm_lite as rk
     >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]
@@ -261,7 +261,7 @@ def circle(
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
-    """Stay at the point x (2,) in m.
+    """Stay at the point x (2,) in m, for a time in s; raises ValueError where x lies outside the workspace.
 
     >>> import rapkm_lite as rk
     >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)

@@ -208,8 +208,8 @@ def simulate(
     Stiff friction costs time: a hold in which a drive is nearly at rest takes as many Runge-Kutta steps as dt f_c / v0
     over the inertia that the drive moves: one for the testbed's friction, 2400 (0.4 ms) in its middle for 1 N m and
     v0 = 0.1 mrad/s; beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
-    Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python raises
-    at the first sample comes through.  Whatever stops the run later, or a compiled law at any sample, raises
+    Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python, or a
+    `compiled` one, raises at the first sample comes through.  Whatever else stops a run, then or later, raises
     SimulationError with the run up to there: a machine that leaves the workspace, a lost pose, a singularity of the
     law's coordinates, an error in the law.  A Ctrl-C comes through, with the run up to there as its `partial`.
 
