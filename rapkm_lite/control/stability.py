@@ -62,7 +62,9 @@ def effective_gain(F, K) -> np.ndarray:
     F = tall_matrix("F", F)
     n = F.shape[-2]
     K = real_array("K", K)
-    K = K * np.eye(n) if K.ndim == 0 else real_array("K", K, n, n)
+    if K.shape[-2:] not in ((), (n, n)):
+        raise ValueError(f"K has shape {K.shape}; allowed: one number or (..., {n}, {n})")
+    K = K * np.eye(n) if K.ndim == 0 else K
     check_leading(F=F.shape[:-2], K=K.shape[:-2])
     Q, R = full_rank("F", F, "its columns are not independent; allowed: one column for each degree of freedom")
     return solve("R", R, Q.mT @ K @ F)
@@ -75,8 +77,7 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
         tangent to V only, where the degree of actuation is delta.  eps : in 1/s, not negative.
     At a fixed desired pose V with eps = 0 falls under `RedundantAPD`, dV/dt = -ed^T K_D ed: not at all where ed = 0.
     With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that a small eps makes the tracking exponential is
-    what the chapter states.
-    Raises ValueError for arguments that do not fit.
+    what the chapter states.  Raises ValueError for arguments that do not fit.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))
@@ -95,8 +96,7 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
 
     pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
-    (A~^T)^+ G~.
-    Raises ValueError at input singularities and for open loops.
+    (A~^T)^+ G~.  Raises ValueError at input singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.feedback_norm(robot, q).round(4))

@@ -178,7 +178,7 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     """
     array = real_array(name, value)
     if array.ndim == 0:
-        array = np.full(size, float(array))
+        array = np.full(size, float(bounded(name, array, 0.0, strict=True)))
     if array.shape != (size,) and array.shape[-2:] != (size, size):
         raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:

@@ -138,7 +138,7 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     """(A^T)_W^+ = W^-1 A (A^T W^-1 A)^-1 of (11), (..., m, delta): of all c with A^T c = f the one of least c^T W c.
 
     W : symmetric positive definite, one number, (m,) or (..., m, m); default the identity.
-    Raises ValueError when W is not, or at input singularities.
+    Raises ValueError when W is not positive definite, and at input singularities.
 
     >>> import rapkm_lite as rk
     >>> rk.weighted_pseudoinverse([[2.0, 1.0], [1.0, 2.0], [1.0, 0.5]], W=[1.0, 1.0, 3.0]).round(3)

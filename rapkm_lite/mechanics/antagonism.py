@@ -99,7 +99,7 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
     """Unit null vector of A^T for three arms in closed form, (..., 3): n_i ~ (a_i x d_i) (d_j x d_k), i, j, k cyclic.
 
     Its sign is that of the cross product of the two columns of A, as in `null_basis`, which takes any number of drives.
-    Raises ValueError for another number of arms, and at input singularities, where the null space has two dimensions.
+    Raises ValueError for another number of arms or open loops, and at input singularities: two null directions.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.null_vector(robot, q).round(3)
@@ -211,7 +211,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     another question.
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
     each drive.
-    Raises ValueError at input singularities, where an arm is stretched or folded, for values out of range, and for
+    Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and for
     gains so unequal that there are too many counts to try (one ten million times all others, say).
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

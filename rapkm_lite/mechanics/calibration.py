@@ -56,8 +56,8 @@ class Calibration(Value):
     names : of the unknowns, in the order of the covariance.  estimate : (p,) rad and m.
     offset : (N,) rad, measured minus true base angle.  lengths : (N, 2) m.  base : (N, 2) m.
     covariance : (p, p) of the estimate for independent noise of the readings, by first order.
-    noise : rad, standard deviation of one reading that the covariance uses; with counts that of the distinct readings,
-        which long rests that jitter make larger (their means, with `noise` given, say more).
+    noise : rad, standard deviation of one reading that the covariance uses; for counts, that of the distinct readings,
+        larger where long rests jitter (their means, with `noise` given, say more).
     freedom : how many readings were left over to estimate the noise from; infinite where it was given.
     rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
     unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.

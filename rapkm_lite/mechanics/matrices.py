@@ -1,8 +1,8 @@
 """The theory for any mechanism: what (4)-(7) and (21)-(24) need of it are matrices.
 
-J (..., r, n) constraint Jacobian of full rank, G and C (..., n, n), Q (..., n) of the tree (2).  Further functions that
-take matrices of any mechanism: `weighted_pseudoinverse`, `prestress_projector`, `antagonism_filter`, `command_filter`,
-`null_basis`, `common_sign`, `singular_values`, `steady_state_error` for A (..., m, delta), `allocate_torques` and
+J (..., r, n) constraint Jacobian of full rank, G and C (..., n, n), Q (..., n) of the tree (2).  So take any mechanism:
+`weighted_pseudoinverse`, `prestress_projector`, `antagonism_filter`, `command_filter`, `null_basis`, `common_sign`,
+`singular_values`, `steady_state_error` and `steady_state_torque` for A (..., m, delta), `allocate_torques` and
 `minimax_torques` for one A; `explicit_pseudoinverse`, `select_independent` and `closed_loop_projector` for A~
 (..., m, n); `effective_gain` for F (..., n, delta).  The functions of a `Manipulator` evaluate the same formulas.
 """

@@ -29,7 +29,7 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     mean of the base points, or, where not all arms reach that bent, where the arms bend most evenly.
     timestep : s; its integrator is RK4.  From 1 ms on the springs that close the loops grow softer with it, and gaps
     of the tips larger: some ten nanometres in a run at 1 ms, tenths of a micrometre at 5 ms.
-    Raises ValueError for values out of range, for a q that leaves the loops open, and where the default finds no place.
+    Raises ValueError for values out of range, point masses, a q with open loops, and where the default finds no place.
 
     >>> from rapkm_lite import load
     >>> to_mjcf(load()).count("<motor")

@@ -127,7 +127,7 @@ def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
     that are there at rest, such as a prestress along the null vector: it stiffens in one sign and softens in the other.
     The last one is that of gravity, with the potential energy V; a machine in a horizontal plane has none.
     K_P : number, (N,) or (N, N), N m/rad.  c : default none.
-    Raises ValueError at the edge of the workspace.
+    Raises ValueError for open loops, and where an arm is stretched or folded.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.0, 0.0])
     >>> rk.endeffector_stiffness(robot, q, 7.05).round(1) + 0.0

@@ -261,7 +261,7 @@ def circle(
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
-    """Stay at the point x (2,) in m, for a time in s; raises ValueError where x lies outside the workspace.
+    """Stay at the point x (2,) in m for `duration` in s; raises ValueError unless x lies inside the workspace.
 
     >>> import rapkm_lite as rk
     >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)

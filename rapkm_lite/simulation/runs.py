@@ -134,7 +134,7 @@ class Run(Value):
 
     @property
     def energy(self) -> np.ndarray:
-        """Electric energy per drive (N,) in J, regenerative: sum over the holds of R (c/k_t)^2 dt + c (q_k+1 - q_k)."""
+        """Electric energy per drive (N,) in J, regenerative: sum over holds of R (c/k_t)^2 dt + c (q[k+1] - q[k])."""
         return copper_loss(self.robot, self.c[:-1], self.dt) + mechanical_work(self)
 
     @property
