@@ -235,7 +235,7 @@ def test_laws_without_an_order_are_refused_before_a_run():
 def test_a_study_has_one_law_or_one_per_row():
     study = rk.sweep(ROBOT, GAINS, PATH, OFFSETS[:2])
     assert rk.Sweep(**(study._fields() | {"law": Listed(GAINS)})) == study
-    with pytest.raises(ValueError, match="law holds 1 laws for 2 rows; allowed: one law, or one per row"):
+    with pytest.raises(ValueError, match="law holds 1 for 2 rows; allowed: one law, or one per row"):
         rk.Sweep(**(study._fields() | {"law": [PD]}))
 
 
@@ -284,7 +284,7 @@ CLOSED.shutdown()
         ({"offsets": np.zeros((4, 2))}, r"offsets has shape \(4, 2\); allowed: \(k, 3\)"),
         ({"offsets": np.zeros((0, 3))}, "allowed: at least one run"),
         ({"offsets": [[0.0, np.nan, 0.0]]}, r"offsets\[0, 1\] = nan"),
-        ({"law": [PD, PD, PD]}, "law holds 3 laws for 2 rows"),
+        ({"law": [PD, PD, PD]}, "law holds 3 for 2 rows"),
         ({"law": [PD, 7.0]}, r"law = 7\.0; allowed: a law, such as PD"),
         ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise', 'mask'"),
         ({"chunk": 0}, "chunk = 0; allowed: >= 1"),

@@ -173,7 +173,7 @@ class CommandFilter(LawValue):
     """Command form: PD drives that get the commands (18), whose errors are filtered as in (17):
 
     c = -K_P R_{A^T K_P} e - K_D R_{A^T K_D} ed, see `command_filter`.  The end-effector force is that of (16), the
-    torques only for K = k_P I.
+    torques in general only for K = k_P I.
 
     >>> import rapkm_lite as rk
     >>> rk.CommandFilter(rk.PD(7.05, 0.225))

@@ -55,7 +55,7 @@ def masked(value) -> bool:
 def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     if masked(value) and np.ma.is_masked(value):
         holes = np.ma.count_masked(value)
-        raise ValueError(f"{name} is a masked array with {holes} masked entries; allowed: numbers (fill or drop them)")
+        raise ValueError(f"{name} is masked in {holes} of {value.size} entries; allowed: numbers (fill or drop them)")
     try:
         array = np.asarray(value)
         # NumPy would read "1.0", True and bytes as numbers, and drop the imaginary part of a complex array.

@@ -41,7 +41,7 @@ def antagonism_filter(A) -> np.ndarray:
 def command_filter(A, K) -> np.ndarray:
     """R_{A^T K} = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
 
-    -K R_{A^T K} e has the end-effector force of the filtered -R K e, and the same torques only for K = k_P I.
+    -K R_{A^T K} e has the end-effector force of the filtered -R K e; the same torques in general only for K = k_P I.
     Raises ValueError at input singularities, and for a gain that is not positive definite.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

@@ -34,7 +34,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
     if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):
-        raise ValueError(f"rows holds {first.shape[-1]} rows, fewer than the rank of A_tilde; allowed: delta of them")
+        raise ValueError(f"rows holds {first.shape[-1]} of the rows, below the rank of A_tilde; allowed: delta of them")
     small, right = product(B.mT, B), product(B.mT, A1T_pinv)
     bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out

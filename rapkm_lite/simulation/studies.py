@@ -82,7 +82,7 @@ class Sweep(Value):
             if given != shape:
                 raise ValueError(f"{name} has shape {given}; allowed: {shape}, a row per run")
         if isinstance(self.law, tuple) and len(self.law) != len(self):
-            raise ValueError(f"law holds {len(self.law)} laws for {len(self)} rows; allowed: one law, or one per row")
+            raise ValueError(f"law holds {len(self.law)} for {len(self)} rows; allowed: one law, or one per row")
 
     @cached_property
     def reasons(self) -> tuple[str | None, ...]:

@@ -159,7 +159,7 @@ def _rows(law, offsets, N: int) -> tuple[object, tuple, np.ndarray]:
     if k == 0:
         raise ValueError("offsets or law is empty; allowed: at least one run")
     if several and len(laws) != k:
-        raise ValueError(f"law holds {len(laws)} laws for {k} rows of offsets; allowed: one law, or one per row")
+        raise ValueError(f"law holds {len(laws)} for {k} rows of offsets; allowed: one law, or one per row")
     rows = np.array(np.broadcast_to(offsets, (k, N)))
     return (laws, laws, rows) if several else (law, laws * k, rows)
 
