@@ -16,7 +16,7 @@ _LEAST = 1e-100
 
 
 class ConvergenceError(RuntimeError, ValueError):
-    """An iteration found no solution; the message carries the residual and the pose it stopped at.
+    """An iteration found no solution; the message says where it stopped, and the residuals or the last step there.
 
     >>> import rapkm_lite as rk
     >>> try:

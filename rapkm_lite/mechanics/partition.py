@@ -30,7 +30,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A_tilde = wide_matrix("A_tilde", A_tilde)
     first, others, back = _partition(rows, A_tilde)
     A1, A2 = _rows(A_tilde, first), _rows(A_tilde, others)
-    where = "dependent rows, or an input singularity; allowed: delta independent rows, as select_independent finds them"
+    where = "an input singularity, or dependent rows; allowed: the full degree of actuation, rows by select_independent"
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
     if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):

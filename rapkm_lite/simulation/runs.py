@@ -203,7 +203,7 @@ def simulate(
     faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s under PD it errs by less than 1 nm at
-    dt = 2 ms, by less than 0.2 micrometres at 10 ms.  Near the edge of the workspace it is more of them: the run ends
+    dt = 2 ms, by less than 0.2 micrometres at 10 ms.  Near the edge of the workspace it takes more: the run ends
     at the sample after which an arm stretches or folds.
     Stiff friction costs time: a hold in which a drive is nearly at rest takes as many Runge-Kutta steps as dt f_c / v0
     over the inertia that the drive moves: one for the testbed's friction, 2400 (0.4 ms) in its middle for 1 N m and
