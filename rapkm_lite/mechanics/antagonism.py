@@ -59,7 +59,7 @@ def command_filter(A, K) -> np.ndarray:
 def null_basis(A) -> np.ndarray:
     """Orthonormal basis of the torques that move nothing, A^T n = 0, (..., m, m - delta), for any A (..., m, delta).
 
-    A smooth function of A, so continuous along any path, and the same for one pose as inside a path.  With m - delta
+    A smooth function of A where it exists, so along paths, and the same for one pose as in a path.  With m - delta
     = 1 it is the unit vector with det[A | n] > 0; for three arms `null_vector`.  With more, all but the last vector
     face fixed references as nearly as the null space allows (the projections of (1, ..., 1) and of the cosines and
     sines of twice, three times ... the drive's share of a turn, made orthonormal in this order), and the last one
