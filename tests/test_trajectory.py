@@ -193,7 +193,7 @@ def test_set_points_reach_the_drives_through_a_model_that_is_slightly_wrong():
     assert_allclose(wrong.c, right.c, rtol=0, atol=1e-9)
     study = rk.sweep(robot, law, late(path), np.zeros((2, 3)), model=model)
     assert_allclose(study.energies[0], right.energy, rtol=1e-9)
-    with pytest.raises(ValueError, match="model cannot follow the trajectory: robot has 4 arms; allowed: 3"):
+    with pytest.raises(ValueError, match="robot cannot follow the trajectory: robot has 4 arms; allowed: 3"):
         rk.simulate(MACHINES["four_arms"], law, late(path))
 
 

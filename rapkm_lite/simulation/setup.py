@@ -109,7 +109,7 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
         # A path that fits is kept: loops in Python find its samples made.
         trajectory = trajectory if model.same_kinematics(trajectory.robot) else trajectory.for_robot(model)
     except ValueError as error:
-        raise ValueError(f"model cannot follow the trajectory: {error}") from None
+        raise ValueError(f"{'robot' if model is robot else 'model'} cannot follow the trajectory: {error}") from None
     _reach(robot, *trajectory.x[0].tolist())
     N = robot.n_arms
     faults = check_faults(faults)
