@@ -109,7 +109,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     end-effector position `guess` (..., 2) in m, by Gauss-Newton steps with the control matrix A = d q_a / d x where the
     exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
     kinematics of the five-bar.  The minimum is that near the guess; near an input singularity another one may be close.
-    Base angles are on the turn of the measured ones, elbow angles in (-pi, pi].  tolerance : of x, in longest links.
+    Its base angles are on the turn of the measured ones, the elbow angles in (-pi, pi].
     Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace, and
     ValueError where it meets an input singularity.
 
