@@ -36,8 +36,7 @@ class CompiledLaw(LawValue):
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type | LawValue):
             raise ValueError(f"function = {short(self.function)}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
-        self._set(memory=_asked(self.at, self.memory))
-        super().__post_init__()
+        super().__post_init__(memory=_asked(self.at, self.memory))
 
     @property
     def pose(self):

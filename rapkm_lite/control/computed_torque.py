@@ -59,11 +59,9 @@ class APD(LawValue):
     def __post_init__(self):
         self._check_pose()
         self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
-        if self.W is not None:
-            self._set(W=gain("W", self.W))
-        if self.independent is not None:
-            self._set(independent=joint_indices("independent", self.independent, None))
-        super().__post_init__()
+        W = None if self.W is None else gain("W", self.W)
+        pair = None if self.independent is None else joint_indices("independent", self.independent, None)
+        super().__post_init__(W=W, independent=pair)
 
     def coordinates(self, memory):
         return self.independent
@@ -129,8 +127,7 @@ class SwitchedCTC(LawValue):
     def __post_init__(self):
         self._check_pose()
         hysteresis = bounded("hysteresis", exact_array("hysteresis", self.hysteresis), 1.0, strict=False)
-        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), hysteresis=float(hysteresis))
-        super().__post_init__()
+        super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), hysteresis=float(hysteresis))
 
     def step(self, memory, sample):
         q, qd = seen(sample).pose(self.pose)
@@ -210,8 +207,7 @@ class RedundantAPD(LawValue):
         self._check_pose()
         one_of("rule", self.rule, PARTITION_RULES)
         projected = switch("projected", self.projected)
-        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), projected=projected)
-        super().__post_init__()
+        super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), projected=projected)
 
     def _feedback(self, model, q, qd, q_a, qd_a, desired):
         """K_P e + K_D ed in all joints, and (A~^T)^+."""

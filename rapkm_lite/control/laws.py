@@ -31,8 +31,7 @@ class PD(LawValue):
     pose = None
 
     def __post_init__(self):
-        self._set(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
-        super().__post_init__()
+        super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D))
 
     def start(self, model, dt):
         self.gains(manipulator(model, "model").n_arms)
@@ -81,8 +80,7 @@ class PID(LawValue):
 
     def __post_init__(self):
         self._set(K_P=gain("K_P", self.K_P), K_I=gain("K_I", self.K_I, zero=True), K_D=gain("K_D", self.K_D))
-        self._set(limit=torque_limit(self.limit))
-        super().__post_init__()
+        super().__post_init__(limit=torque_limit(self.limit))
 
     def start(self, model, dt):
         N = manipulator(model, "model").n_arms
@@ -144,9 +142,7 @@ class AntagonismFilter(LawValue):
     def __post_init__(self):
         self._check_pose()
         as_law(self.law)
-        if self.W is not None:
-            self._set(W=gain("W", self.W))
-        super().__post_init__()
+        super().__post_init__(W=None if self.W is None else gain("W", self.W))
 
     def start(self, model, dt):
         return begin(self.law, manipulator(model, "model"), dt)

@@ -45,8 +45,7 @@ class Log(Value):
             given[name] = real_array(name, getattr(self, name))
             if given[name].shape != q_a.shape:
                 raise ValueError(f"{name} has shape {given[name].shape}; allowed: {q_a.shape}, as q_a")
-        self._set(**given)
-        super().__post_init__()
+        super().__post_init__(**given)
 
     @property
     def error(self) -> np.ndarray:

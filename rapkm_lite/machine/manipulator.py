@@ -82,8 +82,7 @@ class Manipulator(Value):
         given["mode"] = drive_values("mode", self.mode, N)
         if not np.all(np.abs(given["mode"]) == 1.0):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
-        self._set(**given)
-        super().__post_init__()
+        super().__post_init__(**given)
         J_a, J_d, P = self.arm_inertias.T
         if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(

@@ -8,12 +8,12 @@ A value is a frozen dataclass on the base `Value`:
         K_D: Array = default(0.0)
 
         def __post_init__(self):
-            self._set(K_P=real_array("K_P", self.K_P))
-            super().__post_init__()
+            super().__post_init__(K_P=real_array("K_P", self.K_P))
 
 ``eq=False, repr=False`` because `Value` brings both.  A class with its own ``__post_init__`` ends it with the one of
-`Value`, which freezes every array among the fields, in tuples and lists too.  What is computed on demand and kept
-(``functools.cached_property``) is no field: it is neither compared, nor pickled, nor copied.
+`Value`, which takes fields that were checked and freezes every array among all fields, in tuples and lists too.  What
+is computed on demand and kept (``functools.cached_property``) is no field: it is neither compared, nor pickled, nor
+copied.
 
 `Array` and its like tell editors that a field is given as a number or list, and kept as an array.
 """
@@ -137,7 +137,8 @@ class Value:
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def __post_init__(self):
+    def __post_init__(self, **checked):
+        self._set(**checked)
         for name, value in self._fields().items():
             kept = _frozen(self._checked(name, value))
             if kept is not value:

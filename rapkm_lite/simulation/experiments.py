@@ -34,8 +34,7 @@ class Experiment(Value):
 
     def __post_init__(self):
         # What a run would refuse is refused here.
-        self._set(faults=prepare(self.robot, self.trajectory, self.sensors, faults=self.faults).broken)
-        super().__post_init__()
+        super().__post_init__(faults=prepare(self.robot, self.trajectory, self.sensors, faults=self.faults).broken)
 
     @property
     def offset(self) -> np.ndarray:

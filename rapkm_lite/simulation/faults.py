@@ -74,8 +74,7 @@ class TorqueLimit(Fault):
     limit: Array
 
     def __post_init__(self):
-        self._set(limit=torque_limit(self.limit))
-        super().__post_init__()
+        super().__post_init__(limit=torque_limit(self.limit))
 
     def mark(self, table, t):
         if self.limit.shape not in ((), table.limit.shape):

@@ -96,8 +96,8 @@ class Run(Value):
 
     def __post_init__(self):
         as_law(self.law)
-        self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
-        super().__post_init__()
+        model = self.robot if self.model is None else self.model
+        super().__post_init__(faults=check_faults(self.faults), model=model)
         if self.model.n_arms != self.robot.n_arms:
             raise ValueError(f"model has {self.model.n_arms} arms; allowed: {self.robot.n_arms}, as many as robot")
         if self.t.ndim != 1 or len(self.t) > len(self.trajectory):
