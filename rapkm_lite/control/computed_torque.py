@@ -16,6 +16,7 @@ from ..machine.arguments import (
     one_of,
     positive_definite,
     real_array,
+    shaped,
     switch,
 )
 from ..machine.manipulator import Manipulator, manipulator
@@ -146,8 +147,7 @@ class SwitchedCTC(LawValue):
     def pairs(self, model: Manipulator, q) -> np.ndarray:
         """The pairs (k, 2) used along the poses q (k, 2N); `Run.switches` counts the changes."""
         q = real_array("q", q, manipulator(model, "model").n_joints)
-        if q.ndim != 2:
-            raise ValueError(f"q has shape {q.shape}; allowed: (k, {model.n_joints}), poses in the order of time")
+        shaped("q", q, q.ndim == 2, f"(k, {model.n_joints}), poses in the order of time")
         return np.array(self._choices(model, q), dtype=int).reshape(-1, 2)
 
     def _choices(self, model: Manipulator, q, current=()) -> list[tuple[int, int]]:

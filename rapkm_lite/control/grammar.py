@@ -32,6 +32,7 @@ from ..machine.arguments import (
     one_of,
     positive_definite,
     real_array,
+    shaped,
     short,
 )
 from ..machine.manipulator import Manipulator, manipulator
@@ -247,8 +248,7 @@ def gain(name: str, value, zero: bool = False) -> np.ndarray:
     zero : also numbers and diagonals that are zero.
     """
     K = real_array(name, value)
-    if K.size == 0 or K.ndim > 2:
-        raise ValueError(f"{name} has shape {K.shape}; allowed: one number, one per coordinate, or a matrix")
+    shaped(name, K, K.size > 0 and K.ndim <= 2, "one number, one per coordinate, or a matrix")
     return bounded(name, K, 0.0, strict=not zero) if K.ndim < 2 else positive_definite(name, K, K.shape[-1])
 
 
@@ -257,8 +257,8 @@ def joint_gain(name: str, K, N: int) -> np.ndarray:
     K, n = real_array(name, K), 2 * N
     if K.shape == (N,):
         return np.diag(np.concatenate([bounded(name, K, 0.0, strict=True), np.zeros(N)]))
-    if K.shape not in ((), (n,)) and K.shape[-2:] != (n, n):
-        raise ValueError(f"{name} has shape {K.shape}; allowed: one number, ({N},) on the drives, ({n},) or ({n}, {n})")
+    fits = K.shape in ((), (n,)) or K.shape[-2:] == (n, n)
+    shaped(name, K, fits, f"one number, ({N},) on the drives, ({n},) or ({n}, {n})")
     return positive_definite(name, K, n)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, short, whole_number
+from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, shaped, short, whole_number
 from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
@@ -85,9 +85,9 @@ class PID(LawValue):
     def start(self, model, dt):
         N = manipulator(model, "model").n_arms
         for name in ("K_P", "K_I", "K_D", "limit"):
-            if (shape := getattr(self, name).shape) not in ((), (N,), (N, N)):
-                shapes = f" or ({N},)" if name == "limit" else f", ({N},) or ({N}, {N})"
-                raise ValueError(f"{name} has shape {shape}; allowed: one number{shapes}")
+            value = getattr(self, name)
+            fits = f"one number or ({N},)" if name == "limit" else f"one number, ({N},) or ({N}, {N})"
+            shaped(name, value, value.shape in ((), (N,), (N, N)), fits)
         return np.zeros(N)
 
     def step(self, memory, sample):
@@ -108,8 +108,7 @@ def torque_limit(limit) -> np.ndarray:
     """A largest torque in N m, one number or (N,), not negative; infinity is no limit."""
     endless = _is_infinite(limit)
     array = real_array("limit", np.where(endless, 0.0, limit) if np.any(endless) else limit)
-    if array.ndim > 1 or array.size == 0:
-        raise ValueError(f"limit has shape {array.shape}; allowed: one number or one per drive")
+    shaped("limit", array, array.ndim <= 1 and array.size > 0, "one number or one per drive")
     return np.where(endless, math.inf, bounded("limit", array, 0.0, strict=False))
 
 

@@ -73,20 +73,23 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     return array
 
 
+def shaped(name: str, array: np.ndarray, fits: bool, allowed: Any) -> np.ndarray:
+    """Return `array` when its shape `fits`; the sentence says what is `allowed` otherwise."""
+    if not fits:
+        raise ValueError(f"{name} has shape {array.shape}; allowed: {allowed}")
+    return array
+
+
 def exact_array(name: str, value, *shape: int) -> np.ndarray:
     """`real_array` of exactly this shape, without leading axes."""
     array = real_array(name, value)
-    if array.shape != shape:
-        raise ValueError(f"{name} has shape {array.shape}; allowed: {shape or 'one number'}")
-    return array
+    return shaped(name, array, array.shape == shape, shape or "one number")
 
 
 def drive_values(name: str, value, N: int) -> np.ndarray:
     """Return one number, or one for each drive, as a finite (N,) array."""
     array = real_array(name, value)
-    if array.shape not in ((), (N,)):
-        raise ValueError(f"{name} has shape {array.shape}; allowed: one number or ({N},)")
-    return np.broadcast_to(array, (N,))
+    return np.broadcast_to(shaped(name, array, array.shape in ((), (N,)), f"one number or ({N},)"), (N,))
 
 
 def joint_vectors(size: int, **vectors) -> list[np.ndarray]:
@@ -110,17 +113,15 @@ def check_leading(**leads: tuple[int, ...]) -> tuple[int, ...]:
 def tall_matrix(name: str, value) -> np.ndarray:
     """Return `value` as a finite (..., m, k) array with m >= k >= 1."""
     array = real_array(name, value)
-    if array.ndim < 2 or not 1 <= array.shape[-1] <= array.shape[-2]:
-        raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, delta) with m >= delta")
-    return sized(name, array)
+    fits = array.ndim >= 2 and 1 <= array.shape[-1] <= array.shape[-2]
+    return sized(name, shaped(name, array, fits, "(..., m, delta) with m >= delta"))
 
 
 def wide_matrix(name: str, value) -> np.ndarray:
     """Return `value` as a finite (..., m, n) array of 2 <= m <= n rows."""
     array = real_array(name, value)
-    if array.ndim < 2 or not 2 <= array.shape[-2] <= array.shape[-1]:
-        raise ValueError(f"{name} has shape {array.shape}; allowed: (..., m, n) with n >= m >= 2")
-    return sized(name, array)
+    fits = array.ndim >= 2 and 2 <= array.shape[-2] <= array.shape[-1]
+    return sized(name, shaped(name, array, fits, "(..., m, n) with n >= m >= 2"))
 
 
 def sized(name: str, array: np.ndarray) -> np.ndarray:
@@ -179,8 +180,8 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     array = real_array(name, value)
     if array.ndim == 0:
         array = np.full(size, float(bounded(name, array, 0.0, strict=True)))
-    if array.shape != (size,) and array.shape[-2:] != (size, size):
-        raise ValueError(f"{name} has shape {array.shape}; allowed: one number, ({size},) or ({size}, {size})")
+    fits = array.shape == (size,) or array.shape[-2:] == (size, size)
+    shaped(name, array, fits, f"one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:
         return np.diag(bounded(name, array, 0.0, strict=True))
     skew = np.abs(array - array.mT).max(initial=0.0)

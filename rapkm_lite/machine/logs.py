@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .arguments import of_kind, one_of, real_array, short
+from .arguments import of_kind, one_of, real_array, shaped, short
 from .datafiles import data_path
 from .values import Array, Value
 
@@ -42,9 +42,8 @@ class Log(Value):
             raise ValueError(f"t[{late[0] + 1}] = {t[late[0] + 1]:g} s follows {t[late[0]]:g} s; allowed: increasing")
         given = {"t": t, "q_a": q_a}
         for name in ("q_a_desired", "c"):
-            given[name] = real_array(name, getattr(self, name))
-            if given[name].shape != q_a.shape:
-                raise ValueError(f"{name} has shape {given[name].shape}; allowed: {q_a.shape}, as q_a")
+            given[name] = column = real_array(name, getattr(self, name))
+            shaped(name, column, column.shape == q_a.shape, f"{q_a.shape}, as q_a")
         super().__post_init__(**given)
 
     @property

@@ -10,7 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import bounded, drive_values, exact_array, joint_indices, of_kind, positive_number, real_array, short
+from .arguments import (
+    bounded,
+    drive_values,
+    exact_array,
+    joint_indices,
+    of_kind,
+    positive_number,
+    real_array,
+    shaped,
+    short,
+)
 from .datafiles import UNITS, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
@@ -191,8 +201,7 @@ class Manipulator(Value):
 def _base_points(value) -> np.ndarray:
     """Base points (N, 2) of at least two arms, no two the same."""
     base = real_array("base", value, 2)
-    if base.ndim != 2 or len(base) < 2:
-        raise ValueError(f"base has shape {base.shape}; allowed: (N, 2) with at least two arms")
+    shaped("base", base, base.ndim == 2 and len(base) >= 2, "(N, 2) with at least two arms")
     if min(np.hypot(*(base[i] - base[j])) for i in range(len(base)) for j in range(i)) < 1e-50:
         raise ValueError(f"base = {short(base.tolist())} holds one point twice, to 1e-50 m; allowed: different points")
     return base
@@ -200,9 +209,8 @@ def _base_points(value) -> np.ndarray:
 
 def _per_link(name: str, value, N: int) -> np.ndarray:
     array = real_array(name, value)
-    if array.shape not in ((), (2,), (N, 2)):
-        raise ValueError(f"{name} has shape {array.shape}; allowed: one number, (2,) or ({N}, 2)")
-    return np.broadcast_to(array, (N, 2))
+    fits = array.shape in ((), (2,), (N, 2))
+    return np.broadcast_to(shaped(name, array, fits, f"one number, (2,) or ({N}, 2)"), (N, 2))
 
 
 def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:

@@ -17,6 +17,7 @@ from ..machine.arguments import (
     positive_definite,
     positive_number,
     real_array,
+    shaped,
     small_number,
     tall_matrix,
 )
@@ -225,8 +226,7 @@ def force_polygon(A, torque: float) -> np.ndarray:
     (6, 2)
     """
     A = tall_matrix("A", A)
-    if A.ndim != 2 or A.shape[-1] != 2:
-        raise ValueError(f"A has shape {A.shape}; allowed: (m, 2), one pose")
+    shaped("A", A, A.ndim == 2 and A.shape[-1] == 2, "(m, 2), one pose")
     edges = 2 * positive_number("torque", torque) * A
     edges = np.where((edges[:, 1:] < 0) | ((edges[:, 1:] == 0) & (edges[:, :1] < 0)), -edges, edges)
     edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..machine.arguments import matvec, real_array
+from ..machine.arguments import matvec, real_array, shaped
 from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator, crossings
 from . import cores
@@ -48,9 +48,8 @@ def measured(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
         angles = real_array("log", log, robot.n_arms)
     except ValueError as error:
         raise ValueError(f"{error}, a Log, a path, or a list of these") from None
-    if angles.ndim != 2 or len(angles) == 0:
-        raise ValueError(f"log has shape {angles.shape}; allowed: angles (k, {robot.n_arms}) with k >= 1, or a Log")
-    return angles, []
+    fits = angles.ndim == 2 and len(angles) > 0
+    return shaped("log", angles, fits, f"angles (k, {robot.n_arms}) with k >= 1, or a Log"), []
 
 
 def rounding(angles: np.ndarray) -> float:

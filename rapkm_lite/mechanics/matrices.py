@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import check_leading, joint_indices, real_array, sized
+from ..machine.arguments import check_leading, joint_indices, real_array, shaped, sized
 from . import cores
 
 
@@ -96,16 +96,13 @@ def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def _jacobian(J) -> np.ndarray:
     J = real_array("J", J)
-    if J.ndim < 2 or not 1 <= J.shape[-2] < J.shape[-1]:
-        raise ValueError(f"J has shape {J.shape}; allowed: (..., r, n) with 1 <= r < n")
-    return sized("J", J)
+    fits = J.ndim >= 2 and 1 <= J.shape[-2] < J.shape[-1]
+    return sized("J", shaped("J", J, fits, "(..., r, n) with 1 <= r < n"))
 
 
 def _jacobians(J, J_dot) -> tuple[np.ndarray, np.ndarray]:
     J, J_dot = _jacobian(J), real_array("J_dot", J_dot)
-    if J_dot.shape != J.shape:
-        raise ValueError(f"J_dot has shape {J_dot.shape}; allowed: {J.shape}, as J")
-    return J, J_dot
+    return J, shaped("J_dot", J_dot, J_dot.shape == J.shape, f"{J.shape}, as J")
 
 
 def _independent(J: np.ndarray, independent) -> list[int]:

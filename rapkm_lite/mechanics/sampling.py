@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..machine.arguments import positive_number, real_array, short
+from ..machine.arguments import positive_number, real_array, shaped, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import frozen
 from . import cores
@@ -37,8 +37,7 @@ def sample_times(duration: float, dt: float) -> np.ndarray:
 def equidistant(t) -> np.ndarray:
     """Times (k,) in s, the multiples of their mean step, after a check that they rise equidistantly from zero."""
     t = real_array("t", t)
-    if t.ndim != 1 or len(t) < 2:
-        raise ValueError(f"t has shape {t.shape}; allowed: (k,) with at least two samples")
+    shaped("t", t, t.ndim == 1 and len(t) >= 2, "(k,) with at least two samples")
     if t[0] != 0.0 or t[-1] <= 0.0:
         raise ValueError(f"t = {t[0]:g}, {t[1]:g}, ..., {t[-1]:g}; allowed: rising, equidistant times that start at 0")
     step = t[-1] / (len(t) - 1)
@@ -56,10 +55,7 @@ def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -
     """Refuse other shapes than (k, 2), and rates that are no derivative of the positions; a few jumps, as of
     set-points, are allowed."""
     for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
-        if v.shape != (len(t), 2):
-            raise ValueError(
-                f"{name} has shape {v.shape}, t has {len(t)} times; allowed: ({len(t)}, 2), a row per time"
-            )
+        shaped(name, v, v.shape == (len(t), 2), f"({len(t)}, 2), a row for each of the times t")
     for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
         if (fastest := np.abs(v).max()) > 1e30:
             raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..machine.arguments import check_leading, exact_array, positive_number, real_array, whole_number
+from ..machine.arguments import check_leading, exact_array, positive_number, real_array, shaped, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value, frozen
 from .kinematics import unit_vector
@@ -190,8 +190,7 @@ def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3
     array([0.05, 0.01])
     """
     corners = real_array("corners", corners, 2)
-    if corners.ndim != 2 or len(corners) < 2:
-        raise ValueError(f"corners has shape {corners.shape}; allowed: (k, 2) with at least two corners")
+    shaped("corners", corners, corners.ndim == 2 and len(corners) >= 2, "(k, 2) with at least two corners")
     return _polygon(robot, corners, duration, dt, rest, {"corners": corners.tolist()})
 
 

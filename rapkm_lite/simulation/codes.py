@@ -11,6 +11,7 @@ from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.grammar import joint_gain
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
+from ..machine.arguments import shaped
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +91,6 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
 
 
 def _per(name: str, value, size: int) -> np.ndarray:
-    if (shape := np.shape(value)) not in ((), (size,)):
-        shapes = f" or ({size},)" if name == "limit" else f", ({size},) or ({size}, {size})"
-        raise ValueError(f"{name} has shape {shape}; allowed: one number{shapes}")
-    return np.full(size, value, dtype=float)
+    value = np.asarray(value, dtype=float)
+    fits = f"one number or ({size},)" if name == "limit" else f"one number, ({size},) or ({size}, {size})"
+    return np.full(size, shaped(name, value, value.shape in ((), (size,)), fits))

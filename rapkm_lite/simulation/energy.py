@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import having, matvec, of_kind, positive_number, real_array
+from ..machine.arguments import having, matvec, of_kind, positive_number, real_array, shaped
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import steady_state_torque
@@ -35,8 +35,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
     array([0.611, 0.611, 0.611])
     """
     c = real_array("c", c, manipulator(robot).n_arms)
-    if c.ndim < 2:
-        raise ValueError(f"c has shape {c.shape}; allowed: (..., k, {robot.n_arms}), one row per hold")
+    shaped("c", c, c.ndim >= 2, f"(..., k, {robot.n_arms}), one row per hold")
     dt = positive_number("dt", dt)
     parts = (c[..., k : k + PART, :] for k in range(0, max(1, c.shape[-2]), PART))
     heats = [np.sum(joule_heat(part, dt, robot.resistance, robot.torque_constant), axis=-2) for part in parts]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.laws import torque_limit
-from ..machine.arguments import bounded, exact_array, short, whole_number
+from ..machine.arguments import bounded, exact_array, shaped, short, whole_number
 from ..machine.datafiles import known
 from ..machine.values import Array, Value
 
@@ -77,8 +77,8 @@ class TorqueLimit(Fault):
         super().__post_init__(limit=torque_limit(self.limit))
 
     def mark(self, table, t):
-        if self.limit.shape not in ((), table.limit.shape):
-            raise ValueError(f"limit has shape {self.limit.shape}; allowed: one number or {table.limit.shape}")
+        fits = self.limit.shape in ((), table.limit.shape)
+        shaped("limit", self.limit, fits, f"one number or {table.limit.shape}")
         np.minimum(table.limit, self.limit, out=table.limit)
 
     def felt(self, c):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import exact_array, matvec, real_array, short
+from ..machine.arguments import exact_array, matvec, real_array, shaped, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default, frozen
@@ -100,16 +100,12 @@ class Run(Value):
         super().__post_init__(faults=check_faults(self.faults), model=model)
         if self.model.n_arms != self.robot.n_arms:
             raise ValueError(f"model has {self.model.n_arms} arms; allowed: {self.robot.n_arms}, as many as robot")
-        if self.t.ndim != 1 or len(self.t) > len(self.trajectory):
-            most = len(self.trajectory)
-            raise ValueError(f"t has shape {self.t.shape}; allowed: (k,), up to the {most} samples of the trajectory")
+        most = len(self.trajectory)
+        fits = self.t.ndim == 1 and len(self.t) <= most
+        shaped("t", self.t, fits, f"(k,), up to the {most} samples of the trajectory")
         for name in ("x", "xd", "q_a", "qd_a", "c", "pairs"):
-            shape = self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2
-            real_array(name, getattr(self, name))
-            if getattr(self, name).shape != shape:
-                raise ValueError(
-                    f"{name} has shape {getattr(self, name).shape}; allowed: {shape}, t has {self.t.shape}"
-                )
+            column, shape = getattr(self, name), (self.t.size, self.robot.n_arms if name in ("q_a", "qd_a", "c") else 2)
+            shaped(name, real_array(name, column), column.shape == shape, f"{shape}, t has {self.t.shape}")
 
     @cached_property
     def q(self) -> np.ndarray:

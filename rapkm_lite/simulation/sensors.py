@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, real_array, whole_number
+from ..machine.arguments import bounded, exact_array, real_array, shaped, whole_number
 from ..machine.values import Array, OptionalCount, Value, default
 
 _MOST = 10**12
@@ -32,15 +32,14 @@ class Sensors(Value):
     velocity_filter: float | None = None
 
     def __post_init__(self):
-        self._set(offset=real_array("offset", self.offset))
-        if self.offset.ndim > 1 or self.offset.size == 0:
-            raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or (N,), one per drive")
+        offset = real_array("offset", self.offset)
+        shaped("offset", offset, offset.ndim <= 1 and offset.size > 0, "one number or (N,), one per drive")
         if self.encoder is not None:
             self._set(encoder=whole_number("encoder", self.encoder, 1, _MOST))
         if self.velocity_filter is not None:
             tau = bounded("velocity_filter", exact_array("velocity_filter", self.velocity_filter), 0.0, strict=False)
             self._set(velocity_filter=float(tau))
-        super().__post_init__()
+        super().__post_init__(offset=offset)
 
     @property
     def count(self) -> float | None:
@@ -50,8 +49,7 @@ class Sensors(Value):
     def of_drives(self, N: int) -> Sensors:
         """The same for N drives, with one offset each."""
         N = whole_number("N", N, 1)
-        if self.offset.shape not in ((), (N,)):
-            raise ValueError(f"offset has shape {self.offset.shape}; allowed: one number or ({N},), one per drive")
+        shaped("offset", self.offset, self.offset.shape in ((), (N,)), f"one number or ({N},), one per drive")
         return self if self.offset.ndim else self.with_offset(np.broadcast_to(self.offset, (N,)))
 
     def with_offset(self, offset) -> Sensors:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..control.grammar import as_law
-from ..machine.arguments import short
+from ..machine.arguments import shaped, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import Value, default
 from ..mechanics.trajectory import Trajectory
@@ -74,13 +74,11 @@ class Sweep(Value):
 
     def _check_rows(self) -> None:
         """As many rows in all columns, and laws where there are several."""
-        if self.failed.ndim != 1:
-            raise ValueError(f"failed has shape {self.failed.shape}; allowed: (k,), one truth value per run")
+        shaped("failed", self.failed, self.failed.ndim == 1, "(k,), one truth value per run")
         blank = Columns.blank(len(self), self.robot.n_arms)
         for name in ("offsets", *Columns._fields[:-2]):
-            given, shape = getattr(self, name).shape, getattr(blank, name, blank.energies).shape
-            if given != shape:
-                raise ValueError(f"{name} has shape {given}; allowed: {shape}, a row per run")
+            given, shape = getattr(self, name), getattr(blank, name, blank.energies).shape
+            shaped(name, given, given.shape == shape, f"{shape}, a row per run")
         if isinstance(self.law, tuple) and len(self.law) != len(self):
             raise ValueError(f"law holds {len(self.law)} for {len(self)} rows; allowed: one law, or one per row")
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.grammar import LawLike, as_law
-from ..machine.arguments import having, one_of, real_array, switch, whole_number
+from ..machine.arguments import having, one_of, real_array, shaped, switch, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.trajectory import Trajectory
 from .chunks import NOT_RUN, Columns, blunder, run_chunk
@@ -149,8 +149,8 @@ def _several(law) -> bool:
 def _rows(law, offsets, N: int) -> tuple[object, tuple, np.ndarray]:
     """The law, or all laws as a tuple, as the study keeps it; one law and one row of offsets per run."""
     offsets = real_array("offsets", offsets)
-    if offsets.ndim > 2 or (offsets.ndim and offsets.shape[-1] != N):
-        raise ValueError(f"offsets has shape {offsets.shape}; allowed: (k, {N}), one row per run, or ({N},)")
+    fits = offsets.ndim <= 2 and offsets.shape[-1:] in ((), (N,))
+    shaped("offsets", offsets, fits, f"(k, {N}), one row per run, or ({N},)")
     several = _several(law)
     laws = tuple(law) if several else (law,)
     for one in laws:
