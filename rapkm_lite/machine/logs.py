@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -133,19 +134,19 @@ def _check_times(path: Path, t: np.ndarray) -> None:
 
 def _names(path: Path, header: list[str]) -> list[str]:
     """The names of the columns; raises ValueError for others."""
-    N, rest = divmod(len(header) - 1, 3)
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    wanted, header = columns(max(N, 1)), [name.strip() for name in header]
-    if rest or header != wanted:
-        pairs = enumerate(zip(header, wanted, strict=False))
-        wrong = next((k for k, pair in pairs if len(set(pair)) > 1), min(len(header), len(wanted)))
-        got = short(header[wrong]) if wrong < len(header) else "nothing"
-        raise ValueError(
-            f"the log {path.name!r}, line 1, column {wrong + 1} holds {got}; allowed: the header "
-            + ", ".join(wanted if N < 9 else [*wanted[:8], "..."])
-        )
-    return header
+    wanted = columns(max((len(header) - 1) // 3, 1))
+    for column, (name, want) in enumerate(itertools.zip_longest(map(str.strip, header), wanted), 1):
+        if name != want:
+            got, allowed = (
+                "nothing" if name is None else short(name),
+                wanted if len(wanted) < 28 else [*wanted[:8], "..."],
+            )
+            raise ValueError(
+                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(allowed)}"
+            )
+    return wanted
 
 
 def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> list[float]:
