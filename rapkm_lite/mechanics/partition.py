@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 
 from ..machine.arguments import joint_indices, one_of, real_array, whole_number, wide_matrix
+from ..machine.values import frozen
 from . import cores
 from .linalg import product, singular_values
 
@@ -63,10 +64,7 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 @functools.cache
 def _fixed_partition(first: tuple[int, ...], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     others = [i for i in range(m) if i not in first]
-    kept = np.array(first), np.array(others, dtype=int), np.argsort([*first, *others])
-    for index in kept:
-        index.setflags(write=False)
-    return kept
+    return frozen(first), frozen(np.array(others, dtype=int)), frozen(np.argsort([*first, *others]))
 
 
 def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
@@ -96,9 +94,7 @@ PARTITION_RULES = {
 
 @functools.cache
 def _choices(m: int, delta: int) -> np.ndarray:
-    choices = np.array(list(itertools.combinations(range(m), delta)))
-    choices.setflags(write=False)
-    return choices
+    return frozen(list(itertools.combinations(range(m), delta)))
 
 
 def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.ndarray:
