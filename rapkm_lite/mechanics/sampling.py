@@ -126,8 +126,8 @@ def columns(robot: Manipulator, t: np.ndarray, motion: Motion, given: dict) -> l
         path = motion(rows)
         try:
             parts = *path, *joint_motion(robot, *path, before)
-        except ValueError as error:
-            raise refusal(robot, motion(slice(None))[0], given, error) from None
+        except ValueError:
+            raise refusal(robot, motion(slice(None))[0], given) from None
         for column, part in zip(made, parts, strict=True):
             column[rows] = part
     del column
@@ -165,7 +165,7 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
     return q, qd.T, qdd.T
 
 
-def refusal(robot: Manipulator, x, given: dict, error: ValueError) -> ValueError:
+def refusal(robot: Manipulator, x, given: dict) -> ValueError:
     """The error of a path that leaves the workspace or touches its edge, with what the caller was asked for."""
     words = ", ".join(f"{k} = {short(v.tolist() if isinstance(v, np.ndarray) else v)}" for k, v in given.items())
     try:
