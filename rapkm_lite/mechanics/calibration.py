@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number
+from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number, small_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, Value
 from .at import at
@@ -95,9 +95,7 @@ class Calibration(Value):
         """
         if self.noise == 0.0:
             raise ValueError("no reading was left over to show the noise; allowed: a calibration with `noise`, in rad")
-        level = positive_number("level", level)
-        if level >= 1.0:
-            raise ValueError(f"level = {level:g}; allowed: above 0 and below 1")
+        level = small_number("level", level)
         from scipy.special import ndtri, stdtrit
 
         outside = (1.0 - level) / 2
