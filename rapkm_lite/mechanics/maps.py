@@ -107,8 +107,7 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
         # A~ = A (F^T F)^-1 F^T, without a decomposition of J.
         F = at(robot, q).F
         A_tilde = F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
-        merit = [PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)]
-        merit = np.stack(merit, axis=-1)
+        merit = np.stack([PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)], axis=-1)
     return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
 
 
