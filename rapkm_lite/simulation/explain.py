@@ -5,7 +5,6 @@ A run is repeated only with laws of this package; a user's law is never asked ab
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import linecache
 import math
@@ -22,7 +21,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import distal_cross_products, drive_pairs
 from .codes import FILTERS, FORMS
 from .compiled import DONE, LEFT_WORKSPACE, NO_POSE, SINGULAR, TOO_STIFF, encode, single
-from .faults import DeadDrive, EncoderDropout, Fault, TorqueLimit, begins, blank_table, described
+from .faults import DeadDrive, EncoderDropout, Fault, TorqueLimit, begins, blank_table, described, fault_table
 from .growth import growth, inner_law, magnified, swung
 from .loop import closed_loop
 from .setup import Setup
@@ -240,10 +239,8 @@ def _difference(model: Manipulator, robot: Manipulator) -> str:
 
 def _with(setup: Setup, faults: list[Fault]) -> Setup:
     """The run with other faults, or none; it keeps a table of them, so that nothing is compiled anew."""
-    table = blank_table(setup.trajectory.t, setup.robot.n_arms)
-    for fault in faults:
-        copy.deepcopy(fault).mark(table, setup.trajectory.t)
-    return setup._replace(faults=table)
+    t, N = setup.trajectory.t, setup.robot.n_arms
+    return setup._replace(faults=fault_table(faults, t, N) or blank_table(t, N))
 
 
 def _runs(setup: Setup, law, k: int) -> bool:
