@@ -55,8 +55,7 @@ class Sample:
         sample._fill(*known)
         return sample
 
-    def _fill(self, *known):
-        keeper, t, q_a, qd_a, desired, truth = known
+    def _fill(self, keeper: Controller, t, q_a, qd_a, desired, truth):
         # As `__slots__` lists them.
         values = {}, keeper, truth, desired, keeper.dt, keeper.model, q_a, qd_a, t
         for put, value in zip(_SLOTS, values, strict=True):
