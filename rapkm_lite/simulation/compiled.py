@@ -182,9 +182,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
     user, buffer = _user(code.user, N)
     sensor, faults = tables.sensor(sensors, trajectory.dt), tables.faults(setup.faults, W)
     samples, w = len(trajectory), tables.plain(work)
-    log = history
-    if history is not None and not compiled():
-        log = tables.History._make([*map(tables.plain, history[:-1]), N])
+    log = history if history is None or compiled() else tables.History._make([*map(tables.plain, history[:-1]), N])
     with patience(kind, study, modelled, user is None):
         for first in range(0, samples, PART):
             part = slice(first, min(first + PART, samples))
