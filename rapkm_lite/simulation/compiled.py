@@ -221,11 +221,9 @@ def _user(law: CompiledLaw | None, N: int):
 
 def _motion(trajectory, width: int, count: int, part: slice):
     """The desired motion of a part of the run; only that of short runs is kept, because values do not change."""
-    if len(trajectory) > PART:
-        return tables.plain(tables.motion_table(trajectory, width, count, part).ravel())
-    made = trajectory.__dict__.setdefault("_tables", {})
+    made = trajectory.__dict__.setdefault("_tables", {}) if len(trajectory) <= PART else {}
     if (width, count) not in made:
-        made[width, count] = tables.plain(tables.motion_table(trajectory, width, count).ravel())
+        made[width, count] = tables.plain(tables.motion_table(trajectory, width, count, part).ravel())
     return made[width, count]
 
 
