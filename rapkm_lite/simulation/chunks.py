@@ -83,10 +83,7 @@ def _alone(setup: Setup, laws: list, offsets: np.ndarray, rows: Columns) -> list
     # Without a compiler nothing runs side by side, and sums are sooner made at the end of a run.
     codes = {id(law): encode(law, setup) if compiled() else None for law in laws}
     fast = {i: code for i, law in enumerate(laws) if (code := codes[id(law)]) is not None}
-    own = list(fast)
-    if fast:
-        for column, part in zip(rows[:-1], many(setup, list(fast.values()), offsets[own]), strict=True):
-            column[own] = part
+    many(setup, fast, offsets, rows[:-1])
     # A first answer that does not fit is the caller's, and a compiled law cannot say what is wrong with it.
-    mute = {i for i in own if fast[i].user and rows.status[i] == SINGULAR and rows.failure_time[i] == 0.0}
+    mute = {i for i in fast if fast[i].user and rows.status[i] == SINGULAR and rows.failure_time[i] == 0.0}
     return sorted(set(range(len(laws))) - set(fast) | mute)

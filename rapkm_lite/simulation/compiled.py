@@ -63,15 +63,12 @@ def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]
     return Outcome._make([status, sample, *columns]), interrupt
 
 
-def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarray, ...]:
-    """One run per code and row of offsets (k, N): energies (k, N), torque norm, antagonistic energy, final position
-    (k, 2), path error, rms and largest, (k,) each, failure time and status; zeros where a run failed, and failure time
-    zero where it did not."""
-    k, N = offsets.shape
-    sizes = (k, N), k, k, (k, 2), k, k, k
-    columns = *map(np.zeros, sizes), np.zeros(k, int)
+def many(setup: Setup, codes: dict[int, Code], offsets: np.ndarray, columns) -> None:
+    """Run the codes, by row of the offsets (k, N), and write into the columns of a study: energies (k, N), torque norm,
+    antagonistic energy, final position (k, 2), path error, rms and largest, (k,) each, failure time and status; zeros
+    where a run failed, and failure time zero where it did not."""
     kinds: dict = {}
-    for i, code in enumerate(codes):
+    for i, code in codes.items():
         kinds.setdefault(code.kind, []).append(i)
     for rows in kinds.values():
         width = (LANES if compiled() else 1) if codes[rows[0]].user is None else 1
@@ -82,7 +79,6 @@ def many(setup: Setup, codes: list[Code], offsets: np.ndarray) -> tuple[np.ndarr
             sums = _sums(setup, _run(setup, [codes[i] for i in lanes], offsets[lanes], None))
             for column, values in zip(columns, sums, strict=True):
                 column[part] = values[: len(part)]
-    return columns
 
 
 @functools.cache
