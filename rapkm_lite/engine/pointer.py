@@ -107,11 +107,7 @@ def _pointer(function, N: int, matrices: bool, memory: int):
             x, xd, q, qd, F, F_dot, A, A_T_pinv, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv
         )
 
-    @inner
-    def nothing(buffer):
-        return None
-
-    at_hand = matrices_of if matrices else nothing
+    at_hand = matrices_of if matrices else inner(lambda buffer: None)
 
     def call(buffer):
         # A law that raises gives no answer; what it raised is found by running it in Python.

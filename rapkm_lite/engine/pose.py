@@ -33,9 +33,7 @@ def true_pose(lanes, drives, arms, modelled, law, w):
     for j in range(L):
         w[of(PX, j, W, L)], w[of(PY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
-    if modelled is not None:
-        link_rows(lanes, drives, arms, w)
-    elif law.same:
+    if modelled is None and law.same:
         for i in range(W):
             for j in range(L):
                 w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)]
