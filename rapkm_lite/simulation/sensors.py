@@ -73,16 +73,11 @@ class Encoders:
             angle = self._count * np.floor(angle / self._count + 0.5)
         if faults is not None and last is not None:
             angle = np.where(faults.held[k], last, angle)
-        if self._tau is not None:
-            if last is None:
-                self._slow = qd if faults is None else np.where(faults.held[k], 0.0, qd)
-            else:
-                blend = self._dt / (self._tau + self._dt)
-                self._slow = self._slow + blend * ((angle - last) / self._dt - self._slow)
-            rate = self._slow.copy()
-        else:
+        if self._tau is None or last is None:
             rate = qd.copy() if faults is None else np.where(faults.held[k], 0.0, qd)
-        self._last = angle
+        else:
+            rate = self._slow + self._dt / (self._tau + self._dt) * ((angle - last) / self._dt - self._slow)
+        self._last, self._slow = angle, rate
         angle.setflags(write=False)
         rate.setflags(write=False)
         return angle, rate
