@@ -14,6 +14,7 @@ from numpy.testing import assert_array_equal
 import rapkm_lite as rk
 from rapkm_lite.engine import loop
 from rapkm_lite.simulation import compiled, runs
+from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.setup import Outcome, prepare
 
 ROBOT = rk.load().replace(friction=0.0)
@@ -632,7 +633,9 @@ def test_a_division_by_zero_ends_a_run_without_a_compiler_too():
 def test_sums_of_a_failed_run_are_zeros():
     """All but its time and status; those of the run beside it are its own."""
     setup, laws = prepare(ROBOT, PATH, rk.Sensors(OFFSET)), [PD, rk.PD(1e4, 0.225)]
-    *sums, time, status = compiled.many(setup, [compiled.encode(law, setup) for law in laws], np.array([OFFSET] * 2))
+    codes, rows = {i: compiled.encode(law, setup) for i, law in enumerate(laws)}, Columns.blank(2, 3)
+    compiled.many(setup, codes, np.array([OFFSET] * 2), rows[:-1])
+    *sums, time, status, _ = rows
     assert status[0] == compiled.DONE != status[1] and time[0] == 0.0 < time[1]
     for column in sums:
         assert np.all(column[0] != 0.0) and np.all(column[1] == 0.0)

@@ -8,9 +8,12 @@ imported, and code compiled, at the first run.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib.util
 import os
+import signal
+import threading
 import warnings
 
 _WANTED = os.environ.get("RAPKM_LITE_NUMBA", "1").strip().lower() not in ("0", "false", "no", "off")
@@ -20,12 +23,30 @@ COMPILED = _WANTED and _FREE and importlib.util.find_spec("numba") is not None
 """Is Numba wanted and installed?  Whether it works, `compiled` says."""
 
 
+@contextlib.contextmanager
+def _uninterrupted():
+    """A Ctrl-C waits for the end: of a Numba that was imported by half the rest cannot be imported any more."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting = []
+    signal.signal(signal.SIGINT, lambda *call: waiting.append(call))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if waiting:
+            signal.raise_signal(signal.SIGINT)
+
+
 @functools.cache
 def compiled() -> bool:
     """Do kernels run compiled?  The first call imports Numba, and warns once where that fails."""
     if COMPILED:
         try:
-            import numba
+            with _uninterrupted():
+                import numba
         except Exception as error:
             warnings.warn(
                 f"Numba is installed but does not import ({type(error).__name__}: {error}): runs go through plain "

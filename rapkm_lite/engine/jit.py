@@ -74,7 +74,7 @@ def kernel(function) -> Callable[..., Any]:
 
 
 def _forgiving(dispatcher):
-    """A cache that cannot be read or written (damaged, a full disk, lost permissions) costs time, but no run."""
+    """A cache that cannot be read or written (cut short, a full disk, lost permissions) costs time, but no run."""
 
     def quiet(access):
         @functools.wraps(access)

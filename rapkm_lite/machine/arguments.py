@@ -178,8 +178,7 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     Raises ValueError, with the smallest eigenvalue, when it is not.
     """
     array = real_array(name, value)
-    if array.ndim == 0:
-        array = np.full(size, float(bounded(name, array, 0.0, strict=True)))
+    array = array if array.ndim else np.full(size, float(bounded(name, array, 0.0, strict=True)))
     fits = array.shape == (size,) or array.shape[-2:] == (size, size)
     shaped(name, array, fits, f"one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:

@@ -13,7 +13,7 @@ from . import cores
 from .at import at
 from .encoders import poses
 
-# Fewest records of the later half of a rest, over which its means are taken.
+# Fewest records of a rest, without its first quarter, over which its means are taken.
 SHORTEST = 10
 
 
@@ -74,19 +74,19 @@ class Gain(NamedTuple):
 
 
 def rests(logs: list[Log]) -> Rests | None:
-    """The rests of all logs, each the later half of a stretch of equal desired angles; None where there is none."""
+    """The rests of all logs, stretches of equal desired angles without their first quarter; None without any."""
     found = []
     for log in logs:
         moves = np.flatnonzero(np.any(np.diff(log.q_a_desired, axis=0) != 0.0, axis=-1)) + 1
         for start, stop in zip([0, *moves], [*moves, len(log.t)], strict=True):
-            half = slice(start + (stop - start) // 2, stop)
-            count = stop - half.start
+            still = slice(start + (stop - start) // 4, stop)
+            count = stop - still.start
             if count >= SHORTEST:
-                both = np.stack([log.c[half], log.q_a[half]], axis=-1)
+                both = np.stack([log.c[still], log.q_a[still]], axis=-1)
                 c, q_a = np.moveaxis(both.mean(axis=0), -1, 0)
                 off = both - both.mean(axis=0)
                 noise = np.einsum("kia,kib->iab", off, off) / (count - 1)
-                found.append((log.q_a_desired[half.start], q_a, c, noise, count))
+                found.append((log.q_a_desired[still.start], q_a, c, noise, count))
     return Rests(*map(np.array, zip(*found, strict=True))) if found else None
 
 
@@ -131,8 +131,8 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
     """Readings at the rests from their torques, one row a rest, and their standard deviation from the torques'."""
     if stand is None:
         raise ValueError(
-            f"use = 'torques', and no log holds still for {2 * SHORTEST} records with torques; allowed: a Log, a path "
-            "of one, or a list of these, with such rests"
+            f"use = 'torques', and no log holds still for {4 * SHORTEST // 3} records with torques; allowed: a Log, a "
+            "path of one, or a list of these, with such rests"
         )
     if K_P is None:
         if gain is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from .compiled import DONE, LAW_FAILED, SINGULAR, compiled, encode, many
 from .energy import antagonistic_energy, root_mean_square_torque
 from .explain import explain
 from .pools import Stop
-from .runs import SimulationError, complete
+from .runs import attempt
 from .setup import Setup
 
 NOT_RUN = -1
@@ -61,14 +61,18 @@ def run_chunk(setup: Setup, laws: list, offsets: np.ndarray) -> tuple[Columns, d
     """
     rows, errors = Columns.blank(len(laws), setup.robot.n_arms), {}
     for i in _alone(setup, laws, offsets, rows):
+        run: Any
+        error: Any
         try:
-            run = complete(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
-        except Exception as error:
-            rows.failure_time[i], rows.status[i] = getattr(error, "time", 0.0), LAW_FAILED
-            known = isinstance(error, SimulationError)
-            rows.reason[i] = error.reason if known else explain(setup, laws[i], LAW_FAILED, 0, error)
+            run, error = attempt(setup._replace(sensors=setup.sensors.with_offset(offsets[i])), laws[i])
+        except Exception as raised:  # at the first sample, whatever kind it is: a law may run simulations of its own
+            run, error = None, raised
+        if error is not None:
+            rows.status[i], begun = LAW_FAILED, run is not None
+            rows.failure_time[i] = error.time if begun else 0.0
+            rows.reason[i] = error.reason if begun else explain(setup, laws[i], LAW_FAILED, 0, error)
             if not errors or blunder(error):
-                errors[i] = Stop(error, rows.reason[i])
+                errors[i] = Stop(error, rows.reason[i], begun)
         else:
             off = run.path_error
             torques = run.energy, root_mean_square_torque(run), antagonistic_energy(run)

@@ -78,7 +78,10 @@ def again_in_python(setup: Setup, law, outcome: Outcome) -> tuple[Outcome, BaseE
     the caller, as in `closed_loop`.
     """
     with np.errstate(all="ignore"):
-        again, cause = closed_loop(setup.begin(outcome.sample + 1), law)
+        try:
+            again, cause = closed_loop(setup.begin(outcome.sample + 1), law)
+        except KeyboardInterrupt as stop:  # before the repetition has begun
+            return outcome, stop
     if again.status == LAW_FAILED and again.sample == outcome.sample:
         return outcome._replace(status=LAW_FAILED), cause
     if again.status == LEFT_WORKSPACE and cause is not None:

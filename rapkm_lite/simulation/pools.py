@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+import sys
 import threading
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from inspect import isfunction
 
 from ..machine.arguments import short
 
@@ -39,15 +41,30 @@ def answer(job: Future, first: int, setup, laws, offsets):
     """
     try:
         return job.result()
+    except BrokenExecutor as error:
+        for name, value in _sent(first, setup, laws):
+            kind = value if isfunction(value) else type(value)
+            if kind.__module__ == "__main__" and not hasattr(sys.modules["__main__"], "__file__"):
+                error.add_note(
+                    f"{name} = {short(value)} was written in a notebook, where only a process that is forked finds it; "
+                    "allowed: what stands in a module, or threads (executor = None or a ThreadPoolExecutor)"
+                )
+                break
+        raise
     except (pickle.PicklingError, AttributeError, TypeError) as error:
-        named = {f"law of run {i}": law for i, law in enumerate(laws, first)}
-        for name, value in (named | {f"fault {i}": fault for i, fault in enumerate(setup.broken)}).items():
+        for name, value in _sent(first, setup, laws):
             if words := kept_here(value):
                 raise ValueError(
                     f"{name} = {short(value)} cannot be sent to another process ({words}); allowed: what pickle sends, "
                     "such as a def or a class of a module, or threads (executor = None or a ThreadPoolExecutor)"
                 ) from error
         raise
+
+
+def _sent(first: int, setup, laws):
+    """Names and values of what a user may have written, of the runs from `first` on."""
+    yield from ((f"law of run {i}", law) for i, law in enumerate(laws, first))
+    yield from ((f"fault {i}", fault) for i, fault in enumerate(setup.broken))
 
 
 def kept_here(value) -> str:
@@ -63,13 +80,14 @@ def kept_here(value) -> str:
 
 
 class Stop:
-    """What stopped a run; an exception that cannot be sent to another process becomes its words there."""
+    """What stopped a run, `begun` or at its first sample; an exception that cannot be sent to another process becomes
+    its words there."""
 
-    def __init__(self, error: Exception, words: str):
-        self.error, self.words = error, words
+    def __init__(self, error: Exception, words: str, begun: bool):
+        self.error, self.words, self.begun = error, words, begun
 
     def __reduce__(self):
-        return Stop, (RuntimeError(self.words) if kept_here(self.error) else self.error, self.words)
+        return Stop, (RuntimeError(self.words) if kept_here(self.error) else self.error, self.words, self.begun)
 
 
 def _threads() -> bool:

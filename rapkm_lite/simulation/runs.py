@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -222,6 +222,14 @@ def simulate(
 
 def complete(setup: Setup, law) -> Run:
     """The whole run; raises SimulationError with a part of it."""
+    run, lost = attempt(setup, law)
+    if lost is not None:
+        raise lost
+    return run
+
+
+def attempt(setup: Setup, law) -> tuple[Run, SimulationError | None]:
+    """A run as far as it came, and what ended it; what a law raises at its first sample comes through as it is."""
     as_law(law)
     code, cause = encode(law, setup), None
     steps = friction_steps(setup.robot, *setup.trajectory.x[0].tolist(), setup.trajectory.dt)
@@ -240,12 +248,14 @@ def complete(setup: Setup, law) -> Run:
         if cause is not None and not isinstance(cause, Exception):
             raise cause
         if outcome.status == DONE:
-            return run
+            return run, None
         reason = explain(setup, law, outcome.status, outcome.sample, cause, run.c)
     except BaseException as error:  # also a Ctrl-C while the cause is looked for
         hand_over(error, run, f"The run up to t = {time:.4f} s is the `partial` of this exception.")
         raise
-    raise SimulationError(time, reason, run) from cause
+    lost = SimulationError(time, reason, run)
+    lost.__cause__ = cause
+    return run, lost
 
 
 def _run(setup: Setup, law, outcome: Outcome) -> Run:
@@ -266,5 +276,6 @@ def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so instead of one that did."""
     if isinstance(getattr(error, "partial", None), Run):
         error.__notes__ = [text for text in error.__notes__ if "`partial`" not in text]
-    error.partial = partial
+    with suppress(AttributeError):  # of an exception class whose `partial` is its own
+        error.partial = partial
     error.add_note(note)

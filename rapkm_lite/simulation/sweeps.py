@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from concurrent.futures import Executor
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +20,8 @@ from .explain import REASONS
 from .faults import FaultsLike
 from .loop import own_copy
 from .patience import progress_bar
-from .pools import answer, handed, pool_of
-from .runs import SimulationError, complete, hand_over
+from .pools import Stop, answer, handed, pool_of
+from .runs import SimulationError, attempt, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
 from .studies import Sweep
@@ -45,7 +46,8 @@ def sweep(
     law : one law for all runs, or k laws in their order, such as PD with other gains.
     offsets : calibration offsets (k, N) in rad, or (N,) for all runs; the other arguments are those of `simulate`.
     executor : any `concurrent.futures` executor to spread the chunks of `chunk` runs; default: one thread per core, or
-        one thread and run by run for laws in Python.  Other processes need laws that are written in a module.
+        one thread and run by run for laws in Python.  Other processes need laws that are written in a module, and know
+        them, and what they use, as these were when the process began.
     failed : "raise" raises the error of the first run that fails; "mask" masks the rows of such runs, whose `reasons`
         the result knows.
     progress : show a bar.
@@ -72,17 +74,17 @@ def sweep(
     width = 1 if executor is None and in_python else chunk
     chunks = {i: (setup, laws[i : i + width], offsets[i : i + width]) for i in range(0, len(laws), width)}
     table = Columns.blank(len(laws), robot.n_arms)
-    with pool_of(executor, 1 if in_python or not compiled() else os.cpu_count() or 1) as pool:
-        try:
+    try:
+        with pool_of(executor, 1 if in_python or not compiled() else os.cpu_count() or 1) as pool:
             errors = _collect(pool, chunks, table, progress)
-        except BaseException as error:
-            _hand_over_rows(error, table, setup, given, offsets)
-            raise
+    except BaseException as error:  # also a second Ctrl-C, while the pool ends
+        _hand_over_rows(error, table, setup, given, offsets)
+        raise
     result = _result(table, setup, given, offsets, mask=failed == "mask" or bool(table.failed.any()))
     i = _blamed(errors, result.failed, failed == "mask")
     if i is not None:
         own = setup._replace(sensors=setup.sensors.with_offset(offsets[i]))
-        _raise(i, errors[i].error if i in errors else None, own, laws[i], result)
+        _raise(i, errors.get(i), own, laws[i], result)
     return result
 
 
@@ -124,19 +126,14 @@ def _hand_over_rows(error: BaseException, table: Columns, setup: Setup, law, off
         hand_over(error, partial, f"{finished} of {len(table.status)} runs were finished; {words}")
 
 
-def _raise(i: int, error, setup: Setup, law, result: Sweep):
+def _raise(i: int, stop: Stop | None, setup: Setup, law, result: Sweep):
     """Raise what stopped run i; what the engine stopped runs once more, for its reason and its samples."""
-    if error is None:
-        try:
-            complete(setup, law)
-            error = SimulationError(result.failure_time[i], str(result.stopped[i]))
-        except SimulationError as found:
-            error = found
-    if not isinstance(error, SimulationError):
-        hand_over(
-            error, result, f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`."
-        )
-        raise error
+    if stop is not None and not stop.begun:
+        words = f"It was raised at the first sample of run {i} of a sweep; all rows are in its `partial`."
+        hand_over(stop.error, result, words)
+        raise stop.error
+    error: Any = stop.error if stop is not None else attempt(setup, law)[1]
+    error = error or SimulationError(result.failure_time[i], str(result.stopped[i]))
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
 
 
