@@ -633,9 +633,9 @@ def test_a_division_by_zero_ends_a_run_without_a_compiler_too():
 def test_sums_of_a_failed_run_are_zeros():
     """All but its time and status; those of the run beside it are its own."""
     setup, laws = prepare(ROBOT, PATH, rk.Sensors(OFFSET)), [PD, rk.PD(1e4, 0.225)]
-    codes, rows = {i: compiled.encode(law, setup) for i, law in enumerate(laws)}, Columns.blank(2, 3)
-    compiled.many(setup, codes, np.array([OFFSET] * 2), rows[:-1])
-    *sums, time, status, _ = rows
+    *sums, time, status = columns = [column + 1 for column in Columns.blank(2, 3)[:-1]]
+    codes = {i: compiled.encode(law, setup) for i, law in enumerate(laws)}
+    compiled.many(setup, codes, np.array([OFFSET] * 2), columns)
     assert status[0] == compiled.DONE != status[1] and time[0] == 0.0 < time[1]
     for column in sums:
         assert np.all(column[0] != 0.0) and np.all(column[1] == 0.0)

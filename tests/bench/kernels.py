@@ -8,6 +8,7 @@ import numpy as np
 
 import rapkm_lite as rk
 from rapkm_lite.simulation import compiled
+from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.energy import antagonistic_energy
 from rapkm_lite.simulation.sensors import Sensors
 from rapkm_lite.simulation.setup import prepare
@@ -60,7 +61,8 @@ def block(robot, law, path):
     """As many runs as the kernel takes side by side, in one thread."""
     setup = prepare(robot, path, Sensors())
     code = compiled.encode(law, setup)
-    return lambda: compiled.many(setup, [code] * len(BLOCK), BLOCK)
+    columns = Columns.blank(*BLOCK.shape)[:-1]
+    return lambda: compiled.many(setup, dict.fromkeys(range(len(BLOCK)), code), BLOCK, columns)
 
 
 def yards(folder: Path, robot, lanes: int, kinds) -> dict:
