@@ -6,6 +6,7 @@ instant.  Energies hold everywhere.
 
 import numpy as np
 import pytest
+from reference import reference
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
@@ -82,20 +83,27 @@ def test_no_hold_makes_or_loses_energy_at_the_edge(robot):
 
 
 @pytest.mark.parametrize(
-    "inside, speed, dt", [(1e-4, 0.5, 5e-4), (1e-4, 0.5, 1e-3), (1e-5, 0.1, 1e-3), (1e-5, 0.0, 1e-2)]
+    "inside, speed, dt, sag",
+    [
+        (1e-4, 0.5, 5e-4, 0.0),
+        (1e-4, 0.5, 1e-3, 0.0),
+        (1e-5, 0.1, 1e-3, 0.0),
+        (1e-5, 0.0, 1e-2, -0.05),
+        (1e-9, 1e-3, 1e-2, 0.0),  # its first steps are a millionth of the hold
+        (2e-2, 6.0, 1e-3, 0.0),  # its elbow is bent by 36 degrees, and fast
+    ],
 )
-def test_an_arm_that_leaves_the_edge_takes_no_energy_along(inside, speed, dt):
+def test_an_arm_that_leaves_the_edge_takes_no_energy_along(inside, speed, dt, sag):
     """From a place `inside` the reach of the first arm, away from the edge: as stiff as the way there."""
     robot = rk.load().replace(friction=0.0)
     out = robot.base[0] / np.linalg.norm(robot.base[0])
     t = dt * np.arange(5)
     x = robot.base[0] - out * (robot.lengths[0].sum() - inside) + speed * t[:, None] * out
     path = rk.follow(robot, t, x, np.tile(speed * out, (5, 1)), 0.0 * x)
-    sag = [-0.05, 0.0, 0.0] if speed == 0.0 else 0.0
     law = rk.PD(7.05, 0.225)
     for one in (law, lambda t, q_a, qd_a, want: -7.05 * (q_a - want.q_a) - 0.225 * (qd_a - want.qd_a)):
         try:
-            run = rk.simulate(robot, one, path, sag)
+            run = rk.simulate(robot, one, path, [sag, 0.0, 0.0])
         except rk.SimulationError as error:
             run = error.partial
         kinetic, work = rk.kinetic_energy(robot, run.q, run.qd), np.sum(run.c[:-1] * np.diff(run.q_a, axis=0), axis=-1)
@@ -130,3 +138,20 @@ def test_a_run_beside_one_at_the_edge_does_not_feel_it():
     alone = rk.sweep(HEAVY, [firm], longer, offsets[1:])
     np.testing.assert_array_equal(together.energies[1], alone.energies[0])
     assert not rk.sweep(HEAVY, [weak], path, offsets[:1], failed="mask").failed.any()
+
+
+def test_a_run_at_the_edge_is_lost_as_alone_though_those_before_it_are_calm():
+    """Looked at where the others are, it would leap over the instant at which its arm is straight, and go on."""
+    path = rk.hold(HEAVY, [0.08, 0.02], 0.22)
+    alone = lost(rk.simulate, HEAVY, IDLE, path).time
+    study = rk.sweep(HEAVY, 3 * [rk.PD(20.0, 0.5)] + [IDLE], path, np.zeros((4, 3)), failed="mask")
+    assert study.failed.tolist() == [False, False, False, True] and study.failure_time[3] == alone
+
+
+def test_friction_of_an_arm_that_is_nearly_straight_is_that_of_a_stiff_solver():
+    """Pulled away from the edge, at 0.2 mm, against friction that needs shorter steps than the edge does."""
+    robot = rk.load().replace(friction=0.3, friction_velocity=3e-3)
+    x = robot.base[0] * (1.0 - (robot.lengths[0].sum() - 2e-4) / np.linalg.norm(robot.base[0]))
+    law, path, sag = rk.PD(7.05, 0.225), rk.hold(robot, x, 2e-2, 1e-2), np.array([-0.1, 0.01, 0.0])
+    states = reference(robot, law, path, sag, method="LSODA", rtol=1e-12, atol=1e-15)[0]
+    np.testing.assert_allclose(rk.simulate(robot, law, path, sag).x, states[:, :2], rtol=0, atol=1e-9)

@@ -219,6 +219,19 @@ def test_elbows_far_from_their_path(law):
     assert_allclose(study.x_final[1], run.x[-1], rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("law", [rk.CTC(400.0, 40.0, (2, 3), pose="true"), rk.RedundantCTC(400.0, 40.0, pose="true")])
+def test_an_elbow_that_is_folded_and_should_be_stretched_is_far_from_its_path(law):
+    """Half a turn off, where the sine of the error is as small as at none; the other arm is as long in both places."""
+    x = np.array([[0.005, 0.0], [0.35, 0.192]])
+    x[1] *= 0.39987 / np.linalg.norm(x[1])
+    aside = x.mean(axis=0) + 0.5 * (x[1] - x[0])[::-1] * [1.0, -1.0]
+    robot = rk.Manipulator(base=[[0.0, 0.0], aside], lengths=0.2, masses=0.134)
+    path = rk.follow(robot, [0.0, 1e-4], x, 0.0 * x, 0.0 * x)
+    assert np.ptp(path.q[:, 2]) > 3.05 and np.ptp(path.q[:, 3]) < 1e-9
+    run = rk.simulate(robot, law, path)
+    assert_allclose(run.c, rk.simulate(robot, Textbook(law), path).c, rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize("size", [0.3, -0.3])
 def test_the_pose_of_mirrored_readings_is_on_the_axis_of_the_machine(size):
     """A machine that is its own mirror image: no step across its axis ends the search for the place along it."""
