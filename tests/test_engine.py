@@ -93,8 +93,8 @@ def test_every_drive_its_own_gain():
         agrees(machine(3), law, duration=0.1)
 
 
-def test_switching_goes_by_the_directions_of_distal_links_of_any_length():
-    robot = rk.load().replace(lengths=[[0.2, 0.2], [0.2, 0.3], [0.2, 0.22]], friction=0.0)
+def test_switching_goes_by_the_directions_of_distal_links_whatever_the_lengths():
+    robot = rk.load().replace(lengths=[[0.22, 0.2], [0.18, 0.3], [0.27, 0.22]], friction=0.0)
     law = rk.SwitchedCTC(400.0, 40.0, hysteresis=1.0, pose="true")
     run = rk.simulate(robot, law, rk.circle(robot, 0.06, 0.4))
     assert np.array_equal(run.pairs, law.pairs(robot, run.q)) and run.switches > 0

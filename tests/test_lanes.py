@@ -320,6 +320,9 @@ def test_neighbours_that_fail_change_no_bit(name):
     own = rk.sweep(MACHINE, law, CIRCLE, good)
     for column in COLUMNS:
         assert_array_equal(getattr(study, column)[rows], getattr(own, column))
+    alone = rk.sweep(MACHINE, law, CIRCLE, offsets, failed="mask", chunk=1)
+    assert_array_equal(study.failure_time.filled(-1.0), alone.failure_time.filled(-1.0))
+    assert study.reasons == alone.reasons
 
 
 # Friction.
