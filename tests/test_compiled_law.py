@@ -571,7 +571,7 @@ def test_a_law_that_raises_says_what_the_plain_function_says(how, wrapped):
     assert study.failed.all() and study.reasons == (one.reason,) * 2
 
 
-@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan, 1e120])
 def test_a_limit_of_the_drives_makes_no_torque_of_what_is_none(bad):
     def law(t, q_a, qd_a, d):
         c = -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a)
