@@ -1,5 +1,6 @@
 """Nothing is lost: a run that stops keeps its samples and the reason, a sweep its finished rows."""
 
+import copyreg
 import os
 import pickle
 import subprocess
@@ -310,7 +311,14 @@ class Wordless(Exception):
         raise RuntimeError("no words")
 
 
-def test_an_error_travels_without_a_cause_that_cannot():
+@pytest.fixture
+def plain_pickle(monkeypatch):
+    """Without the ways of pickling exceptions that a cluster's client installs."""
+    for kind in (rk.SimulationError, Rooted, Unreadable):
+        monkeypatch.delitem(copyreg.dispatch_table, kind, raising=False)
+
+
+def test_an_error_travels_without_a_cause_that_cannot(plain_pickle):
     error = lost(ROBOT, FailsAt(0.1, boom), PATH, OFFSET)
     error.__cause__ = Rooted()
     again = pickle.loads(pickle.dumps(error))
@@ -440,7 +448,7 @@ def unreadable():
 
 
 @pytest.mark.parametrize("failed", ["mask", "raise"])
-def test_an_exception_that_cannot_travel_costs_no_rows(failed):
+def test_an_exception_that_cannot_travel_costs_no_rows(failed, plain_pickle):
     laws = [pd, FailsAt(0.0, unreadable), pd]
     with ProcessPoolExecutor(1) as pool:
         if failed == "mask":

@@ -249,7 +249,7 @@ function words(panel, { kind, points, words }, style) {
   const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold), left = x - wide * SHARE[style.ha];
   // Words that would cover others step aside, away from what they name.
   const near = ([a, b, c, s], up) => left - 3 < c && left + wide + 3 > a && Math.abs(y + up - b) < 0.6 * (s + size);
-  const way = (style.va === "top" ? 0.5 : -0.5) * size;
+  const way = (style.va === "top" ? 0.25 : -0.25) * size;
   let up = 0;
   while (Math.abs(up) < 3 * size && panel.taken.some((t) => near(t, up))) up += way;
   panel.taken.push([left, y + up, left + wide, size]);

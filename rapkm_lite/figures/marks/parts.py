@@ -99,12 +99,21 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
     width = positive_number("width", width)
     zero_line(picture, panel)
     size = 9 if sum(len(values) for values, _ in groups) < 8 else 7
+    said = [[_bar_words(value, form) for value in values] for values, _ in groups]
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
-            at = i + 1 + (k - (len(groups) - 1) / 2) * width
+            at, words = i + 1 + (k - (len(groups) - 1) / 2) * width, said[k][i]
             picture.bar(panel, at, value, 0.92 * width, facecolor=arm_colour(i), **style)
-            words = re.sub("^−(?=[0.]+$)", "", format(value, form).replace("-", "−"))
-            picture.text(panel, at, value, words, ha="center", fontsize=size, va="top" if words[0] == "−" else "bottom")
+            # Equal numbers of a drive are written once, between its bars.
+            once = len({row[i] for row in said}) == 1
+            if k == 0 or not once:
+                va = "top" if words[0] == "−" else "bottom"
+                picture.text(panel, i + 1 if once else at, value, words, ha="center", fontsize=size, va=va)
+
+
+def _bar_words(value: float, form: str) -> str:
+    """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart."""
+    return re.sub("^−(?=[0.]+$)", "", format(np.round(value, 9), form).replace("-", "−"))
 
 
 def per_drive(values, digits: int) -> str:
@@ -113,7 +122,7 @@ def per_drive(values, digits: int) -> str:
     >>> per_drive([0.25, -0.001], 2)
     '0.25 / 0.00'
     """
-    return " / ".join(f"{np.round(v, digits) + 0.0:.{digits}f}" for v in values)
+    return " / ".join(f"{np.round(np.round(v, digits + 6), digits) + 0.0:.{digits}f}" for v in values)
 
 
 def offset_values(values: dict, n: int) -> np.ndarray:
