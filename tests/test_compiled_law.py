@@ -4,6 +4,8 @@ import copy
 import linecache
 import pickle
 import re
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -598,3 +600,17 @@ def test_a_law_that_fails_at_the_last_sample_fails_in_a_study_too():
         study = rk.sweep(ROBOT, one, PATH, np.tile(OFFSET, (2, 1)), failed="mask")
         assert caught.value.time == pytest.approx(0.3) and study.failed.all()
         assert_allclose(study.failure_time, 0.3)
+
+
+def test_a_law_of_a_notebook_travels_with_its_code():
+    """As to the executors of clusters; by its name a process that is not forked would not find it."""
+    cloudpickle = pytest.importorskip("cloudpickle", reason="needs the optional extra [cluster]")
+    there = """import cloudpickle, sys, rapkm_lite as rk
+@rk.compiled(memory=3)
+def soft(t, q_a, qd_a, d, memory):
+    return -2.0 * (q_a - d.q_a)
+sys.stdout.buffer.write(cloudpickle.dumps(soft))"""
+    data = subprocess.run([sys.executable, "-c", there], check=True, capture_output=True).stdout
+    law = cloudpickle.loads(data)
+    assert repr(law) == "compiled(soft, at=None, memory=3)"
+    assert rk.simulate(ROBOT, law, PATH).c.shape == (len(PATH), 3)

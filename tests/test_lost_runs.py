@@ -3,6 +3,7 @@
 import copyreg
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -13,8 +14,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import rapkm_lite as rk
+from rapkm_lite import engine
 from rapkm_lite.engine import loop
-from rapkm_lite.simulation import compiled, runs
+from rapkm_lite.simulation import compiled, pools, runs
+from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.setup import Outcome, prepare
 
@@ -460,6 +463,94 @@ def test_an_exception_that_cannot_travel_costs_no_rows(failed, plain_pickle):
         assert study.failed.tolist() == [False, True, False]
     with pytest.raises(Unreadable):
         rk.sweep(ROBOT, laws, PATH, OFFSET)
+
+
+class Late(Exception):
+    """One whose words have a time of their own."""
+
+    def __init__(self, time):
+        super().__init__("late")
+        self.time = time
+
+
+class Foresees:
+    """A law that simulates ahead at its first sample, where its model is lost."""
+
+    def __call__(self, t, q_a, qd_a, desired):
+        rk.simulate(ROBOT, rk.PD(1e4, 0.225), PATH, OFFSET)
+
+
+@pytest.mark.parametrize("time", [3.5, "noon"])
+def test_what_a_law_raises_at_its_first_sample_has_no_time_of_its_own(time):
+    def late():
+        raise Late(time)
+
+    study = rk.sweep(ROBOT, [pd, FailsAt(0.0, late)], PATH, OFFSET, failed="mask")
+    assert study.failed.tolist() == [False, True] and study.failure_time[1] == 0.0
+    assert study.reasons[1].startswith("the law raised Late: late")
+
+
+def test_a_run_that_a_law_lost_ahead_is_not_the_run_of_the_machine():
+    study = rk.sweep(ROBOT, [pd, Foresees()], PATH, OFFSET, failed="mask")
+    assert study.failure_time[1] == 0.0 and study.reasons[1].startswith("the law raised SimulationError: at t = ")
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.sweep(ROBOT, [pd, Foresees()], PATH, OFFSET)
+    assert isinstance(caught.value.partial, rk.Sweep) and caught.value.partial.failed.tolist() == [False, True]
+    assert "first sample of run 1" in caught.value.__notes__[-1]
+
+
+class Own(Exception):
+    """Its `partial` is its own."""
+
+    partial = property(lambda self: "mine")
+
+
+def test_an_exception_with_a_partial_of_its_own_is_raised_with_a_note():
+    def own():
+        raise Own("words")
+
+    with pytest.raises(Own, match="words") as caught:
+        rk.sweep(ROBOT, [pd, FailsAt(0.0, own)], PATH, OFFSET)
+    assert caught.value.partial == "mine" and "first sample of run 1" in caught.value.__notes__[-1]
+
+
+def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):
+    """A second Ctrl-C, or one just after the last run."""
+
+    def interrupted(self, *arguments, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pools.Serial, "shutdown", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.sweep(ROBOT, [pd, pd], PATH, OFFSET)
+    assert not caught.value.partial.failed.any() and "2 of 2 runs were finished" in caught.value.__notes__[-1]
+
+
+def test_an_interrupt_before_a_compiled_run_is_repeated_keeps_it(monkeypatch):
+    @rk.compiled
+    def gives_up(t, q_a, qd_a, d):
+        return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a) + (np.nan if t > 0.05 else 0.0)
+
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop_in_python, "Plant", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, gives_up, PATH, OFFSET)
+    assert caught.value.partial.t[-1] == pytest.approx(0.05, abs=2 * PATH.dt)
+
+
+def test_a_ctrl_c_waits_until_numba_is_imported():
+    """Of a Numba that was imported by half the rest could not be imported any more."""
+    usual, ended = signal.signal(signal.SIGINT, signal.default_int_handler), []
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            with engine._uninterrupted():
+                signal.raise_signal(signal.SIGINT)
+                ended.append(True)
+        assert ended and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def test_an_interrupted_sweep_tells_of_one_partial():

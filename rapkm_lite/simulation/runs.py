@@ -242,8 +242,7 @@ def attempt(setup: Setup, law) -> tuple[Run, SimulationError | None]:
         else:
             law = own_copy(law)
             outcome, cause = closed_loop(setup, law)
-    run = _run(setup, law, outcome)
-    time = setup.trajectory.t[outcome.sample]
+    run, time = _run(setup, law, outcome), setup.trajectory.t[outcome.sample]
     try:
         if cause is not None and not isinstance(cause, Exception):
             raise cause
@@ -275,7 +274,7 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
 def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so instead of one that did."""
     if isinstance(getattr(error, "partial", None), Run):
-        error.__notes__ = [text for text in error.__notes__ if "`partial`" not in text]
+        error.__notes__ = [text for text in getattr(error, "__notes__", []) if "`partial`" not in text]
     with suppress(AttributeError):  # of an exception class whose `partial` is its own
         error.partial = partial
     error.add_note(note)
