@@ -139,10 +139,8 @@ def _names(path: Path, header: list[str]) -> list[str]:
     wanted = columns(max((len(header) - 1) // 3, 1))
     for column, (name, want) in enumerate(itertools.zip_longest(map(str.strip, header), wanted), 1):
         if name != want:
-            got, allowed = (
-                "nothing" if name is None else short(name),
-                wanted if len(wanted) < 28 else [*wanted[:8], "..."],
-            )
+            got = "nothing" if name is None else short(name)
+            allowed = wanted if len(wanted) < 28 else [*wanted[:8], "..."]
             raise ValueError(
                 f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(allowed)}"
             )
