@@ -90,7 +90,7 @@ def test_dashboard_is_a_sequence_of_screens_for_a_projector(open_notebook):
     assert notebook.ask("() => lab.at(0)") == value
     # The answer comes on demand, and goes.
     first = notebook.page.locator(".rapkm-screen").first
-    answer = first.get_by_text("On the dark curve")
+    answer = first.get_by_text("On the outlined curve")
     for seen, word in ((False, "Show"), (True, "Hide"), (False, "Show")):
         answer.wait_for(state="visible" if seen else "hidden", timeout=5000)
         first.get_by_role("button", name=f"{word} the answer").click()
