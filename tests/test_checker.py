@@ -383,7 +383,7 @@ def test_strict_mode_raises_unless_solved(monkeypatch, capsys):
     assert check("08.counts", lambda K_P, friction: np.pi * K_P / friction)(7.05, 4.2e-3) > 5000
 
 
-def test_a_wrong_answer_is_drawn_dashed_and_a_right_one_is_not(capsys):
+def test_a_wrong_answer_is_drawn_dotted_and_a_right_one_is_not(capsys):
     name = "04.filtered_torques"
     A, c = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.array([1.0, 2.0, 0.0])
     for answer, lines in (

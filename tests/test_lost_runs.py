@@ -499,19 +499,37 @@ def test_a_run_that_a_law_lost_ahead_is_not_the_run_of_the_machine():
     assert "first sample of run 1" in caught.value.__notes__[-1]
 
 
+class Grows:
+    """A law that holds what no process sends, and then fails."""
+
+    def __call__(self, t, q_a, qd_a, d):
+        self.held = lambda: 0
+        if t > 0.05:
+            raise RuntimeError("boom")
+        return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+
+
+def test_a_run_that_cannot_travel_leaves_its_time_and_reason():
+    with ProcessPoolExecutor(1) as pool:
+        with pytest.raises(rk.SimulationError, match="the law raised RuntimeError: boom") as caught:
+            rk.sweep(ROBOT, [pd, Grows()], PATH, OFFSET, executor=pool)
+    assert caught.value.run == 1 and 0.05 < caught.value.time < 0.052
+    assert caught.value.sweep.failed.tolist() == [False, True]
+
+
 class Own(Exception):
     """Its `partial` is its own."""
 
     partial = property(lambda self: "mine")
 
 
-def test_an_exception_with_a_partial_of_its_own_is_raised_with_a_note():
+def test_an_exception_with_a_partial_of_its_own_is_raised_as_it_is():
     def own():
         raise Own("words")
 
     with pytest.raises(Own, match="words") as caught:
         rk.sweep(ROBOT, [pd, FailsAt(0.0, own)], PATH, OFFSET)
-    assert caught.value.partial == "mine" and "first sample of run 1" in caught.value.__notes__[-1]
+    assert caught.value.partial == "mine" and not hasattr(caught.value, "__notes__")
 
 
 def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):

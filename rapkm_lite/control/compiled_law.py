@@ -57,7 +57,8 @@ class CompiledLaw(LawValue):
         # The name of a decorated function stands for the law, which plain pickle would not take for the function.
         place = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "")
         # But cloudpickle, which executors of clusters use, sends what a notebook defines itself and not by name.
-        by_value = sys._getframe(1).f_globals.get("__name__", "").endswith("cloudpickle")
+        sender = sys._getframe(1).f_globals.get("__name__", "")
+        by_value = place[0] == "__main__" and sender.endswith("cloudpickle")
         try:
             if not by_value and _function(*place) is self.function:
                 return _law, (*place, self.at, self.memory)

@@ -190,7 +190,7 @@ class RedundantAPD(LawValue):
         the driven joints (which come first in our q); one number, (2N,) or (2N, 2N) act on all joints.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     projected : False reads line 2 of the print, c = (A~^T)^+ N_J (G qdd^d + C qd^d + Q - K_P e - K_D ed), which is
-        another law: both agree where qd^d and qdd^d are a motion at q, as for e = ed = 0, or a desired pose at rest.
+        another law: both agree for e = ed = 0 and for a desired pose at rest.
 
     >>> import rapkm_lite as rk
     >>> rk.RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2])

@@ -140,9 +140,11 @@ def _names(path: Path, header: list[str]) -> list[str]:
     for column, (name, want) in enumerate(itertools.zip_longest(map(str.strip, header), wanted), 1):
         if name != want:
             got = "nothing" if name is None else short(name)
-            allowed = wanted if len(wanted) < 28 else [*wanted[:8], "..."]
+            shown = (
+                wanted if len(wanted) < 28 else [*wanted[:3], "...", *wanted[max(column - 2, 3) : column + 1], "..."]
+            )
             raise ValueError(
-                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(allowed)}"
+                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(shown)}"
             )
     return wanted
 

@@ -211,8 +211,8 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     another question.
     K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
     each drive.
-    Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and for
-    gains so unequal that there are too many counts to try (one ten million times all others, say).
+    Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and
+    where friction may carry soft drives too many counts to try (two of a millionth of the third one's gain, say).
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)

@@ -43,7 +43,10 @@ def answer(job: Future, first: int, setup, laws, offsets):
         return job.result()
     except BrokenExecutor as error:
         for name, value in _sent(first, setup, laws):
-            kind = value if isfunction(value) else type(value)
+            inner = value
+            while hasattr(inner, "law") or hasattr(inner, "function"):  # of a filter, and what is compiled
+                inner = getattr(inner, "law", None) or inner.function
+            kind = inner if isfunction(inner) else type(inner)
             if kind.__module__ == "__main__" and not hasattr(sys.modules["__main__"], "__file__"):
                 error.add_note(
                     f"{name} = {short(value)} was written in a notebook, where only a process that is forked finds it; "

@@ -277,4 +277,4 @@ def hand_over(error, partial, note: str) -> None:
         error.__notes__ = [text for text in getattr(error, "__notes__", []) if "`partial`" not in text]
     with suppress(AttributeError):  # of an exception class whose `partial` is its own
         error.partial = partial
-    error.add_note(note)
+        error.add_note(note)

@@ -133,7 +133,8 @@ def _raise(i: int, stop: Stop | None, setup: Setup, law, result: Sweep):
         hand_over(stop.error, result, words)
         raise stop.error
     error: Any = stop.error if stop is not None else attempt(setup, law)[1]
-    error = error or SimulationError(result.failure_time[i], str(result.stopped[i]))
+    if not isinstance(error, SimulationError):  # also what could not travel
+        error = SimulationError(result.failure_time[i], str(result.stopped[i]))
     raise SimulationError(error.time, error.reason, error.partial, i, result) from error.__cause__
 
 

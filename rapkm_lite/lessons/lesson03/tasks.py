@@ -179,7 +179,7 @@ def refusal(answer) -> Result:
         off = abs(abs(float(got.reshape(()))) - abs(n @ error))
         if off < 4e-5:
             return Result("ok", f"the encoders contradict each other by this number, within {1e3 * off:.1g} mrad")
-        raise Ended("wrong", "one number is right, what the encoders contradict each other by, but not this one")
+        raise Ended("wrong", "one number is right, the encoders' contradiction, but the log tells another one")
     if got.shape not in ((), (3,)):
         raise Ended("wrong", f"the answer has shape {got.shape}, expected (3,)", "another shape")
     if np.all(np.isnan(got)):
