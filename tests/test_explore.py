@@ -211,7 +211,7 @@ def test_feedback_map_is_the_textbook_one_where_the_pair_is_regular():
         A = rk.control_matrix(robot, path.q, pair)
         Gbar, _, _ = rk.minimal_dynamics(robot, path.q, path.qd, pair)
         norm = np.linalg.norm(rk.weighted_pseudoinverse(A) @ Gbar, 2, axis=(-2, -1))
-        found = explore.torque.feedback_along(robot, rk.CTC(1.0, 1.0, pair), path)
+        found = explore.torque.feedback_along(robot, rk.CTC(1.0, 1.0, pair), path.q)
         np.testing.assert_allclose(found, norm, rtol=1e-9)
 
 

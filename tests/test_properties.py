@@ -119,7 +119,7 @@ def test_feedback_norm_is_what_the_definition_says(drawn):
     """The largest torque for a unit feedback acceleration, in redundant coordinates and for a pair."""
     robot, _, q, rng = drawn
     at = rk.at(robot, q, 0 * q)
-    redundant = at.A_tilde_T_pinv @ at.redundant[0]
+    redundant = np.linalg.pinv(at.A_tilde.mT, rcond=1e-9) @ at.redundant[0]
     size = rk.feedback_norm(robot, q)
     directions = np.linalg.svd(redundant)[2]
     assert size > 0.0

@@ -16,9 +16,11 @@ from ..machine.arguments import (
     wide_matrix,
 )
 from ..machine.manipulator import Manipulator, manipulator
-from ..mechanics.actuation import control_matrix, redundant_control_matrix, weighted_pseudoinverse
+from ..mechanics.actuation import weighted_pseudoinverse
+from ..mechanics.at import at
 from ..mechanics.cores import full_rank
-from ..mechanics.dynamics import minimal_dynamics, redundant_dynamics
+from ..mechanics.dynamics import redundant_dynamics
+from ..mechanics.linalg import product
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .grammar import joint_gain
 
@@ -102,18 +104,16 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     >>> float(rk.feedback_norm(robot, q).round(4))
     0.0056
     """
-    still = np.zeros(manipulator(robot).n_joints)
+    pose = at(robot, q)
     if pair is None:
-        A = redundant_control_matrix(robot, q)
-        M = explicit_pseudoinverse(A, select_independent(A)) @ redundant_dynamics(robot, q, still)[0]
+        M = product(pose.A_tilde_T_pinv, pose.N, pose.G, pose.N)
     else:
         pair = joint_indices("pair", pair, robot.n_arms, 2, "drive")
         # In end-effector coordinates first, so that a grid point on the curve is no special case.
-        A = control_matrix(robot, q)
-        a, b, c, d = (A[..., i, k] for i in pair for k in range(2))
+        a, b, c, d = (pose.A[..., i, k] for i in pair for k in range(2))
         det = a * d - b * c
-        least = 1e-12 * np.linalg.norm(A, axis=(-2, -1)) ** 2
+        least = 1e-12 * np.linalg.norm(pose.A, axis=(-2, -1)) ** 2
         det = np.where(np.abs(det) < least, least, det)
         to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
-        M = weighted_pseudoinverse(A) @ minimal_dynamics(robot, q, still)[0] @ to_ee
+        M = product(weighted_pseudoinverse(pose.A), pose.F.mT, pose.G, pose.F, to_ee)
     return np.linalg.norm(M, 2, axis=(-2, -1))

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from ..control.computed_torque import CTC, RedundantCTC, SwitchedCTC
 from ..control.stability import feedback_norm
-from ..figures.maps import curve_crossings, pair_line, pair_name
+from ..figures.maps import pair_line, pair_name
 from ..figures.marks import draw_workspace, offset_values, pair_lines, per_drive, singular_curves, workspace_outline
 from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
@@ -20,13 +20,14 @@ from .explorer import Explorer, explorer
 from .shared import central_triangle, curves, frictionless, length_slider, over_time, ready_made, size, usual_gains
 
 
-def feedback_along(robot: Manipulator, law, t) -> np.ndarray:
-    """Norm of the feedback map of a law with a pair along a path, N m per rad/s^2, (k,)."""
-    chosen = law.pairs(robot, t.q) if isinstance(law, SwitchedCTC) else np.tile(law.independent, (len(t), 1))
-    norm = np.empty(len(t))
+def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
+    """Norm of the feedback map of a law with a pair along a path q (k, 2N), N m per rad/s^2, (k,)."""
+    if not isinstance(law, SwitchedCTC):
+        return feedback_norm(robot, q, law.independent)
+    chosen, norm = law.pairs(robot, q), np.empty(len(q))
     for pair in {tuple(p) for p in chosen.tolist()}:
         k = np.all(chosen == pair, axis=-1)
-        norm[k] = feedback_norm(robot, t.q[k], pair)
+        norm[k] = feedback_norm(robot, q[k], pair)
     return norm
 
 
@@ -44,8 +45,10 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     laws = {word: partial(CTC, independent=pair) for word, pair in fixed.items()}
     laws |= {"switched pair": SwitchedCTC, "redundant coordinates": RedundantCTC}
-    path = lru_cache(maxsize=16)(partial(central_triangle, robot))
-    coarse = lru_cache(maxsize=64)(partial(central_triangle, robot, dt=0.01))
+    # Only two, whose memory the next one takes: fresh memory costs as much as the numbers.
+    path = lru_cache(maxsize=2)(partial(central_triangle, robot))
+    coarse = lru_cache(maxsize=64)(lambda side: path(side)[::10])
+    times = path(None).t[::10]
 
     def law_of(word, rate):
         # Two equal real poles at -rate.
@@ -54,19 +57,19 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     @lru_cache(maxsize=64)
     def distance(law: str, side: int) -> str:
         """How near the path comes to the points on which the pair is singular."""
-        if len(curve_crossings(coarse(side))[pairs.index(fixed[law])]):
+        if np.ptp(np.sign(act.distal_cross_products(robot, coarse(side).q)[:, pairs.index(fixed[law])])):
             return "crossed"
         gap = cdist(coarse(side).x, np.concatenate(singular[fixed[law]])).min()
         return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
-    norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side)))
+    norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side).q))
 
     @lru_cache(maxsize=64)
     def needed(side: int) -> float:
         """Largest torque in mN m that the path takes."""
-        t = coarse(side)
+        t = path(side)[::50]
         return 1e3 * float(np.abs(act.inverse_dynamics(robot, t.q, t.qd, t.qdd)).max())
 
     def draw(picture, law, side, rate, **offsets):
@@ -79,9 +82,9 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
             if singular[fixed[law]]:
                 numbers["distance from its singular curve"] = distance(law, side)
         other = redundant(side)
-        times, norm = (t.t[::5], other) if law == "redundant coordinates" else (t.t, norms(law, side))
-        picture.line("map", t.t[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
-        picture.line("map", times, np.minimum(norm, 1e6 * heavier), color=AFTER)
+        at, norm = (times[::5], other) if law == "redundant coordinates" else (times, norms(law, side))
+        picture.line("map", times[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
+        picture.line("map", at, np.minimum(norm, 1e6 * heavier), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
