@@ -112,6 +112,13 @@ def test_prestress_adds_its_own_heat_and_takes_changes_of_sign_away():
     assert_allclose([data[0, 1] for data in curve(explorer, "with")], 1e3 * stress[0], rtol=1e-9)
 
 
+def test_a_light_machine_changes_its_signs_as_often_as_a_heavy_one():
+    """In a horizontal plane without friction all torques go with the masses."""
+    light = ROBOT.replace(**{name: 2.0**-24 * getattr(ROBOT, name) for name in ("masses", "inertias", "rotor_inertia")})
+    name = "changes of sign without"
+    assert explore.prestress(light).numbers[name] == explore.prestress(ROBOT).numbers[name]
+
+
 def test_every_rule_makes_the_force_and_keeps_what_it_promises():
     explorer, A, f = explore.allocation().set(f_x=0.3, f_y=0.6, limit=90), at([0.0, 0.0]), [0.3, 0.6]
     for rule in ("least size", "least peak", "one sign, 4 mN m at least"):

@@ -236,5 +236,6 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
 
 
 def sign_changes(c: np.ndarray) -> np.ndarray:
-    """How often each column of c (k, m) changes its sign, zeros not counted, (m,)."""
-    return np.array([np.count_nonzero(np.diff(np.sign(column[np.abs(column) > 1e-9]))) for column in c.T])
+    """How often each column of c (k, m) changes its sign, zeros (to 1e-8 of the largest) not counted, (m,)."""
+    least = 1e-8 * np.abs(c).max()
+    return np.array([np.count_nonzero(np.diff(np.sign(column[np.abs(column) > least]))) for column in c.T])
