@@ -755,6 +755,15 @@ def test_drives_above_one_another_are_no_machine_without_width(name):
         assert float(re.match(r"[\d.]+", energy)[0]) > 0.0
 
 
+def test_a_machine_with_a_drive_in_the_middle_is_compared_under_every_law():
+    """docs/add_a_machine.md: all explorers take it; its middle is no pose, but its path is."""
+    robot = rk.Manipulator(base=[[-0.2, -0.1], [0.2, -0.1], [0.0, 0.2], [0.0, 0.0]], lengths=0.25, masses=0.1)
+    with pytest.raises(ValueError, match="boundary"):
+        rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+    shown = explore.controller_choice(robot)
+    assert not shown.problem and "largest error" in shown.numbers
+
+
 def test_a_drive_in_the_middle_of_the_others_has_a_place_too():
     square = 0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     assert not explore.own_machine(rk.Manipulator(base=square, lengths=[0.25, 0.3], masses=0.1)).problem
