@@ -769,6 +769,16 @@ def test_a_drive_in_the_middle_of_the_others_has_a_place_too():
     assert not explore.own_machine(rk.Manipulator(base=square, lengths=[0.25, 0.3], masses=0.1)).problem
 
 
+def test_drives_in_a_row_stay_in_a_row():
+    """The layout of the given machine is kept, also where two drives lie in one direction from the middle."""
+    row = rk.Manipulator(base=[[-0.3, 0.0], [0.0, 0.0], [0.3, 0.0]], lengths=0.25, masses=0.67 * 0.25, load=0.5)
+    path = rk.triangle(row, 0.24, dt=0.02)
+    largest = 1e3 * np.abs(rk.inverse_dynamics(row, path.q, path.qd, path.qdd)).max()
+    shown = explore.own_machine(row)
+    assert shown.values["radius"] == 200
+    assert shown.numbers["largest torque that moves"] == f"{largest:.0f} mN m"
+
+
 def test_the_feedback_of_a_heavy_machine_is_in_the_picture():
     """Links ten times as long and a hundred times as heavy: the norm of the feedback grows with the inertia."""
     robot = rk.load().replace(friction=0.0)

@@ -139,8 +139,8 @@ def _nearest(lengths, low: int, high: int) -> int:
 def own_machine(robot: Manipulator | None = None) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
 
-    It begins with the directions of the base joints and the working mode of the given machine, and with the mean of
-    each of its lengths, as near as the sliders come.
+    It begins with the layout of the base joints and the working mode of the given machine, and with the mean of each of
+    its lengths, as near as the sliders come.
 
     >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
@@ -149,9 +149,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     N, centre = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - centre
     away = np.linalg.norm(along, axis=1)
-    # A drive in the middle has no direction; it goes to the right.
-    out = np.where(away[:, None] > 1e-9 * robot.lengths.max(), along, [1.0, 0.0])
-    out /= np.linalg.norm(out, axis=1)[:, None]
+    out = along / away.mean()
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
     offset, side = np.resize(OFFSET, N), 0.24 if N > 2 else 0.16
     way = triangle(load(), side, dt=0.02).x
