@@ -52,6 +52,10 @@ sys.meta_path.insert(0, Finder())
 """
 
 
+FORBIDDEN_NUMBA = BROKEN_NUMBA.replace("numba.core", "numba")
+EMPTY_NUMBA = "import sys, types; sys.modules['numba'] = types.ModuleType('numba')\n"
+
+
 def result(code=RUN, before="", cwd="/", **environment):
     """What a new process prints, and what it says on stderr; an environment variable that is None is taken away."""
     variables = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg", **environment}
@@ -83,6 +87,12 @@ def test_a_numba_that_does_not_import_costs_a_warning(plain):
     pytest.importorskip("numba")
     numbers, words = result(before=BROKEN_NUMBA)
     assert numbers[:2] == plain[:2] and words.count("Numba is installed but does not import") == 1
+
+
+@pytest.mark.parametrize("before", [FORBIDDEN_NUMBA, EMPTY_NUMBA])
+def test_a_numba_that_cannot_be_looked_for_is_not_there(plain, before):
+    numbers, words = result(before=before)
+    assert numbers[:2] == plain[:2] and not words
 
 
 def test_no_folder_for_a_cache(plain, tmp_path):

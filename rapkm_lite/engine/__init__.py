@@ -19,7 +19,17 @@ import warnings
 _WANTED = os.environ.get("RAPKM_LITE_NUMBA", "1").strip().lower() not in ("0", "false", "no", "off")
 # Numba's own switch, for debuggers and coverage: its functions are then plain ones, and no kernels.
 _FREE = os.environ.get("NUMBA_DISABLE_JIT", "").strip() in ("", "0")
-COMPILED = _WANTED and _FREE and importlib.util.find_spec("numba") is not None
+
+
+def _installed() -> bool:
+    """Can Numba be found?  An import hook that forbids it, or an empty module in its place, means no."""
+    try:
+        return importlib.util.find_spec("numba") is not None
+    except (ImportError, ValueError):
+        return False
+
+
+COMPILED = _WANTED and _FREE and _installed()
 """Is Numba wanted and installed?  Whether it works, `compiled` says."""
 
 
