@@ -11,6 +11,8 @@ from rapkm_lite.lessons.answers import Answer, numbers
 from rapkm_lite.lessons.judging import judged
 from rapkm_lite.lessons.lesson04 import lean_law
 
+SHAPES = "make it hold there too; shapes of the arguments tell the numbers"
+
 
 def scaled(K_P, v, limit):
     return K_P * v / limit
@@ -234,6 +236,26 @@ def test_only_the_kinds_beyond_the_idea_that_fail_are_said():
 
     result = judged(Exercise(scaled, ("a", "b", "c"), "N m", more), lambda K, v, m: (K * v)[:3] / m)
     assert result.word == "close" and "not for four entries, where" in result.sentence
+
+
+def test_only_what_has_other_shapes_is_advised_to_look_at_shapes():
+    """An open path and gains that couple the drives have arguments of the usual shapes."""
+
+    def trapezoids(robot, path, K_P):
+        n = rk.null_basis(rk.control_matrix(robot, path.q))
+        weight = robot.resistance[0] / robot.torque_constant[0] ** 2
+        return weight * K_P**2 * np.trapezoid(n @ n.mT, dx=path.dt, axis=0)
+
+    def uncoupled(A, K_P, offset):
+        return rk.steady_state_error(A, np.diag(np.diag(K_P)), offset)
+
+    for name, answer, advice in (
+        ("06.form", trapezoids, exercises()["06.form"].improve),
+        ("03.rest_error", uncoupled, "make it hold there too"),
+        ("02.control_matrix", lambda a, d: exercises()["02.control_matrix"].reference(a, d)[:3], SHAPES),
+    ):
+        verdict, sentence = examine(name, answer)
+        assert verdict == "close" and sentence.endswith(f". To improve: {advice}")
 
 
 def test_what_stops_for_one_kind_of_case_only_says_for_which():

@@ -65,9 +65,18 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
         return whole if result.word == "ok" else result
     said = _failures(exercise, answer, far, whole.sentence)
     right = "it is right" if result.word == "ok" else "the method is right"
-    words = next(iter(said.values())).partition(". To improve:")[0].replace("the method is right, off", "it is off")
+    words, _, advice = next(iter(said.values())).partition(". To improve: ")
+    words = words.replace("the method is right, off", "it is off")
+    near = [_sizes(case) for case in cases if not _is_far(case)]
+    if any(_sizes(case) not in near for case in far if case.label in said):
+        advice = "make it hold there too; shapes of the arguments tell the numbers"
     short = f"{right}, but not for {', '.join(said)}, where {words}"
-    return Result("close", f"{short}. To improve: make it hold there too; shapes of the arguments tell the numbers")
+    return Result("close", f"{short}. To improve: {advice or 'make it hold there too'}")
+
+
+def _sizes(case: tuple) -> list:
+    """Shapes of the arrays of a case, numbers of arms of its machines."""
+    return [v.shape if isinstance(v, np.ndarray) else getattr(v, "n_arms", None) for v in case]
 
 
 def _failures(exercise: Exercise, answer: Any, cases: list[Case], sentence: str) -> dict[str, str]:
