@@ -258,6 +258,11 @@ def test_only_what_has_other_shapes_is_advised_to_look_at_shapes():
         assert verdict == "close" and sentence.endswith(f". To improve: {advice}")
 
 
+def test_torques_that_make_another_force_are_told_so_once():
+    sentence = examine("09.quiet_gears", lambda A, f: np.full(3, 5e-3))[1]
+    assert sentence.count("do not make the force f") == 1 and "A^T c misses f" in sentence
+
+
 def test_what_stops_for_one_kind_of_case_only_says_for_which():
     def kinds(rng):
         return [Case("three entries", *case) for case in cases(rng)] + [Case("four", np.ones(4), np.arange(4.0), 2.0)]

@@ -142,7 +142,7 @@ def carried(answer) -> list[Measured]:
     robot, path = carriage()
     for A, f in probes()[:2]:
         if np.abs(A.T @ chosen(answer, A, f) - f).max() > 0.5 * np.abs(f).max():
-            raise Ended("wrong", "these torques do not make the force f: A^T c is another one", "another force")
+            raise Ended("wrong", "A^T c misses f by more than half of its largest component", "another force")
     run = simulate(robot, Choosing(lambda A, f: chosen(answer, A, f)), path)
     one_way = np.maximum(run.c.min(axis=0), (-run.c).min(axis=0)).min()
     error = np.linalg.norm(run.x - path.x, axis=-1).max()
