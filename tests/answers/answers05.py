@@ -186,6 +186,7 @@ INVERSES = [
     ("close", "damped", lambda A, rows: np.linalg.solve(A @ A.T + 1e-5 * np.eye(len(A)), A)),
     ("wrong", "numpy's pinv", lambda A, rows: np.linalg.pinv(A.T), "cut-off"),
     ("wrong", "numpy's pinv of A~", lambda A, rows: np.linalg.pinv(A).T, "cut-off"),
+    ("wrong", "a cut-off that is too small", lambda A, rows: np.linalg.pinv(A.T, rcond=1e-13), "or one as small"),
     ("wrong", "stacked", stacked, "order"),
     ("wrong", "transposed", lambda A, rows: explicit(A, rows).T, "transposed"),
     ("wrong", "opposite", lambda A, rows: -explicit(A, rows), "sign"),

@@ -181,8 +181,8 @@ EXERCISES = {
         close=1e-3,
         improve="solve the least-squares problem for c_2 exactly",
         mistakes={
-            "the default cut-off of pinv takes rounding for a third direction and divides by it: its rank must be "
-            "given, or decided by rows": lambda A_tilde, rows: np.linalg.pinv(A_tilde.T),
+            "pinv takes rounding for a third direction and divides by it: its default cut-off, or one as small, does "
+            "not give the rank; a larger one does, and so do rows": lambda A_tilde, rows: np.linalg.pinv(A_tilde.T),
             "the blocks are stacked, A~_1 first: the rows stand in another order than the drives": _blocks(
                 lambda L, B, right, A1: (L - B @ right, right), sort=False
             ),
