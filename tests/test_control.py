@@ -520,9 +520,11 @@ def test_antagonistic_energy_is_quadratic_in_the_offsets():
     path, offset = rk.triangle(FRICTIONLESS, dt=5e-3), np.array([0.004, -0.002, 0.005])
     S = rk.antagonism_form(FRICTIONLESS, path, 7.05)
     assert_allclose(S, S.T, rtol=1e-12)
-    # Its definition, torque by torque; and a run that is slow against the PD loop.
-    c = rk.steady_state_torque(rk.control_matrix(FRICTIONLESS, path.q), 7.05, offset)
-    assert_allclose(offset @ S @ offset, rk.copper_loss(FRICTIONLESS, c[:-1], 5e-3).sum(), rtol=1e-12)
+    # Its definition, torque by torque, on a path that ends elsewhere, too; and a run that is slow against the PD loop.
+    for one in (path, rk.circle(FRICTIONLESS, 0.08, 1.0, 5e-3, turns=0.5)):
+        c = rk.steady_state_torque(rk.control_matrix(FRICTIONLESS, one.q), 7.05, offset)
+        cost = offset @ rk.antagonism_form(FRICTIONLESS, one, 7.05) @ offset
+        assert_allclose(cost, rk.copper_loss(FRICTIONLESS, c[:-1], 5e-3).sum(), rtol=1e-12)
     run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), rk.triangle(FRICTIONLESS), offset)
     assert_allclose(rk.antagonistic_energy(run), offset @ S @ offset, rtol=0.05)
     # An offset that is itself a motion of the loops costs nothing.
