@@ -100,6 +100,50 @@ def test_a_scale_is_pointed_where_values_lie_beyond(most, extend):
     assert ax.collections[0].colorbar.extend == extend
 
 
+def test_a_working_mode_is_drawn_under_its_name():
+    """The sign of a x d of each arm, as drawn, is that of the sine of its elbow angle."""
+    for ax in np.ravel(plotting.plot_working_modes(ROBOT, [0.03, 0.02])):
+        chains = np.array([xy(line) for line in ax.lines if len(line.get_xdata()) == 3])
+        a, d = np.moveaxis(np.diff(chains, axis=1), 1, 0)
+        assert_allclose(chains[:, 2], [[0.03, 0.02]] * 3)
+        assert ax.get_title() == plotting.mode_name(np.sign(a[:, 0] * d[:, 1] - a[:, 1] * d[:, 0]))
+
+
+def test_a_map_of_a_mode_stands_under_its_name(monkeypatch):
+    from rapkm_lite.lessons.lesson02 import figures
+
+    curves, x = [], np.linspace(-0.1, 0.1, 3)
+    monkeypatch.setattr(figures, "plot_pair_curves", lambda robot, ax, mode, **rest: curves.append((ax, mode)))
+    axes = np.ravel(figures.plot_mode_maps(ROBOT, np.arange(8.0)[:, None, None] * np.ones((3, 3)), x, x))
+    for k, (ax, mode, (drawn, of)) in enumerate(zip(axes, rk.working_modes(ROBOT), curves, strict=True)):
+        assert_allclose(ax.collections[0].get_array(), k)
+        # The style of the lessons puts titles to the left.
+        assert ax.get_title("left") + ax.get_title() == plotting.mode_name(mode)
+        assert drawn is ax and np.array_equal(of, mode)
+
+
+def test_cranks_of_the_crossed_linkage_are_as_long_as_links():
+    ax = plotting.plot_crossed_linkage(ROBOT, (0, 1))
+    cranks = np.array([xy(line) for line in ax.lines if line.get_alpha() == 0.6])
+    assert len(cranks) == 6 and {tuple(start) for start in cranks[:, 0]} == {tuple(b) for b in ROBOT.base[:2]}
+    assert_allclose(np.linalg.norm(np.diff(cranks, axis=1), axis=-1), 0.2, rtol=1e-9)
+    rods = np.array([xy(line) for line in ax.lines if line.get_linestyle() == "-" and line.get_linewidth() == 2.0])
+    assert_allclose(np.linalg.norm(np.diff(rods, axis=1), axis=-1), 0.4, rtol=1e-9)
+
+
+def test_a_patch_of_the_tangent_plane_is_tangent():
+    """Columns of F span it: its corners stand aside from the marked angles by F times something, in degrees."""
+    q, path = pose([0.02, 0.05]), rk.triangle(ROBOT, dt=5e-2)
+    F = rk.orthogonal_complement(ROBOT, q)
+    ax = plotting.plot_configuration_space(ROBOT, [(1, 1, 1)], q=q, trajectory=path, F=F)
+    way, point, patch = (np.array(line.get_data_3d()).T for line in ax.lines[-3:])
+    assert_allclose(np.mod(point - np.degrees(q[:3]) + 180, 360), 180)
+    assert_allclose(np.mod(way - np.degrees(path.q_a) + 180, 360), 180)
+    aside = patch - point
+    assert_allclose(np.cross(*F[:3].T) @ aside.T, 0, atol=1e-9 * np.abs(aside).max())
+    assert_allclose(np.linalg.norm(np.diff(patch, axis=0), axis=1), 70)
+
+
 # Torques, forces, prestress.
 def test_forces_of_one_drive_reach_as_far_as_its_torque():
     q = pose([0.02, 0.05])
@@ -161,6 +205,90 @@ def test_a_log_is_drawn_in_milliradians_and_millinewton_metres():
         assert_allclose(torques.lines[i].get_ydata(), 1e3 * log.c[:, i])
 
 
+def test_shares_of_a_prestress_are_those_of_the_null_vector():
+    x, y, *_ = plotting.grid_points(ROBOT, 41)
+    eta = np.abs(rk.null_vector(ROBOT, pose([x[24], y[20]])))
+    assert np.ptp(eta) > 0.1
+    for i, ax in enumerate(plotting.plot_prestress_maps(ROBOT, n=41)):
+        assert ax.collections[0].get_array()[20, 24] == pytest.approx(eta[i], rel=1e-9)
+
+
+def test_a_disc_and_a_map_of_the_guaranteed_force_are_of_one_torque():
+    disc, whole = plotting.plot_guaranteed_force(
+        ROBOT, {"": pose([0.02, 0.05])}, lambda A, torque: torque * np.linalg.norm(A[0]), torque=0.2, n=21
+    )
+    x, y, *_ = plotting.grid_points(ROBOT, 21)
+    size = [0.2 * np.linalg.norm(rk.control_matrix(ROBOT, pose(at))[0]) for at in ([0.02, 0.05], [x[12], y[10]])]
+    assert disc.patches[-1].get_radius() == pytest.approx(size[0], rel=1e-9)
+    assert whole.collections[0].get_array()[10, 12] == pytest.approx(size[1], rel=1e-9)
+
+
+def test_forces_stand_beside_the_machine_in_their_mode():
+    modes = [(1, 1, 1), (1, 1, -1)]
+    for mode, ax in zip(modes, plotting.plot_modes_and_forces(ROBOT, [0.03, 0.02], modes)[1::2], strict=True):
+        assert_allclose(
+            ax.patches[0].get_xy()[:-1], rk.force_polygon(rk.control_matrix(ROBOT, pose([0.03, 0.02], mode=mode)), 0.1)
+        )
+
+
+def test_measures_of_pairs_and_of_all_drives_are_named():
+    """sigma_min squared is the smallest eigenvalue of A^T A, of the rows that the name says."""
+    ax, A = plotting.plot_pair_measures(PATH), rk.control_matrix(ROBOT, PATH.q)
+    rows = {"pair (1,2)": [0, 1], "pair (1,3)": [0, 2], "pair (2,3)": [1, 2], "all drives": [0, 1, 2]}
+    for label, some in rows.items():
+        square = np.linalg.eigvalsh(A[:, some].mT @ A[:, some])[:, 0]
+        assert_allclose(y_of(ax, label) ** 2, square, atol=1e-9)
+
+
+def test_circles_on_a_path_are_where_it_crosses_the_curve_of_their_colour():
+    x = np.array([0.094, 0.064])
+    left, right = plotting.plot_parameterization_singularities(rk.triangle(ROBOT), x, (1, 2))
+    circles = [line for line in right.lines if line.get_marker() == "o"]
+    for k, (line, pair) in enumerate(zip(circles, rk.drive_pairs(ROBOT), strict=True)):
+        crossed = rk.distal_cross_products(ROBOT, pose(xy(line)))
+        assert len(crossed) == 2 and np.abs(crossed[:, k]).max() < 0.01 < np.abs(np.delete(crossed, k, axis=1)).min()
+        assert to_hex(line.get_markeredgecolor()) == to_hex(plotting.pair_line(ROBOT, pair)["color"])
+    (dotted,) = [line for line in left.lines if hasattr(line, "get_xy1")]
+    way, d = np.subtract(dotted.get_xy2(), dotted.get_xy1()), rk.arm_vectors(ROBOT, pose(x))[1]
+    assert_allclose(way[0] * d[1:, 1] - way[1] * d[1:, 0], 0, atol=0.05 * 0.2**2)
+
+
+def test_one_sign_is_possible_where_the_null_vector_has_one():
+    level = plotting.plot_one_sign(PATH, n=41).collections[0].get_array()
+    x, y, inside, points = plotting.grid_points(ROBOT, 41, driven=True)
+    n = rk.null_vector(ROBOT, pose(points))
+    clear = np.abs(n).min(axis=1) > 1e-9  # on the curve of a pair one share is zero
+    assert np.array_equal(level[inside][clear].astype(bool), np.abs(np.sign(n).sum(axis=1))[clear] == 3)
+    assert level[inside].min() == 0 and level[inside].max() == 1
+
+
+def test_points_of_belief_are_those_of_the_readings():
+    """A drive reads q + offset: its pair believes to stand A_pair^-1 offset aside, all together A^+ offset."""
+    offset, A = 0.1 * OFFSET, rk.control_matrix(ROBOT, pose([0.02, 0.01]))
+    ax = plotting.plot_synchronization(ROBOT, [0.02, 0.01], offset)[1]
+    squares = [xy(line)[0] for line in ax.lines if line.get_marker() == "s"]
+    for point, pair in zip(squares, map(list, rk.drive_pairs(ROBOT)), strict=True):
+        assert_allclose(point, 1e3 * np.linalg.solve(A[pair], offset[pair]), rtol=0.02)
+    (diamond,) = [xy(line)[0] for line in ax.lines if line.get_marker() == "D"]
+    assert_allclose(diamond, 1e3 * np.linalg.lstsq(A, offset, rcond=None)[0], rtol=0.02)
+
+
+def test_the_film_of_three_lines_ends_without_torques(monkeypatch):
+    from rapkm_lite.lessons.lesson03 import figures
+
+    told, q = {}, pose([0.04, -0.05])
+    monkeypatch.setattr(figures, "film", lambda draw, steps, alt, **rest: told.update(draw=draw, steps=steps))
+    figures.film_three_lines(ROBOT, q, OFFSET, 7.05)
+    whole = 1e3 * rk.steady_state_torque(rk.control_matrix(ROBOT, q), 7.05, OFFSET)
+    for share in (told["steps"][0], 0.5, told["steps"][-1]):
+        ax = plt.figure().add_subplot()
+        told["draw"](ax, share)
+        words = [float(label.split()[2].replace("−", "-")) for label in named(ax) if label.startswith("drive")]
+        assert_allclose(words, share * whole, atol=0.051)
+        assert f"{100 * share:3.0f} % of the normal part" in (ax.get_title(), ax.get_title("left"))
+    assert (told["steps"][0], told["steps"][-1]) == (1.0, 0.0)
+
+
 # The filter.
 @pytest.mark.parametrize("plot", ["plot_joint_moves", "plot_spacing"])
 def test_a_slope_of_two_goes_with_the_square(plot):
@@ -198,6 +326,28 @@ def test_measured_bars_stand_beside_simulated_ones_of_the_same_row():
     assert_allclose(np.reshape(bars, (4, 3)), rows)
     names = ["measured, without filter", "simulated, without filter", "measured, with filter", "simulated, with filter"]
     assert [text.get_text() for text in ax.get_legend().get_texts()] == names
+
+
+@pytest.mark.parametrize("antagonism", [False, True])
+def test_norms_of_torques_are_in_the_unit_of_their_axis(antagonism):
+    """What moves nothing is n n^T c, of the size |n^T c|."""
+    n = rk.null_vector(ROBOT, RUN.q)
+    size = np.abs(np.sum(n * RUN.c, axis=1)) if antagonism else np.sqrt(np.sum(RUN.c**2, axis=1))
+    words = "antagonism" if antagonism else "torques"
+    for log, unit, scale in ((False, "mN m", 1e3), (True, "N m", 1.0)):
+        ax = plotting.plot_torque_norms({"a": RUN}, antagonism=antagonism, log=log)
+        assert ax.get_ylabel() == f"norm of the {words} in {unit}"
+        assert_allclose(y_of(ax, "a"), scale * size, atol=1e-12)
+
+
+def test_bars_of_energies_stand_at_their_drive_with_their_number():
+    ax = plotting.plot_energies({"a": [1.25, 2.0], "b": [0.5, 0.25]})
+    bars = [bar for bar in ax.patches if np.isfinite(bar.get_x())]
+    middle = np.reshape([bar.get_x() + bar.get_width() / 2 for bar in bars], (2, 2))
+    assert_allclose(middle.mean(axis=0), [0, 1], atol=1e-12)
+    assert np.all(middle[0] < middle[1])
+    assert_allclose([text.get_position() for text in ax.texts], np.column_stack([middle.ravel(), [1.25, 2, 0.5, 0.25]]))
+    assert [text.get_text() for text in ax.texts] == ["1.25", "2.00", "0.50", "0.25"]
 
 
 # Computed torque.
@@ -240,6 +390,55 @@ def test_one_pair_is_in_use_at_a_time():
     assert np.all(np.sum(np.isfinite(lines), axis=0) == 1)
     for k, (line, pair) in enumerate(zip(lines, rk.drive_pairs(ROBOT), strict=True)):
         assert np.array_equal(np.isfinite(line), [tuple(p) == pair for p in run.pairs]) and np.nanmax(line) == k
+
+
+def test_thin_lines_are_where_the_path_crosses_the_curve_of_the_pair():
+    run = rk.simulate(ROBOT, rk.PD(7.05, 0.225), rk.triangle(ROBOT), OFFSET)
+    for ax in plotting.plot_torques_and_errors(run, pair=(1, 2)):
+        times = [line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == ":"]
+        assert len(times) == 2
+        crossed = [np.interp(times, run.t, cross) for cross in rk.distal_cross_products(ROBOT, run.trajectory.q).T]
+        assert np.abs(crossed[2]).max() < 0.01 < np.abs(crossed[:2]).min()
+
+
+def test_a_block_is_the_one_that_its_rule_picks():
+    """The printed rule of section 4.5: the pair of rows of A~ with the smallest row-sum norm."""
+    x, y, *_ = plotting.grid_points(ROBOT, 41)
+    i, j = 18, 26
+    A = rk.redundant_control_matrix(ROBOT, pose([x[j], y[i]]))
+    blocks = [A[list(pair)] for pair in rk.drive_pairs(ROBOT)]
+    sigma = [np.linalg.svd(block, compute_uv=False)[-1] for block in blocks]
+    printed, best = plotting.plot_partition_rules(ROBOT, n=41)
+    small = sigma[int(np.argmin([np.linalg.norm(block, np.inf) for block in blocks]))]
+    assert small < 0.9 * max(sigma)
+    assert printed.collections[0].get_array()[i, j] == pytest.approx(small, rel=1e-9)
+    assert best.collections[0].get_array()[i, j] == pytest.approx(max(sigma), rel=1e-9)
+
+
+def test_the_line_of_a_mirror_goes_through_both_elbows():
+    for ax in plotting.plot_mirror(RUN, 300, (0, 1)):
+        (line,) = [line for line in ax.lines if hasattr(line, "get_xy1")]
+        for elbow, base in zip((line.get_xy1(), line.get_xy2()), ROBOT.base, strict=False):
+            a, d = elbow - base, RUN.x[300] - elbow
+            assert_allclose([np.hypot(*a), np.hypot(*d)], 0.2, rtol=1e-9)
+            assert a[0] * d[1] > a[1] * d[0]  # the arms bend to the left
+
+
+def test_a_cross_marks_the_end_of_a_lost_run_and_a_box_its_limits():
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(ROBOT, rk.CTC(400.0, 40.0), PATH, OFFSET)
+    lost = caught.value.partial
+    for ax in (axes := plotting.plot_ee_paths({"PD": RUN, "lost": lost}, pair=(0, 1), zoom=[-0.1, 0.12, -0.09, 0.03])):
+        (mark,) = [xy(line) for line in ax.lines if line.get_marker() == "x"]
+        assert_allclose(mark, lost.x[-1:])
+    assert (axes[1].get_xlim(), axes[1].get_ylim()) == ((-0.1, 0.12), (-0.09, 0.03))
+
+
+def test_values_of_places_stand_at_their_places():
+    centres = [[0.01, 0.05], [-0.02, 0.03]]
+    marks = plotting.plot_placement(ROBOT, centres, [1.0, 2.0]).collections[-1]
+    assert_allclose(marks.get_offsets(), centres)
+    assert_allclose(marks.get_array(), [1.0, 2.0])
 
 
 # Studies.
