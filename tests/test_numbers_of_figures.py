@@ -144,6 +144,37 @@ def test_a_patch_of_the_tangent_plane_is_tangent():
     assert_allclose(np.linalg.norm(np.diff(patch, axis=0), axis=1), 70)
 
 
+def test_a_machine_is_drawn_from_its_driven_joints_to_its_end_effector():
+    q = pose([0.02, 0.05])
+    elbows = ROBOT.base + 0.2 * np.stack([np.cos(q[:3]), np.sin(q[:3])], axis=-1)
+    marks = [line for line in plotting.plot_machine(ROBOT, q).lines if line.get_marker() != "None"]
+    driven, passive, tips = (np.concatenate([xy(mark) for mark in marks[k::3]]) for k in range(3))
+    assert_allclose(driven, ROBOT.base)
+    assert_allclose(passive, elbows)
+    assert_allclose(tips, [[0.02, 0.05]] * 3)
+    assert [mark.get_marker() for mark in marks[:3]] == ["o", "o", "s"]
+    assert to_hex(marks[0].get_markerfacecolor()) != to_hex(marks[1].get_markerfacecolor()) == "#ffffff"
+
+
+def test_the_workspace_is_shaded_where_all_arms_reach():
+    """Distances between |l1 - l2| and l1 + l2 from every base point, but for a grid step."""
+    shade = plotting.plot_workspace(ROBOT).collections[0].get_paths()[0]
+    points = np.random.default_rng(2).uniform([-0.22, -0.2], [0.22, 0.3], (400, 2))
+    far = np.linalg.norm(points[:, None] - ROBOT.base, axis=-1).max(axis=1)
+    clear = np.abs(far - 0.4) > 4e-3
+    assert np.array_equal(shade.contains_points(points)[clear], (far < 0.4)[clear])
+    assert 50 < np.count_nonzero(far < 0.4) < 350
+
+
+def test_a_frame_holds_the_elbows_in_any_pose():
+    robot = ROBOT.replace(lengths=[[0.2, 0.22], [0.3, 0.2], [0.21, 0.24]])
+    frame = plotting.plane_limits(robot, margin=0.0)
+    turn = np.linspace(0, 2 * np.pi, 361)
+    elbows = robot.base + robot.lengths[:, :1] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, None]
+    low, high = np.transpose([frame["xlim"], frame["ylim"]])
+    assert np.all(elbows >= low - 1e-12) and np.all(elbows <= high + 1e-12)
+
+
 # Torques, forces, prestress.
 def test_forces_of_one_drive_reach_as_far_as_its_torque():
     q = pose([0.02, 0.05])
@@ -484,6 +515,21 @@ def test_what_an_edge_needs_begins_and_ends_as_it_is_commanded():
         turn = np.degrees(pose([0.1, -0.02]) - pose([-0.1, -0.06]))[list(pair)]
         assert_allclose(xy(line)[[0, -1]], straight[[0, -1]], atol=1e-9)
         assert_allclose(straight[-1], turn, atol=1e-9)
+
+
+def test_via_points_stand_below_their_shares():
+    ax = plotting.plot_demand([0.0, 0.5, 1.0], [0.1, 0.05, 0.2], {"first": [0.2, 0.3], "second": [0.7]})
+    assert xy(ax.lines[0]).tolist() == [[0.0, 0.1], [0.5, 0.05], [1.0, 0.2]]
+    first, second = (xy(named(ax)[label]) for label in ("first", "second"))
+    assert (first[:, 0].tolist(), second[:, 0].tolist()) == ([0.2, 0.3], [0.7])
+    assert first[0, 1] == first[1, 1] < 0 and second[0, 1] < 0 and first[0, 1] != second[0, 1]
+
+
+def test_a_crossing_lies_between_its_sample_and_the_next():
+    path = rk.triangle(ROBOT)
+    crossed = rk.distal_cross_products(ROBOT, path.q)
+    for k, at in enumerate(plotting.curve_crossings(path)):
+        assert len(at) == 2 and np.all(crossed[at, k] * crossed[at + 1, k] < 0)
 
 
 # Readings and rests.
