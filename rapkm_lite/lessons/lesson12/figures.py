@@ -79,7 +79,7 @@ def plot_length_choice(lengths, conditions: dict, special, ax=None):
 
 
 def plot_swing(motion, pose, labels, ax=None):
-    """Distance of the platform's centre from the circle over time, in mm: poses (runs, k, 3) of runs with `labels`.
+    """Distance of the platform's centre from its wanted place over time, in mm: poses (runs, k, 3), named by `labels`.
 
     >>> import numpy as np; from rapkm_lite.lessons.lesson12 import four_rrr
     >>> motion = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
