@@ -54,6 +54,13 @@ def test_a_log_holds_what_the_controller_read():
         assert log.name == "mine" and np.array_equal(log.t, PATH.t)
 
 
+def test_errors_of_a_run_and_of_its_log_are_those_that_the_law_saw_with_another_model():
+    """At rest PD commands -K_P times them."""
+    run = rk.simulate(ROBOT, PD, PATH, OFFSET, model=ROBOT.replace(lengths=0.201))
+    assert_allclose(run.c[0], -7.05 * run.log().error[0], rtol=1e-12)
+    assert_allclose(run.c[0], -7.05 * (run.error[0] + OFFSET), rtol=1e-12)
+
+
 def test_a_log_of_a_lost_run_ends_where_it_was_lost():
     with pytest.raises(rk.SimulationError) as caught:
         rk.simulate(ROBOT, rk.PD(7.05, 30.0), PATH, OFFSET)
