@@ -362,6 +362,15 @@ def test_a_sweep_masks_what_failed():
     assert "5 runs, 3 failed" in repr(study)
 
 
+def test_a_masked_row_tells_of_its_own_offsets():
+    law, offsets = rk.AntagonismFilter(PD), np.array([[0.0, 0.0, 0.0], [1.5, -1.5, 1.5], [1.2, -1.2, 1.2]])
+    study = rk.sweep(ROBOT, law, PATH, offsets, failed="mask")
+    assert study.failed.tolist() == [False, True, True] and study.reasons[0] is None
+    for i in (1, 2):
+        assert study.reasons[i] == lost(ROBOT, law, PATH, offsets[i]).reason
+        assert f"offset = {offsets[i].tolist()} rad" in study.reasons[i]
+
+
 def test_a_sweep_knows_why_each_row_is_masked():
     """The reason of a row is the one that its run alone gives, whoever ran it and in whatever parts."""
     laws, faults = [*LAWS, rk.AntagonismFilter(PD)], [rk.OffsetJump(i, 0.1, 2.5 * (-1) ** i) for i in range(3)]
