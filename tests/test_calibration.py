@@ -403,6 +403,21 @@ def test_a_machine_seen_in_a_mirror_has_the_opposite_offsets(seed):
     assert_allclose(rk.calibrate(mirrored, -q_a).offset, -offset, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize(("unknowns", "count"), [("offsets+lengths", 9), ("all", 15)])
+def test_what_a_refusal_knows_it_knows_as_well_as_least_squares(unknowns, count):
+    """Gauss and Markov: a combination k of the unknowns has the variance noise^2 k^T (J^T J)^+ k; the gauge is held."""
+    q = rk.inverse_kinematics(TESTBED, [[0.05, 0.02], [-0.04, 0.06], [0.01, -0.07], [-0.06, -0.03]])
+    with pytest.raises(rk.CalibrationError) as refused:
+        rk.calibrate(TESTBED, q[:, :3], unknowns, noise=1e-6)
+    held = np.pad(gauge(TESTBED), ((9, 0), (0, 0)))[:count]
+    J = closure(rk.at(TESTBED, q), q[:, :3], count)[1] @ (np.eye(count) - held @ held.T)
+    known = refused.value.known
+    error = 1e-6 * np.sqrt(np.diagonal(known @ np.linalg.pinv(J.T @ J, rcond=1e-9) @ known.T))
+    said = [float(number) for number in re.findall(r"± (\S+?)(?:;|$)", str(refused.value))]
+    assert refused.value.rank == 4 and len(said) == 3 and np.ptp(error) > 0.5 * error.max()
+    assert_allclose(said, error[:3], rtol=0.06)  # two digits
+
+
 @pytest.mark.parametrize("unknowns", ["offsets+lengths", "all"])
 def test_a_noisy_log_of_few_places_is_refused_with_what_it_says(unknowns):
     for seed in range(6):
