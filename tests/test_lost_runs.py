@@ -371,6 +371,13 @@ def test_a_masked_row_tells_of_its_own_offsets():
         assert f"offset = {offsets[i].tolist()} rad" in study.reasons[i]
 
 
+def test_a_masked_row_tells_of_the_model_of_its_sweep():
+    law, model, path = rk.AntagonismFilter(PD), ROBOT.replace(lengths=0.28), rk.triangle(ROBOT, duration=1.5)
+    study = rk.sweep(ROBOT, law, path, [OFFSET], failed="mask", model=model)
+    assert "the controller's model has lengths that are off by 40 %" in study.reasons[0]
+    assert study.reasons[0] == lost(ROBOT, law, path, OFFSET, model=model).reason
+
+
 def test_a_sweep_knows_why_each_row_is_masked():
     """The reason of a row is the one that its run alone gives, whoever ran it and in whatever parts."""
     laws, faults = [*LAWS, rk.AntagonismFilter(PD)], [rk.OffsetJump(i, 0.1, 2.5 * (-1) ** i) for i in range(3)]
