@@ -36,10 +36,13 @@ def test_replace_carries_rods_along_and_keeps_given_inertias():
     assert_allclose(heavier.inertias, 2 * TESTBED.inertias)
     longer = TESTBED.replace(lengths=0.3)
     assert_allclose(longer.centers, 0.15)
+    assert_allclose(TESTBED.replace(centers=0.08).replace(lengths=0.3).centers, 0.08)
     given = MACHINES["asymmetric"].replace(masses=0.2)
     assert_allclose(given.inertias, MACHINES["asymmetric"].inertias)
     assert TESTBED.replace(friction=0.0).same_kinematics(TESTBED)
     assert not TESTBED.replace(mode=-1).same_kinematics(TESTBED)
+    assert not TESTBED.replace(base=TESTBED.base + [0.01, 0.0]).same_kinematics(TESTBED)
+    assert not TESTBED.replace(lengths=0.201).same_kinematics(TESTBED)
     with pytest.raises(ValueError, match=r"unknown argument 'frictoin' \(did you mean 'friction'\?\); allowed: "):
         TESTBED.replace(frictoin=0.0)
     square = [[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]]
