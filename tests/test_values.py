@@ -95,6 +95,7 @@ def test_a_value_prints_as_it_was_typed():
         np.float64(2.0),
         np.arange(4)[::2],
         np.ones((2, 2), order="F"),
+        frozen(np.arange(6.0).reshape(2, 3)).T,
         np.array([True, False]),
         np.array(["a", "b"]),
     ],
@@ -105,6 +106,11 @@ def test_frozen_keeps_shape_type_and_numbers(array):
     assert kept.shape == np.shape(array) and kept.dtype == np.asarray(array).dtype and np.array_equal(kept, array)
     assert kept.flags.c_contiguous and not kept.flags.writeable
     assert frozen(kept) is kept or kept.size == 0
+
+
+def test_what_is_under_a_mask_is_filled_with_the_callers_number():
+    kept = frozen(np.ma.array([1.0, 2.0], mask=[False, True], fill_value=-7.0))
+    assert kept.filled().tolist() == [1.0, -7.0]
 
 
 # The values of machine and mechanics.
