@@ -197,6 +197,12 @@ def test_a_constant_factor_is_a_mistake_though_it_is_near():
     assert result.word == "wrong" and "1.015 times the right one" in result.sentence
 
 
+def test_a_matrix_that_is_singular_in_one_case_divides_nothing():
+    matrices = [np.array([[2.0, 1.0], [0.5, 3.0]]), np.array([[1.0, 2.0], [2.0, 4.0]])]
+    exercise = Exercise(lambda M, v: M @ v, cases=lambda rng: [(M, rng.normal(size=2)) for M in matrices])
+    assert judged(exercise, lambda M, v: M @ v + np.sin(5 * v)).word == "wrong"
+
+
 def test_a_mistake_with_a_name_is_not_close():
     known = Exercise(
         scaled, ("a", "b", "c"), "N m", cases, close=0.02, mistakes={"too long": lambda *c: 1.001 * scaled(*c)}
