@@ -503,10 +503,12 @@ def test_reduced_motion_steps_instead_of_playing(browser, address):
     assert seen.places()["time"] == 0.25 and seen.places()["moving"]
 
 
-def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address):
-    seen = Page(browser, address, 1400)
+@pytest.mark.parametrize("width", [500, 1400])
+def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address, width):
+    seen = Page(browser, address, width)
     seen.page.emulate_media(media="print")
-    assert seen.page.evaluate("[...document.querySelectorAll('form')].every(e => !e.getClientRects().length)")
+    controls = "[...document.querySelectorAll('form, input, select, button')]"
+    assert seen.page.evaluate(f"{controls}.every(e => !e.getClientRects().length)")
     # Chromium lays out a page of paper without painting anew; then a canvas must not be stretched.
     fits = "[...document.querySelectorAll('canvas')].map(e => getComputedStyle(e).objectFit)"
     assert set(seen.page.evaluate(fits)) == {"contain"}
