@@ -371,6 +371,19 @@ def test_letters_follow_the_size_that_the_browser_is_set_to(browser, address):
     assert sizes[24] > 1.2 * sizes[16]
 
 
+@pytest.mark.parametrize("points", [24, 32])
+def test_large_letters_on_a_phone_leave_the_machine_its_room_and_the_button_its_box(browser, address, points):
+    arguments = [*ARGUMENTS, f"--blink-settings=defaultFontSize={points}"]
+    other = browser.browser_type.launch(executable_path=find_browser(), args=arguments)
+    page = Page(other, address, 390).page
+    boxes = "['#deck', '#play', '.rapkm-plot'].map(e => document.querySelector(e).getBoundingClientRect())"
+    deck, play, plot = page.evaluate(boxes)
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    other.close()
+    assert play["right"] <= deck["right"] and wide <= 390
+    assert plot["height"] > 0.6 * plot["width"]
+
+
 def test_the_numbers_are_those_of_the_package(browser, address):
     seen = Page(browser, address)
     robot, law = rk.load(), rk.PD(7.05, 0.225)
