@@ -23,8 +23,8 @@ export function pieces(words) {
 
 /** About `most` ticks {at, words} between two limits, in steps of 1, 2, 2.5, 5; decades on a logarithmic axis. */
 export function ticks(low, high, most = 6, log = false) {
-  if (!(high > low) || !Number.isFinite(high - low) || (log && low <= 0)) return [];
-  const [start, end] = log ? [Math.log10(low), Math.log10(high)] : [low, high];
+  const [start, end] = log ? [Math.log10(low), Math.log10(high)] : [low, high], far = Math.max(-start, end);
+  if (!(end - start > Math.max(1e-12 * far, 1e-10)) || !(far < 1e21)) return []; // no digits tell them apart
   const least = Math.max((end - start) / Math.max(most, 1), log ? 1 : 0), decade = 10 ** Math.floor(Math.log10(least));
   const step = log ? Math.ceil(least) : [1, 2, 2.5, 5, 10].find((s) => s * decade >= least * (1 - 1e-9)) * decade;
   const digits = step.toFixed(12).replace(/0+$/, "").split(".")[1].length, out = [];

@@ -35,6 +35,15 @@ test("a logarithmic axis has decades, and limits without meaning have no ticks",
     assert.deepEqual(ticks(low, high, 5, log), []);
 });
 
+test("numbers on an axis are different ones, and few, however large, small or near each other its limits are", () => {
+  const ranges = [[0, 1e-11], [0, 1e-300], [-1e300, 1e300], [0, 1e22], [1e15, 1e15 + 1], [-1e16, 2 - 1e16], [1e-30, 1e30]];
+  for (const [low, high] of [...ranges, [1e-9, 3e-9], [0, 1e20], [1e6, 1e6 + 1e-3]])
+    for (const log of [false, true]) {
+      const words = ticks(low, high, 5, log).map((tick) => tick.words);
+      assert.ok(words.length <= 6 && new Set(words).size === words.length, `${low} ${high}: ${words}`);
+    }
+});
+
 test("subscripts, powers and minus signs are found, hyphens are left", () => {
   assert.equal(minus("-.01 was rounded to 0.0, a half-.5"), "−.01 was rounded to 0.0, a half-.5");
   assert.deepEqual(pieces("K_P 1 in N"), [{ text: "K", shift: 0 }, { text: "P", shift: -1 }, { text: " 1 in N", shift: 0 }]);
