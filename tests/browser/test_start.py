@@ -361,6 +361,25 @@ def test_on_a_phone_a_slider_stands_below_what_it_moves(browser, address):
     assert seen.errors == []
 
 
+@pytest.mark.parametrize("size", [(390, 844), (320, 256)])
+def test_the_filter_at_the_top_covers_nothing_that_the_keyboard_comes_to(browser, address, size):
+    seen = Page(browser, address, size[0])
+    seen.page.set_viewport_size({"width": size[0], "height": size[1]})
+    seen.page.wait_for_timeout(300)
+    seen.page.evaluate("document.querySelector('footer pre').setAttribute('tabindex', 0)")
+    seen.page.focus("footer pre")
+    covered = """() => {
+        const held = document.activeElement, deck = document.getElementById('deck');
+        if (deck.contains(held) || held === document.body) return null;
+        return held.getBoundingClientRect().top < deck.getBoundingClientRect().bottom; }"""
+    for _ in range(11):
+        seen.page.keyboard.press("Shift+Tab")
+        seen.page.wait_for_timeout(100)
+        assert seen.page.evaluate(covered) is False, seen.page.evaluate("document.activeElement.outerHTML")
+    seen.page.keyboard.press("Shift+Tab")
+    assert seen.page.evaluate("document.activeElement.id") == "play"
+
+
 def test_letters_follow_the_size_that_the_browser_is_set_to(browser, address):
     size, sizes = "parseFloat(getComputedStyle(document.documentElement).fontSize)", {}
     for points in (16, 24):
