@@ -1,8 +1,8 @@
 """All pages of a built site in headless Chromium, from disk and from a web server: python -m tests.site docs/_site
 
 Fails on an outside request, a console error, a raw formula, a broken link or anchor, a picture without words,
-horizontal scrolling and broken words of tables at 360 px, a box that the keyboard does not move, an open answer, and
-a search that finds nothing.  --shots FOLDER takes screenshots.
+horizontal scrolling and broken words of tables at 360 px, a box that the keyboard does not move or that the bar covers,
+an open answer, and a search that finds nothing.  --shots FOLDER takes screenshots.
 """
 
 from __future__ import annotations
@@ -160,6 +160,23 @@ def drawers(context, base: str) -> list[str]:
     return [f"{base.split(':')[0]} drawers: {what}" for what in wrong]
 
 
+def covered(context, base: str) -> list[str]:
+    """What lies under the bar at the top of a telephone when the keyboard comes to it, from the foot of a page on."""
+    page, wrong = opened(context, base)
+    page.set_viewport_size({"width": 390, "height": 700})
+    page.goto(f"{base}/lessons/04_antagonism_filter_energy.html")
+    page.wait_for_function(READY)
+    page.focus("article > :last-child a >> nth=-1")
+    under = "(b => b.top < document.querySelector('.mobile-header').getBoundingClientRect().bottom)"
+    for _ in range(16):
+        page.keyboard.press("Shift+Tab")
+        page.wait_for_timeout(400)  # the page glides
+        if page.evaluate(f"{under}(document.activeElement.getBoundingClientRect())"):
+            wrong.append(f"the bar covers {page.evaluate('document.activeElement.outerHTML')[:80]}")
+    page.close()
+    return [f"{base.split(':')[0]} bar: {what}" for what in wrong]
+
+
 def pictures(browser, base: str, shots: Path) -> list[str]:
     """What is wrong with the pages that are shown most, at three widths, light and dark, while they are drawn."""
     wrong = []
@@ -196,6 +213,7 @@ def main() -> int:
             wrong += [what for name in names for what in look(context, base, name, None)]
             wrong += search(browser.new_context(viewport={"width": 1280, "height": 800}), base)
             wrong += drawers(context, base)
+            wrong += covered(context, base)
             context.close()
         wrong += pictures(browser, bases[0], options.shots) if options.shots else []
         browser.close()
