@@ -124,8 +124,9 @@ class Controller:
     Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
 
     nearest : a faster way than `estimate_pose` from angles and guess to the end-effector position, or None; it may
-        answer None.  smooth : its guess lies on a parabola through the last three estimates, as in the engine; else it
-        is the last one.
+        answer None.  smooth : its guess lies on a parabola through the last three estimates; else it is the last one.
+        The engine does so too while all drives are within 0.1 rad of the path, beyond that it begins at the last one:
+        where two poses fit the angles, as near an input singularity, the two may then take different ones.
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()
