@@ -557,3 +557,28 @@ def test_offsets_of_sensors_are_those_of_one_machine(offset):
     """Those of many runs are given to `sweep`."""
     with pytest.raises(ValueError, match=r"offset has shape .*; allowed: one number or \(N,\), one per drive"):
         Sensors(offset)
+
+
+class InPython(rk.Law):
+    """Another law, one that the engine does not know."""
+
+    def __init__(self, law):
+        self.law = law
+
+    def step(self, memory, sample):
+        return self.law.step(memory, sample)
+
+
+@pytest.mark.parametrize("dead_from", [0.13, 0.18])
+def test_a_dead_drive_takes_a_five_bar_through_a_singularity_and_no_loop_loses_the_pose(dead_from):
+    """Encoders without errors tell the true pose on both sides of it, far from the path, too: the way goes on there."""
+    robot = rk.load("five_bar").replace(friction=0.0)
+    path, law = rk.circle(robot, 0.04, 0.3), rk.CTC(400.0, 40.0, None)
+    faults = [rk.DeadDrive(0, dead_from)]
+    truth = rk.simulate(robot, rk.CTC(400.0, 40.0, None, pose="true"), path, faults=faults)
+    crossing = np.linalg.det(rk.control_matrix(robot, rk.inverse_kinematics(robot, truth.x)))
+    assert crossing.min() < 0.0 < crossing.max() and np.abs(truth.q_a - path.q_a).max() > 0.3
+    for here in (law, InPython(law)):
+        assert_allclose(rk.simulate(robot, here, path, faults=faults).x, truth.x, atol=1e-7)
+    study = rk.sweep(robot, law, path, np.zeros((9, 2)), faults=faults)
+    assert_allclose(study.x_final, np.tile(truth.x[-1], (9, 1)), atol=1e-7)

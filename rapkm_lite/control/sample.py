@@ -9,7 +9,7 @@ import numpy as np
 from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.at import at
-from ..mechanics.closure import estimate_pose, on_the_turn_of
+from ..mechanics.closure import estimate_pose, misfit, on_the_turn_of
 from ..mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ..mechanics.trajectory import Desired
 from .grammar import ask, begin, coordinates, measured
@@ -97,12 +97,14 @@ class Sample:
     def _measured(self):
         model, keeper, found = self.model, self._keeper, None
         x, x1, x2 = keeper.places or (self.desired.x,) * 3
+        guess = 3.0 * (x - x1) + x2 if keeper.smooth else x
         if keeper.nearest is not None:
-            found = keeper.nearest(self.q_a, 3.0 * (x - x1) + x2 if keeper.smooth else x)
+            found = keeper.nearest(self.q_a, guess)
         keeper.places = ()
         if found is None:
+            start = min(guess, x, key=lambda place: misfit(model, self.q_a, place)[-1])
             try:
-                found = forward_kinematics(model, estimate_pose(model, self.q_a, x))
+                found = forward_kinematics(model, estimate_pose(model, self.q_a, start))
             except ConvergenceError as error:
                 raise NoPose(str(error)) from error
         keeper.places = np.asarray(found), x, x1
@@ -124,9 +126,8 @@ class Controller:
     Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
 
     nearest : a faster way than `estimate_pose` from angles and guess to the end-effector position, or None; it may
-        answer None.  smooth : its guess lies on a parabola through the last three estimates; else it is the last one.
-        The engine does so too while all drives are within 0.1 rad of the path, beyond that it begins at the last one:
-        where two poses fit the angles, as near an input singularity, the two may then take different ones.
+        answer None.  smooth : its guess lies on a parabola through the last three estimates, as in the engine; else it
+        is the last one.  Where Newton's steps from there lead nowhere, `estimate_pose` begins at the better of both.
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()

@@ -89,11 +89,12 @@ def newton_step(lanes, drives, arms, table, o, w):
             near = min(near, w[at(NEAR, i, j, W, L)])
         sx, sy = solve2(m11, m12, m22, fx, fy)
         det, todo = m11 * m22 - m12 * m12, w[of(TODO, j, W, L)]
-        least = min(m11, det)
-        w[of(FAR, j, W, L)] += 0.0 if near >= 0.0 and least > 0.0 else todo
+        regular = near >= 0.0 and min(m11, det) > 0.0
+        w[of(FAR, j, W, L)] += 0.0 if regular else todo
         enough = small(m11 + m22, det, w[at(MODEL + L1SQ, 0, j, W, L)], sx, sy)
-        more = todo if near >= 0.0 and least > 0.0 and not enough else 0.0
-        w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(TODO, j, W, L)] = sx, sy, more
+        more = todo if regular and not enough else 0.0
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = sx if regular else 0.0, sy if regular else 0.0
+        w[of(TODO, j, W, L)] = more
         w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
         w[of(PY, j, W, L)] += sy if more > 0.0 else 0.0
         count += 1 if more > 0.0 else 0
@@ -167,15 +168,16 @@ def nearest(drives, arms, w, q_a, x, y):
 
 
 @outlined
-def rough_newton(drives, arms, table, o, w, j, L, x, y):
-    """Least-squares pose of one run from a rough start, as `estimate_pose` finds it; and whether it converged."""
+def rough_newton(drives, arms, table, o, w, j, L, x, y, guess_x, guess_y):
+    """Least-squares pose of one run as `estimate_pose` finds it, from the guess, or from the last pose (x, y) where
+    that fits better, as after an encoder's jump; and whether it converged."""
     N, W = len(drives), len(arms)
     longest = 0.0
     for i in range(N):
         longest = max(longest, 1.0 / w[at(MODEL + SCALE, i, j, W, L)])
     most, tolerance = 0.1 * longest, 1e-13 * longest + 2e-15 * (abs(x) + abs(y))
     x0, y0, px, py, least = x, y, 0.0, 0.0, 1e299
-    for _ in range(100):
+    for n in range(102):
         m11 = m12 = m22 = h11 = h12 = h22 = fx = fy = square = -0.0
         for i in range(N):
             links, area2 = placed(MODEL, w, i, j, W, L, x, y)
@@ -188,6 +190,9 @@ def rough_newton(drives, arms, table, o, w, j, L, x, y):
             square += r * r if area2 > 0.0 else 1e300
             m11, m12, m22, fx, fy = m11 + bx * bx, m12 + bx * by, m22 + by * by, fx + bx * r, fy + by * r
             h11, h12, h22 = h11 + p11, h12 + p12, h22 + p22
+        if n == 0:
+            least, x, y = min(square, least), guess_x, guess_y
+            continue
         # A step is halved where it leaves the workspace or the residuals grow.
         if not square <= least + 1e-14:
             px, py = 0.5 * px, 0.5 * py
@@ -232,7 +237,8 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
                 x, y = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
-                px, py, found = rough_newton(drives, arms, table, o, w, j, L, x, y)
+                px, py = w[of(PX, j, W, L)], w[of(PY, j, W, L)]
+                px, py, found = rough_newton(drives, arms, table, o, w, j, L, x, y, px, py)
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:
                     w[of(STATUS, j, W, L)], w[of(SAMPLE, j, W, L)] = NO_POSE, k
