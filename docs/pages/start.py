@@ -26,8 +26,8 @@ def values() -> dict:
     """What the page must know: the machine, its drives and path, and Table 1."""
     setting = rk.experiment("testbed")
     robot, path = setting.robot, setting.trajectory
-    edge = (len(path) - 1) / 3
-    corners = np.stack([path.x[round(k * edge)] for k in range(3)])
+    # Samples at the corners, which the path's own do not meet.
+    corners = rk.triangle(robot, dt=path.t[-1] / 3000).x[:3000:1000]
     return {
         "machine": {name: np.asarray(getattr(robot, name)).tolist() for name in VALUES},
         "K_P": float(setting.law.K_P),

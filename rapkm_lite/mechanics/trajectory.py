@@ -159,7 +159,8 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero on (to 1e-6 of a
-    step), and where xd errs by a tenth, or xdd by half, of the largest step, except at a few jumps; xdd may be all 0.
+    step), and where xd errs by a tenth, or xdd by half, of the largest step that is made or meant, except at a few
+    jumps; xdd may be all 0.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
