@@ -137,6 +137,18 @@ def test_poses_and_angles_are_inverse_and_closed():
         four_rrr.angles([0.3, 0.3, 0.0])
 
 
+def test_a_machine_of_other_sizes_closes_where_its_angles_say(monkeypatch):
+    """The lesson invites to change the numbers: h is zero in every pose, and leg 1 tells the pose it was made from."""
+    monkeypatch.setattr(four_rrr, "BASE", np.array([[-0.5, -0.4], [0.6, -0.45], [0.4, 0.5], [-0.55, 0.6]]))
+    monkeypatch.setattr(four_rrr, "PLATFORM", np.array([[-0.12, -0.08], [0.1, -0.1], [0.13, 0.09], [-0.11, 0.07]]))
+    monkeypatch.setattr(four_rrr, "LINK", 0.5)
+    q, _, h, _, _ = four_rrr.symbols()
+    at = poses(20)
+    assert_allclose(four_rrr.poses(four_rrr.angles(at)), at, atol=1e-14)
+    loops = sp.lambdify([q], h)
+    assert_allclose([loops(angles) for angles in four_rrr.angles(at)], 0, atol=1e-14)
+
+
 def test_the_motion_is_consistent():
     motion = four_rrr.swing(dt=1e-3)
     J, J_dot, *_ = machine().terms(motion.q, motion.qd)

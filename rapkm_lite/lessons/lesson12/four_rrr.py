@@ -45,9 +45,9 @@ def symbols():
         square = sum(a[0] * b[0] * spin(a) * spin(b) * sp.cos(angle(a) - angle(b)) for a in links for b in links)
         return mass * square / 2 + inertia * spin(links[-1]) ** 2 / 2
 
-    def corner(k):
-        """From the centre of the platform to its corner k; from corner 0 to the centre it is that of corner 2."""
-        return np.hypot(*PLATFORM[k]), _PLATFORM_JOINTS, sp.Rational(2 * k - 3, 4) * sp.pi
+    def across(x, y):
+        """A vector of the platform, as a link."""
+        return np.hypot(x, y), _PLATFORM_JOINTS, sp.Rational(np.arctan2(y, x) / np.pi) * sp.pi
 
     m1, m2 = ROD_MASSES
     half, T, legs = LINK / 2, 0, []
@@ -56,9 +56,9 @@ def symbols():
         legs.append([upper, lower])
         T += energy(m1, [(half, *upper[1:])], m1 * LINK**2 / 12 + ROTOR)
         T += energy(m2, [upper, (half, *lower[1:])], m2 * LINK**2 / 12)
-    centre = [*legs[0], corner(2)]
+    centre = [*legs[0], across(*-PLATFORM[0])]
     T += energy(PLATFORM_MASS, centre, PLATFORM_INERTIA)
-    gaps = [place(BASE[i], legs[i]) - place(BASE[0], [*centre, corner(i)]) for i in (1, 2, 3)]
+    gaps = [place(BASE[i], legs[i]) - place(BASE[0], [*centre, across(*PLATFORM[i])]) for i in (1, 2, 3)]
     pose = [*place(BASE[0], centre), angle(centre[-1])]
     return q, qd, [e for gap in gaps for e in gap], T, pose
 
@@ -106,8 +106,9 @@ def poses(q) -> np.ndarray:
     q = np.asarray(q, dtype=float)
     lower = q[..., 0] + q[..., 4]
     turn = lower + q[..., 8]
-    links = [(LINK, q[..., 0]), (LINK, lower), (np.hypot(*PLATFORM[0]), turn + np.pi / 4)]
-    x, y = (sum(length * of(at) for length, at in links) + BASE[0, 0] for of in (np.cos, np.sin))
+    inward = np.arctan2(*-PLATFORM[0, ::-1])
+    links = [(LINK, q[..., 0]), (LINK, lower), (np.hypot(*PLATFORM[0]), turn + inward)]
+    x, y = (sum(length * of(at) for length, at in links) + b for of, b in zip((np.cos, np.sin), BASE[0], strict=True))
     return np.stack([x, y, wrap(turn)], axis=-1)
 
 
