@@ -160,6 +160,13 @@ def test_the_motion_is_consistent():
     assert_allclose(np.gradient(motion.qd, 1e-3, axis=0)[inner], motion.qdd[inner], atol=1e-4)
 
 
+def test_a_swing_ends_at_rest_whatever_its_times():
+    """Samples that miss the end would leave the machine in motion."""
+    assert np.abs(four_rrr.swing(duration=3.0, dt=0.1).qd[-1]).max() < 1e-12
+    with pytest.raises(ValueError, match=r"dt = 0\.3 s; allowed: a whole fraction of duration = 4 s"):
+        four_rrr.swing(dt=0.3)
+
+
 def test_accelerations_keep_the_loops_and_the_energy():
     """Without torques the kinetic energy of a run stays, to the fourth order of the step."""
     q = four_rrr.angles(np.array([[0.05, 0.02, 0.1]]))

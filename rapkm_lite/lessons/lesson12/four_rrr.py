@@ -15,7 +15,7 @@ import numpy as np
 from ...machine.arguments import matvec
 from ...mechanics.cores import wrap
 from ...mechanics.matrices import complement, complement_dot
-from ...mechanics.sampling import quintic
+from ...mechanics.sampling import quintic, sample_times
 from .mechanism import Mechanism, derive, symbolic
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -131,7 +131,7 @@ def swing(radius: float = 0.1, angle: float = 0.3, duration: float = 4.0, dt: fl
     >>> swing(dt=0.1).q.shape
     (41, 9)
     """
-    t = np.arange(round(duration / dt) + 1) * dt
+    t = sample_times(duration, dt)
     way, way_dot, way_ddot = quintic(t / duration)
     turn, rate, accel = 2 * np.pi * way, 2 * np.pi * way_dot / duration, 2 * np.pi * way_ddot / duration**2
     size = np.array([radius, radius, angle])
