@@ -764,6 +764,14 @@ def test_a_machine_with_a_drive_in_the_middle_is_compared_under_every_law():
     assert not shown.problem and "largest error" in shown.numbers
 
 
+def test_a_machine_whose_first_triangle_is_too_large_is_shown_on_a_smaller_one():
+    """docs/add_a_machine.md: all explorers take it; the picture says what does not fit, as for any setting."""
+    robot = rk.Manipulator(base=[[-0.2, 0.0], [0.2, 0.0]], lengths=[0.25, 0.3], masses=0.1, mode=[1, -1])
+    shown = explore.computed_torque(robot)
+    assert "outside the workspace" in shown.problem
+    assert not shown.set(law="redundant coordinates", side=200, rate=20, offset_1=0, offset_2=0).problem
+
+
 def test_a_drive_in_the_middle_of_the_others_has_a_place_too():
     square = 0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     assert not explore.own_machine(rk.Manipulator(base=square, lengths=[0.25, 0.3], masses=0.1)).problem

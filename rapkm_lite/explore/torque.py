@@ -48,7 +48,6 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     # Only two, whose memory the next one takes: fresh memory costs as much as the numbers.
     path = lru_cache(maxsize=2)(partial(central_triangle, robot))
     coarse = lru_cache(maxsize=64)(lambda side: path(side)[::10])
-    times = path(None).t[::10]
 
     def law_of(word, rate):
         # Two equal real poles at -rate.
@@ -81,7 +80,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
                 picture.line("plane", *line.T, color=pair_line(robot, fixed[law])["color"], linewidth=4, alpha=0.35)
             if singular[fixed[law]]:
                 numbers["distance from its singular curve"] = distance(law, side)
-        other = redundant(side)
+        times, other = path(side).t[::10], redundant(side)
         at, norm = (times[::5], other) if law == "redundant coordinates" else (times, norms(law, side))
         picture.line("map", times[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", at, np.minimum(norm, 1e6 * heavier), color=AFTER)
