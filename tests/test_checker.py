@@ -1,5 +1,7 @@
 """What `check`, `hint` and `draw_own` promise, on exercises made up for it and on those of the lessons."""
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -262,6 +264,12 @@ def test_only_what_has_other_shapes_is_advised_to_look_at_shapes():
     ):
         verdict, sentence = examine(name, answer)
         assert verdict == "close" and sentence.endswith(f". To improve: {advice}")
+
+
+def test_the_page_on_grading_says_by_how_much_a_design_may_miss():
+    shares = [100 * exercise.close for exercise in exercises().values() if exercise.judge and exercise.close]
+    words = (Path(__file__).parents[1] / "docs" / "teaching" / "grading.md").read_text(encoding="utf-8")
+    assert f"({min(shares):g} to {max(shares):g} % at most)" in words
 
 
 def test_torques_that_make_another_force_are_told_so_once():
