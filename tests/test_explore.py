@@ -762,6 +762,10 @@ def test_a_machine_with_a_drive_in_the_middle_is_compared_under_every_law():
         rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
     shown = explore.controller_choice(robot)
     assert not shown.problem and "largest error" in shown.numbers
+    # Gains fit its weight: without friction equal accelerations make the same motion.
+    for mass in (1e-3, 10.0):
+        other = explore.controller_choice(robot.replace(masses=mass))
+        assert other.numbers["largest error"] == shown.numbers["largest error"]
 
 
 def test_a_machine_whose_first_triangle_is_too_large_is_shown_on_a_smaller_one():

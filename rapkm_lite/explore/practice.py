@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
@@ -97,9 +96,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     path = central_triangle(robot, 120 * size(robot), duration=2.5)
-    mass = carried(load())
-    with suppress(ValueError):  # where the middle is out of reach
-        mass = carried(robot)
+    mass = carried(robot)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
         "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),

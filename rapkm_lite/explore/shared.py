@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from functools import wraps
 
 import numpy as np
 
 from ..figures import marks
+from ..figures.maps import grid_points
 from ..figures.style import AFTER, ALARM
 from ..machine.manipulator import Manipulator, load
 from ..mechanics.actuation import control_matrix, force_polygon
@@ -51,17 +51,25 @@ def _rounded(ratio: float) -> float:
 
 
 def carried(robot: Manipulator) -> float:
-    """What a gain of PD in N m/rad has to carry for one in 1/s^2, N m s^2: the mean of both modes in the middle."""
-    q = inverse_kinematics(robot, marks.middle(robot))
-    A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
-    return 2 / np.trace(np.linalg.solve(inertia, A.T @ A))
+    """What a gain of PD in N m/rad has to carry for one in 1/s^2, N m s^2: the mean of both modes in the middle.
+
+    Where that is out of reach, the median over the workspace.
+    """
+
+    def mean(x) -> np.ndarray:
+        q = inverse_kinematics(robot, x)
+        A, inertia = control_matrix(robot, q), minimal_dynamics(robot, q, 0 * q, None)[0]
+        return 2 / np.trace(np.linalg.solve(inertia, A.mT @ A), axis1=-2, axis2=-1)
+
+    try:
+        return float(mean(marks.middle(robot)))
+    except ValueError:
+        return float(np.median(mean(grid_points(robot, 41)[3])))
 
 
 def usual_gains(robot: Manipulator) -> tuple[float, float]:
     """K_P in N m/rad and K_D in N m s/rad that make a machine about as fast as the testbed's make the testbed."""
-    heavier = 1.0
-    with suppress(ValueError):  # where the middle is out of reach
-        heavier = _rounded(carried(robot) / carried(load()))
+    heavier = _rounded(carried(robot) / carried(load()))
     return heavier * 7.05, heavier * 0.225
 
 
