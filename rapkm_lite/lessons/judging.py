@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard
 
@@ -53,8 +53,8 @@ def _is_far(case: tuple) -> TypeGuard[Case]:
 
 def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     """The verdict on the plain cases; what is right there may fall short in those that lie beyond."""
-    far = [case for case in cases if _is_far(case)]
-    result = _numbers(exercise, answer, [case for case in cases if not _is_far(case)])
+    near, far = [case for case in cases if not _is_far(case)], [case for case in cases if _is_far(case)]
+    result = _numbers(exercise, answer, near)
     if not far:
         return result
     try:
@@ -67,16 +67,15 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
     right = "it is right" if result.word == "ok" else "the method is right"
     words, _, advice = next(iter(said.values())).partition(". To improve: ")
     words = words.replace("the method is right, off", "it is off")
-    near = [_sizes(case) for case in cases if not _is_far(case)]
-    if any(_sizes(case) not in near for case in far if case.label in said):
+    if _sizes([case for case in far if case.label in said]) - _sizes(near):
         advice = "make it hold there too; shapes of the arguments tell the numbers"
     short = f"{right}, but not for {', '.join(said)}, where {words}"
     return Result("close", f"{short}. To improve: {advice or 'make it hold there too'}")
 
 
-def _sizes(case: tuple) -> list:
-    """Shapes of the arrays of a case, numbers of arms of its machines."""
-    return [v.shape if isinstance(v, np.ndarray) else getattr(v, "n_arms", None) for v in case]
+def _sizes(cases: Sequence[tuple]) -> set[tuple]:
+    """Shapes of the arrays of the cases, numbers of arms of their machines."""
+    return {tuple(v.shape if isinstance(v, np.ndarray) else getattr(v, "n_arms", None) for v in case) for case in cases}
 
 
 def _failures(exercise: Exercise, answer: Any, cases: list[Case], sentence: str) -> dict[str, str]:
