@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 import rapkm_lite as rk
 from rapkm_lite.__main__ import main
 from rapkm_lite.lessons.copies import bare, copy_lessons, lesson_folder
-from rapkm_lite.simulation.summary import OFFSET, ROWS
+from rapkm_lite.simulation.summary import OFFSET, ROWS, as_text
 
 ROOT = Path(__file__).parents[1]
 
@@ -49,6 +50,17 @@ def test_summary_for_people_names_the_machine_and_both_tables():
     assert done.returncode == 0, done.stderr
     for word in ("testbed", "default experiment, without filter", "Table 1, measured, with filter", "4.56", "2.24"):
         assert word in done.stdout
+
+
+def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
+    """Table 1: 4.56 J become 2.24 J; the lessons' offsets are (4, -2, 5) mrad."""
+    tables = {
+        "by hand": dict(zip(ROWS, [[4.0, 2.0, 2.0], [1.0, 0.5, 0.5]], strict=True)),
+        "Table 1, measured": dict(zip(ROWS, rk.measured_energies(), strict=True)),
+    }
+    text = as_text({"version": "0", "machine": "", "law": "", "offset_rad": list(OFFSET), "energy_J": tables})
+    assert re.findall(r"the filter saves (.*) %", text) == ["75", "51"]
+    assert "encoder offsets (4, -2, 5) mrad" in text
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a closed pipe is another error there")
