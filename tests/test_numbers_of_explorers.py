@@ -52,6 +52,12 @@ def least_and_prestress(A, c):
     return least, c - least
 
 
+def bill(run):
+    """Heat of the copper and work of the drives over the holds of a run, J."""
+    c = run.c[:-1]
+    return np.sum(PRICE * run.dt * c**2 + c * np.diff(run.q_a, axis=0))
+
+
 def test_every_pixel_of_the_map_stands_at_its_own_place():
     image = next(m for m in explore.machine().set(drives="all drives").picture.marks if m.kind == "image")
     values, (left, right, low, high), _ = image.words
@@ -146,6 +152,7 @@ def test_spread_of_offsets_is_that_of_rounded_readings(counts):
     n, quantum = rk.null_vector(ROBOT, q), 2 * np.pi / counts
     spread = 1e3 * quantum / np.sqrt(12) * np.sqrt(np.diagonal(np.linalg.inv(n.T @ n)))
     assert_allclose(said(explorer, "standard deviation expected"), spread, rtol=0.03, atol=6e-4)
+    assert said(explorer, "condition")[0] == pytest.approx(np.linalg.cond(n), rel=0.03)
     found = rk.calibrate(ROBOT, quantum * np.rint((q[:, :3] + OFFSET) / quantum)).offset
     assert_allclose(said(explorer, "error of the offsets"), 1e3 * (found - OFFSET), atol=6e-4)
 
@@ -153,15 +160,24 @@ def test_spread_of_offsets_is_that_of_rounded_readings(counts):
 @pytest.mark.parametrize("filter", [False, True])
 def test_imperfections_are_those_of_the_built_machine_and_the_drawings_law(filter):
     robot = rk.load()
-    explorer = explore.imperfections(robot).set(longer=8.0, filter=filter, limit=120)
+    explorer = explore.imperfections(robot).set(longer=8.0, K_P=14.1, filter=filter, limit=120)
     built = robot.replace(lengths=1.008 * robot.lengths, centers=1.008 * robot.centers)
     path = rk.triangle(robot, 0.12, duration=2.5, dt=2e-3, centre=[0.0, 0.0])
-    law = rk.AntagonismFilter(rk.PD(7.05, 0.225)) if filter else rk.PD(7.05, 0.225)
+    law = rk.PD(14.1, 0.225 * 2**0.5)  # critical damping: K_D^2 goes with K_P
+    law = rk.AntagonismFilter(law) if filter else law
     run = rk.simulate(built, law, path, model=robot, faults=[rk.TorqueLimit(0.12)])
     off = 1e3 * np.linalg.norm(run.x - path.x, axis=1).max()
     assert said(explorer, "farthest from the wanted place")[0] == pytest.approx(off, abs=6e-3)
     pressing = least_and_prestress(rk.control_matrix(built, run.q[-1:]), run.c[-1:])[1][0]
     assert_allclose(said(explorer, "torque that only presses, at the end"), 1e3 * pressing, atol=0.051)
+    assert said(explorer, "largest torque").tolist() == [round(1e3 * np.abs(run.c).max()), 120]
+    assert said(explorer, "electric energy")[0] == pytest.approx(bill(run), abs=6e-3)
+
+
+def carried():
+    """By symmetry both modes of PD in the middle have w^2 = K_P / m, m the equal eigenvalues of (A^T A)^-1 Gbar."""
+    A, inertia = at([0.0, 0.0]), rk.minimal_dynamics(ROBOT, rk.inverse_kinematics(ROBOT, [0.0, 0.0]), np.zeros(6), None)
+    return np.linalg.eigvals(np.linalg.solve(A.T @ A, inertia[0])).real.mean()
 
 
 @pytest.mark.parametrize(
@@ -170,6 +186,8 @@ def test_imperfections_are_those_of_the_built_machine_and_the_drawings_law(filte
         ("computed torque, end-effector", lambda w: rk.CTC(w**2, 2 * w, None), False),
         ("computed torque, switched pair", lambda w: rk.SwitchedCTC(w**2, 2 * w), False),
         ("computed torque, redundant", lambda w: rk.RedundantCTC(w**2, 2 * w), True),
+        ("PD", lambda w: rk.PD(carried() * w**2, 2 * carried() * w), False),
+        ("PD and filter", lambda w: rk.AntagonismFilter(rk.PD(carried() * w**2, 2 * carried() * w)), False),
     ],
 )
 def test_laws_to_choose_have_both_poles_at_the_frequency_and_know_no_payload(name, law, coarse):
@@ -181,6 +199,9 @@ def test_laws_to_choose_have_both_poles_at_the_frequency_and_know_no_payload(nam
     assert said(explorer, "largest error")[0] == pytest.approx(error, abs=6e-3)
     jump = 1e3 * np.abs(run.c[1:] - run.c[:-1]).max()
     assert said(explorer, "largest jump of a torque")[0] == pytest.approx(jump, abs=0.06)
+    pressing = least_and_prestress(rk.control_matrix(ROBOT, run.q), run.c)[1][:-1]
+    shares = bill(run), PRICE * run.dt * np.sum(pressing**2)
+    assert_allclose(said(explorer, "energy"), shares, atol=6e-3)
 
 
 def test_torques_of_a_machine_of_ones_own():
@@ -212,6 +233,10 @@ def test_bars_of_the_steady_state_are_theory_and_run():
     assert said(explorer, "largest difference")[0] == pytest.approx(1e3 * np.abs(theory - run).max(), abs=0.06)
     dotted = [data[:, 1] for data in marks(explorer, "line", "error", linestyle=":")]
     assert_allclose(dotted, np.stack([error, error], axis=1), atol=1e-9)
+    still = rk.hold(ROBOT, [0.04, -0.03], 1.5, 2e-3)
+    own = 1e3 * rk.simulate(ROBOT, rk.PD(K, 0.225 * np.sqrt(K / 7.05)), still, offset).error
+    drawn = [data[:, 1] for data in marks(explorer, "line", "error") if len(data) > 2]
+    assert_allclose([[row.min(), row.max()] for row in drawn], np.stack([own.min(0), own.max(0)], axis=1), rtol=1e-9)
     heat = PRICE * np.sum((1e-3 * heights(explorer, "torque", alpha=None)) ** 2)
     assert said(explorer, "heat at rest")[0] == pytest.approx(heat, abs=6e-4)
 
@@ -248,6 +273,7 @@ def test_level_lines_hold_the_energy_that_is_written_on_them():
             point = np.append(mark.data[0], 5.0)
             assert float(mark.words) == pytest.approx(point @ S @ point, rel=1e-6)
     assert said(explorer, "trace of S")[0] == pytest.approx(np.trace(S), abs=6e-4)
+    assert_allclose(said(explorer, "principal costs"), np.linalg.eigvalsh(S), atol=6e-4)
     shares = heights(explorer, "shares")
     assert shares.sum() == pytest.approx(offset @ S @ offset, rel=1e-9)
     assert_allclose(np.sort(shares), np.sort(np.linalg.eigh(S)[0] * (offset @ np.linalg.eigh(S)[1]) ** 2), atol=1e-9)
@@ -262,6 +288,7 @@ def test_pale_bars_are_the_measured_ones_of_table_1(filter, row):
     plain = rk.simulate(ROBOT, law, path, offset)
     run = plain if filter == "off" else rk.simulate(ROBOT, rk.AntagonismFilter(law), path, offset)
     assert said(explorer, "largest error")[0] == pytest.approx(1e3 * np.abs(run.q_a - path.q_a).max(), abs=0.06)
+    assert_allclose(said(explorer, "torque at the end"), 1e3 * run.c[-1], atol=0.051)
     if filter != "off":
         share = 100 * (plain.energy.sum() - run.energy.sum()) / plain.energy.sum()
         assert said(explorer, "saved by the filter")[0] == round(share)
@@ -304,6 +331,7 @@ def test_a_late_drive_follows_its_set_points_so_many_milliseconds_later(robot):
     assert energy == pytest.approx(run.energy.sum(), abs=6e-3)
     assert lost == pytest.approx(PRICE * 2e-3 * np.sum(pressing[:-1] ** 2), abs=6e-4)
     off = 1e3 * (run.x - path.x)[: len(path) // 2 + 1]
+    assert said(explorer, "farthest from the wanted place")[0] == pytest.approx(np.hypot(*off.T).max(), abs=6e-3)
     for data, values in zip(curve(explorer, "way"), off.T, strict=True):
         assert data[:, 1].max() == pytest.approx(values.max()) and data[:, 1].min() == pytest.approx(values.min())
 
@@ -314,6 +342,20 @@ def test_computed_torque_has_both_poles_where_the_slider_says():
     run = rk.simulate(ROBOT, rk.RedundantCTC(900.0, 60.0), path, 1e-3 * np.array([1.0, 3.0, 0.5]))
     assert said(explorer, "largest torque")[0] == round(1e3 * np.abs(run.c).max())
     assert said(explorer, "largest error")[0] == pytest.approx(1e3 * np.abs(run.q_a - path.q_a).max(), abs=0.06)
+    assert said(explorer, "energy")[-1] == pytest.approx(bill(run), abs=6e-3)
+
+
+def test_switches_are_counted_by_the_sines_between_the_distal_links():
+    """A pair is kept until another one has a sine larger by a fifth."""
+    explorer = explore.computed_torque().set(law="switched pair", side=170, **NO_OFFSETS)
+    path = rk.triangle(ROBOT, 0.17, centre=[0.0, 0.0])
+    way = path.q[:, :3] + path.q[:, 3:]
+    sines = np.abs(np.sin([way[:, k] - way[:, j] for j, k in rk.drive_pairs(ROBOT)]))
+    used, count = sines[:, 0].argmax(), 0
+    for row in sines.T:
+        if row.max() > 1.2 * row[used]:
+            used, count = row.argmax(), count + 1
+    assert count > 1 and explorer.numbers["switches"] == str(count)
 
 
 def test_distance_from_a_singular_curve_is_where_the_distal_links_turn_past_each_other():
