@@ -181,6 +181,23 @@ def test_accelerations_keep_the_loops_and_the_energy():
     assert np.abs(matvec(J, accelerations(machine(), q, qd, np.ones((1, 4)))) + matvec(J_dot, qd)).max() < 1e-11
 
 
+def test_a_mechanism_with_a_potential_falls_as_a_pendulum():
+    """By hand, for the mass 1 on a circle of radius 1: g downwards along it, and the square of the rate inwards."""
+    (x, y), (xd, yd) = q, qd = sp.symbols("x y"), sp.symbols("xd yd")
+    mine = derive(q, qd, [x**2 + y**2 - 1], (xd**2 + yd**2) / 2, m=1, U=9.81 * y)
+    angle, rate, push = 0.7, 1.3, 2.0  # the angle from below; the drive pushes along x
+    out, along = np.array([[np.sin(angle), -np.cos(angle)], [np.cos(angle), np.sin(angle)]])
+    found = accelerations(mine, out, rate * along, np.array([push]))
+    wanted = (push * np.cos(angle) - 9.81 * np.sin(angle)) * along - rate**2 * out
+    assert_allclose(found, wanted, atol=1e-12)
+
+
+def test_electric_energy_is_heat_and_the_work_that_is_done():
+    """Two holds of 0.5 s: 2 W of heat with 1 N m over 1 rad, then with -1 N m over 0.25 rad."""
+    q, c = np.array([[0.0], [1.0], [1.25]]), np.array([[1.0], [-1.0], [9.0]])
+    assert runs.electric_energy(q, c, 0.5, 2.0, 1.0) == pytest.approx(2.0 + 1.0 - 0.25)
+
+
 # What the lesson predicts.
 def test_null_vector_and_fight_in_the_centre():
     """By symmetry: a quarter turn maps the machine onto itself, so the null vector is an eigenvector of the shift."""
