@@ -93,6 +93,7 @@ SETS = [
     ("TorqueLimit", HANGING, TASK, HOLD, fault(rk.TorqueLimit(0.02))),
     ("TorqueLimit", HANGING, REDUNDANT, HOLD, fault(rk.TorqueLimit(0.03))),
     ("own limit of 0.05 N m", HANGING, rk.PID(20.0, 10.0, 0.4, 0.05), HOLD, {}),
+    ("own limit of 0.05 N m", HANGING, rk.PID(20.0, 10.0, 0.4, [0.05, np.inf, 0.05]), HOLD, {}),
     ("own limit of 0.05 N m", HANGING, rk.AntagonismFilter(rk.PID(20.0, 10.0, 0.4, 0.05)), HOLD, {}),
     ("DeadDrive\\(0, 0.2\\)", ROBOT, TASK, TRIANGLE, fault(rk.DeadDrive(0, 0.2), rk.DeadDrive(1, 0.25))),
     ("DeadDrive\\(0, 0.2\\)", ROBOT, REDUNDANT, TRIANGLE, fault(*(rk.DeadDrive(i, 0.2) for i in range(3)))),
@@ -402,6 +403,14 @@ def test_torques_that_only_pause_do_not_swing():
     with np.errstate(all="raise"):
         assert swinging(pausing) == swinging(-pausing) == 0.0
         assert swinging(1e-3 * (-2.0) ** np.arange(12)[:, None]) == pytest.approx(64.0)
+
+
+def test_torques_that_turn_twice_in_a_dozen_samples_do_not_swing():
+    """A quarter of the signs has to change, which are three of twelve."""
+    growing = 2.0 ** np.arange(12)
+    for turns, grown in ((2, 0.0), (3, 64.0)):
+        signs = (-1.0) ** np.minimum(np.arange(12) // 3, turns)
+        assert swinging((signs * growing)[:, None]) == grown
 
 
 def test_fewer_than_two_torques_do_not_swing():
