@@ -506,3 +506,13 @@ def test_what_a_notebook_started_ends_with_it(tmp_path):
     written = mark.stat().st_size
     time.sleep(1.0)
     assert mark.stat().st_size == written
+
+
+def test_the_limit_of_a_statement_is_the_one_that_the_help_says(tmp_path, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(grader, "grade", lambda folder, seconds, jobs, bar: asked.append((seconds, jobs)) or [])
+    assert main(["grade", str(tmp_path)]) == 0 and main(["grade", str(tmp_path), "--seconds", "5", "--jobs", "2"]) == 0
+    with pytest.raises(SystemExit):
+        main(["grade", "--help"])
+    told = re.search(r"limit of a statement or a\s+check \((\d+)\)", capsys.readouterr().out)
+    assert told and asked == [(float(told[1]), None), (5.0, 2)]
