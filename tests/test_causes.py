@@ -141,6 +141,7 @@ HOLD_FOUR = rk.hold(FOUR, [0.02, 0.03], 2.0)
 UNSTABLE = "unstable gain K_I = .* of the integral: .*; without it it is not lost"
 SETS += [
     (UNSTABLE, FOUR, rk.PID(7.0, 1e5, 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
+    (UNSTABLE, FOUR, rk.PID(7.0, [1e5, 1e5, 1e5, 0.0], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, FOUR, rk.PID(7.0, [1e3, 2e3, 1e3, 1e3], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2)), TRIANGLE, {"offset": OFFSET}),
     (UNSTABLE, ROBOT, rk.AntagonismFilter(rk.AntagonismFilter(rk.PID(7.0, 1e4, 0.2))), TRIANGLE, {"offset": OFFSET}),
@@ -411,6 +412,12 @@ def test_torques_that_turn_twice_in_a_dozen_samples_do_not_swing():
     for turns, grown in ((2, 0.0), (3, 64.0)):
         signs = (-1.0) ** np.minimum(np.arange(12) // 3, turns)
         assert swinging((signs * growing)[:, None]) == grown
+
+
+def test_the_share_by_which_a_model_is_off_is_that_of_the_largest_number():
+    unequal = ROBOT.replace(masses=[0.1, 0.2])
+    off = _difference(ROBOT.replace(masses=[0.12, 0.2]), unequal)  # rods, whose inertias go with their masses
+    assert off == "masses that are off by 10 % and inertias that are off by 10 %"
 
 
 def test_fewer_than_two_torques_do_not_swing():
