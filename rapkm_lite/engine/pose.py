@@ -89,12 +89,11 @@ def newton_step(lanes, drives, arms, table, o, w):
             near = min(near, w[at(NEAR, i, j, W, L)])
         sx, sy = solve2(m11, m12, m22, fx, fy)
         det, todo = m11 * m22 - m12 * m12, w[of(TODO, j, W, L)]
-        regular = near >= 0.0 and min(m11, det) > 0.0
-        w[of(FAR, j, W, L)] += 0.0 if regular else todo
+        least = min(m11, det)
+        w[of(FAR, j, W, L)] += 0.0 if near >= 0.0 and least > 0.0 else todo
         enough = small(m11 + m22, det, w[at(MODEL + L1SQ, 0, j, W, L)], sx, sy)
-        more = todo if regular and not enough else 0.0
-        w[of(SX, j, W, L)], w[of(SY, j, W, L)] = sx if regular else 0.0, sy if regular else 0.0
-        w[of(TODO, j, W, L)] = more
+        more = todo if near >= 0.0 and least > 0.0 and not enough else 0.0
+        w[of(SX, j, W, L)], w[of(SY, j, W, L)], w[of(TODO, j, W, L)] = sx, sy, more
         w[of(PX, j, W, L)] += sx if more > 0.0 else 0.0
         w[of(PY, j, W, L)] += sy if more > 0.0 else 0.0
         count += 1 if more > 0.0 else 0
@@ -218,8 +217,9 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         x, y = w[of(PX, j, W, L)], w[of(PY, j, W, L)]
         x1, y1 = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
         # The pose moves on smoothly, unless angles are stepped: a parabola through the last three.
-        w[of(PX, j, W, L)] = 3.0 * (x - x1) + w[of(PX2, j, W, L)] if smooth else x
-        w[of(PY, j, W, L)] = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
+        px = 3.0 * (x - x1) + w[of(PX2, j, W, L)] if smooth else x
+        py = 3.0 * (y - y1) + w[of(PY2, j, W, L)] if smooth else y
+        w[of(PX, j, W, L)], w[of(PY, j, W, L)], w[of(GUESS_X, j, W, L)], w[of(GUESS_Y, j, W, L)] = px, py, px, py
         w[of(PX2, j, W, L)], w[of(PY2, j, W, L)], w[of(PX1, j, W, L)], w[of(PY1, j, W, L)] = x1, y1, x, y
         w[of(TODO, j, W, L)], w[of(FAR, j, W, L)] = 1.0, 0.0
     if history is not None:
@@ -237,7 +237,7 @@ def measured_pose(lanes, drives, arms, history, study, table, o, w, k, smooth):
         for j in range(L):
             if w[of(FAR, j, W, L)] + w[of(TODO, j, W, L)] > 0.0 and w[of(STATUS, j, W, L)] == DONE:
                 x, y = w[of(PX1, j, W, L)], w[of(PY1, j, W, L)]
-                px, py = w[of(PX, j, W, L)], w[of(PY, j, W, L)]
+                px, py = w[of(GUESS_X, j, W, L)], w[of(GUESS_Y, j, W, L)]
                 px, py, found = rough_newton(drives, arms, table, o, w, j, L, x, y, px, py)
                 w[of(PX, j, W, L)], w[of(PY, j, W, L)] = px, py
                 if not found:

@@ -42,15 +42,15 @@ BLOCKS = OTHER + 8
 (
     X, Y, VX, VY, KX, KY,
     SX, SY, SVX, SVY, TX, TY, TVX, TVY, STEP, STEPS, BEND,
-    PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR,
+    PX, PY, PX1, PY1, PX2, PY2, PVX, PVY, TODO, FAR, GUESS_X, GUESS_Y,
     JOINT_J, JOINT_K, PAIR_P1, PAIR_P2, PAIR_D1, PAIR_D2, HYSTERESIS,
     REF_X, REF_Y, ACC_X, ACC_Y, PUSH_X, PUSH_Y, G11, G12, G22,
     TORQUE2, ANTAGONISM, MISS2, FARTHEST, AROUND, STATUS, SAMPLE,
     NEAR_EDGE, WAS_X, WAS_Y, WAS_VX, WAS_VY,
     GRAVITY_X, GRAVITY_Y, SHARPNESS,
-) = range(58)  # fmt: skip
+) = range(60)  # fmt: skip
 # After the environment of the machine stands that of the model.
-ENVIRONMENT, SINGLES = 3, 61
+ENVIRONMENT, SINGLES = 3, 63
 
 
 @index
