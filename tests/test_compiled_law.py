@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from samples import InPython
 
 import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED, user
@@ -21,19 +22,6 @@ ROBOT = rk.load().replace(friction=0.0)
 PATH = rk.circle(ROBOT, radius=0.05, duration=0.3)
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 PD = rk.PD(7.05, 0.225)
-
-
-class InPython(rk.Law):
-    """The function of a compiled law with the textbook matrices, sample by sample."""
-
-    def __init__(self, law):
-        self.law, self.pose = law, law.pose
-
-    def start(self, model, dt):
-        return self.law.start(model, dt)
-
-    def step(self, memory, sample):
-        return self.law.step(memory, sample)
 
 
 @rk.compiled(memory=3)

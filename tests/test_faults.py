@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from samples import InPython
 
 import rapkm_lite as rk
 from rapkm_lite.simulation.faults import Fault, fault_table
@@ -557,16 +558,6 @@ def test_offsets_of_sensors_are_those_of_one_machine(offset):
     """Those of many runs are given to `sweep`."""
     with pytest.raises(ValueError, match=r"offset has shape .*; allowed: one number or \(N,\), one per drive"):
         Sensors(offset)
-
-
-class InPython(rk.Law):
-    """Another law, one that the engine does not know."""
-
-    def __init__(self, law):
-        self.law = law
-
-    def step(self, memory, sample):
-        return self.law.step(memory, sample)
 
 
 @pytest.mark.parametrize("dead_from", [0.13, 0.18])
