@@ -1,0 +1,28 @@
+"""The slides of the lessons on the screens of lecture rooms: every slide is seen whole while its answers are closed."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
+sys.path.insert(0, str(NOTEBOOKS))
+LESSONS = sorted(NOTEBOOKS.glob("[0-9][0-9]_*.ipynb"))
+TALL = """pages.map((page, k) => (show(k), [k + 1, page.getBoundingClientRect().height - innerHeight,
+    document.documentElement.scrollWidth - innerWidth])).filter(([k, tall, wide]) => tall > 1 || wide > 1)"""
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda path: path.stem[:2])
+def test_every_slide_fits_a_projector(browser, tmp_path, lesson):
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    import slides
+
+    file = tmp_path / "slides.html"
+    assert slides.main(lesson.stem[:2], str(file)) == 0
+    page = browser.new_page()
+    for width, height in ((1024, 768), (1280, 720), (1280, 800), (1920, 1080)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(file.as_uri())
+        page.evaluate("document.images.length && Promise.all([...document.images].map(image => image.decode()))")
+        assert page.evaluate(TALL) == [], f"{width} x {height}: slide, px too tall, px too wide"
+    page.close()
