@@ -323,6 +323,12 @@ def test_any_widget_with_a_value_is_a_control(widget, value, wrong):
         assert explorer.values == {"slope": 1, "other": value}
 
 
+def test_whole_numbers_of_numpy_make_a_slider_that_plays():
+    slider = explore.slider("power", 1, np.int64(3), 1, np.uint8(2))
+    shown = explore.explorer(line, light().controls | {"power": slider}, {"a": {}}, play="power")
+    assert shown.values["power"] == 2 and type(shown.values["power"]) is int
+
+
 def test_a_path_is_told_to_cross_where_it_does():
     """It crosses a curve on which a pair is singular where d_j x d_k changes its sign, on machines of any size."""
     robot, told = rk.load().replace(friction=0.0), {True: [], False: []}

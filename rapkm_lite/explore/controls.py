@@ -26,7 +26,7 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
     """
     _within(low, high, value)
     positive_number("step", step)
-    whole = all(isinstance(v, int) for v in (low, high, step, value))
+    whole = all(isinstance(v, int | np.integer) for v in (low, high, step, value))
     kind = widgets.IntSlider if whole else widgets.FloatSlider
     digits = max(0, math.ceil(-math.log10(step) - 1e-9))
     digits += not math.isclose(round(step, digits), step, rel_tol=1e-9)  # 0.25 has one more than 0.2
