@@ -329,6 +329,11 @@ def test_whole_numbers_of_numpy_make_a_slider_that_plays():
     assert shown.values["power"] == 2 and type(shown.values["power"]) is int
 
 
+def test_a_box_takes_the_truth_values_of_numpy():
+    made = explore.explorer(lambda picture, on: None, {"on": explore.switch("on", np.True_)}, {"a": {}})
+    assert made.values == {"on": True} and made.set(on=np.False_).values == {"on": False}
+
+
 def test_a_path_is_told_to_cross_where_it_does():
     """It crosses a curve on which a pair is singular where d_j x d_k changes its sign, on machines of any size."""
     robot, told = rk.load().replace(friction=0.0), {True: [], False: []}

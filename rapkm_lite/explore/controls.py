@@ -79,7 +79,7 @@ def switch(label: str, value: bool = False) -> widgets.Widget:
     >>> switch("filter").value
     False
     """
-    return widgets.Checkbox(value, description=label, indent=False, **_COMMON)
+    return widgets.Checkbox(truth("value", value), description=label, indent=False, **_COMMON)
 
 
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
@@ -206,7 +206,7 @@ def put(controls: dict, values: dict) -> None:
     before = {name: controls[name].value for name in values}
     try:
         for name, value in values.items():
-            controls[name].value = value
+            controls[name].value = bool(value) if isinstance(value, np.bool_) else value  # as `check` takes both
     except Exception as error:  # of a widget from elsewhere, too
         for other, value in before.items():
             controls[other].value = value
