@@ -337,3 +337,10 @@ def test_what_is_masked_or_missing_is_a_gap():
     assert_array_equal(picture.marks[0].data, [[0.0, 0.0], [1.0, np.nan], [2.0, 1.0]])
     picture.fit("a", [0.5, np.nan, -1.0, np.inf])
     assert picture.ylim("a") == (-1.5, 1.5)
+
+
+def test_a_panel_in_which_no_curve_is_left_has_limits_too():
+    hidden, gaps = explore.Picture({"a": {}}), explore.Picture({"a": {}})
+    hidden.fit("a", *[])
+    gaps.fit("a", [np.nan])
+    assert hidden.ylim("a") == gaps.ylim("a")

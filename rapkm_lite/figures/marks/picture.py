@@ -203,11 +203,12 @@ class Picture:
     def fit(self, panel: str, *values, symmetric: bool = True, least: float = 1e-9, most: float = np.inf) -> None:
         """Vertical limits that hold all `values`, in steps of 1, 1.5, 2, 3, 5, 7 so that they seldom change.
 
-        The limits shrink only when the values fill less than half of them; they end at the first step not below `most`.
+        Without `symmetric` they begin at zero.  They shrink only when the values fill less than half of them, and end
+        at the first step not below `most`.
         """
         low, now = self.ylim(panel)
         sizes = (np.abs(numbers("values", v, most=9)) for v in values)
-        largest = max(positive_number("least", least), *(float(v[np.isfinite(v)].max(initial=0.0)) for v in sizes))
+        largest = max([positive_number("least", least), *(float(v[np.isfinite(v)].max(initial=0.0)) for v in sizes)])
         endless = isinstance(most, float) and most == np.inf
         largest = min(largest, (most if endless else positive_number("most", most)) / 1.05)
         switch("symmetric", symmetric)
