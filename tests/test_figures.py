@@ -296,6 +296,9 @@ def test_workspace_grid_keeps_off_the_boundary():
     q = rk.inverse_kinematics(robot, points)
     assert np.abs(np.sin(q[:, 3:])).min() > 1e-6
     np.testing.assert_array_equal(plotting.on_grid(inside, points)[inside], points)
+    for wrong in (1.0, points[:1], points[:-1]):
+        with pytest.raises(ValueError, match=rf"values has shape .*; allowed: \({len(points)}, ...\)"):
+            plotting.on_grid(inside, wrong)
     i, j = np.argwhere(inside)[7]
     assert points[7].tolist() == [x[j], y[i]]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import patheffects
 
-from ..machine.arguments import short
+from ..machine.arguments import shaped, short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
 from ..mechanics.kinematics import inverse_kinematics, reachable
@@ -85,6 +85,9 @@ def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
     values = np.asarray(values)
     if values.dtype.kind not in "biuf" or not np.all(np.isfinite(values)):
         raise ValueError(f"values = {short(values)}; allowed: finite numbers, one for each point inside")
+    count = np.count_nonzero(inside)
+    # NumPy would write a single value to all points.
+    shaped("values", values, values.shape[:1] == (count,), f"({count}, ...), one row for each point inside")
     grid = np.ma.array(np.zeros((*inside.shape, *values.shape[1:])), mask=True)
     grid[inside] = values
     return grid
