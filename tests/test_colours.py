@@ -137,6 +137,7 @@ def test_a_film_with_frames_left_out_says_so_and_keeps_its_ends():
         ([0.0, 1.0], " ", {}, "alt = ' '; allowed"),
         ([0.0, 1.0], "A hand.", {"loops": 0}, "loops = 0; allowed"),
         ([0.0, 1.0], "A hand.", {"most": 1}, "most = 1; allowed"),
+        ([0.0, 1.0], "A hand.", {"poster": 2}, "poster = 2; allowed: whole numbers >= -1, to 1"),
     ],
 )
 def test_films_refuse_what_they_cannot_show(frames, alt, more, sentence):

@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
+from ..machine.arguments import whole_number
 from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
@@ -142,7 +143,7 @@ def film(
     figsize : width and height in inches, at `dpi`.
     seconds : of motion, in equal steps.  rest : seconds that the last frame stays.
     loops : how often it plays; it always stops, on its last frame.
-    poster : index of the frame that stands for the film where motion is not wanted.
+    poster : index of the frame that stands for the film where motion is not wanted; -1 is the last one.
     most : the most frames; of more, some are left out, and the film says so.  In a browser's own kernel 8, else all.
         Some are left out, too, where all would make more than 120 kB.
 
@@ -158,6 +159,7 @@ def film(
         raise ValueError(f"alt = {alt!r}; allowed: a sentence that says what is seen and what it shows")
     if len(steps) < 2:
         raise ValueError(f"frames has {len(steps)} steps; allowed: two or more")
+    poster = whole_number("poster", poster, -1, len(steps) - 1)
     if not seconds > 0 or not rest >= 0:
         raise ValueError(f"seconds = {seconds}, rest = {rest}; allowed: a positive time, and a time of rest or 0")
     if loops < 1:
