@@ -82,7 +82,9 @@ DEAD_ENCODER = Exercise(
         "the filter removes antagonism, but the force of the frozen error stays: a dead encoder must be noticed": (
             lambda make: isinstance(law := make(_model()), AntagonismFilter) and isinstance(law.law, PD)
         ),
-        "a fixed pair survives only if the dead encoder is the third one: which one died must be noticed": _of_a_pair,
+        "a fixed pair survives only if the dead encoder is the one outside the pair: which one died must be noticed": (
+            _of_a_pair
+        ),
         "switching looks at the pose, not at the health of the encoders: a dead one must be noticed": (
             _kind(SwitchedCTC)
         ),
