@@ -335,6 +335,21 @@ def test_a_survivor_notices_each_encoder_that_dies(overlooked):
     assert said.word == "wrong" and f"encoder {overlooked + 1} dead" in said.sentence
 
 
+def test_a_law_that_listens_to_dead_encoders_only_does_listen():
+    """A mask that is upside down: no feedback of healthy drives, all of the frozen one's."""
+
+    def make(robot):
+        def law(t, q_a, qd_a, desired):
+            dead = (qd_a == 0.0) & np.any(qd_a)
+            feedback = 7.05 * (q_a - desired.q_a) + 0.225 * (qd_a - desired.qd_a)
+            return rk.inverse_dynamics(robot, desired.q, desired.qd, desired.qdd) - dead * feedback
+
+        return law
+
+    said = judged(exercises()["05.dead_encoder"], make)
+    assert said.word == "wrong" and said.sentence.startswith("encoder 1 dead")
+
+
 @pytest.mark.parametrize("name", ["04.lean_law", "05.dead_encoder", "06.placement", "10.spare_law", "11.one_law"])
 def test_a_design_that_returns_nothing_is_not_tried_yet(name):
     assert judged(exercises()[name], lambda *arguments: None).word == "todo"

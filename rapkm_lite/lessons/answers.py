@@ -148,14 +148,14 @@ def given_law(make: Any, robot: Any) -> Any:
 
 
 def blind(law: Any, desired: Any) -> bool:
-    """True for a function that gives the same torques, early and late, whatever the encoders read."""
+    """True for a function that gives the same torques, early and late, whatever the encoders read, dead ones too."""
     if not inspect.isfunction(law):
         return False
-    given = [
-        [law(t, desired.q_a + error, desired.qd_a + 10 * error, desired) for error in (0.0, 0.01, -0.02)]
-        for t in (0.6, 1.4, 2.4)
-    ]
-    return np.shape(given)[2:] == desired.q_a.shape and bool(np.ptp(given, axis=1).max() < 1e-12)
+    q_a, qd_a = desired.q_a, desired.qd_a
+    readings = [(q_a + error, qd_a + 10 * error) for error in (0.0, 0.01, -0.02)]
+    readings += [(q_a + 0.01, qd_a * (np.arange(len(q_a)) != dead)) for dead in range(len(q_a))]
+    given = [[law(t, *reading, desired) for reading in readings] for t in (0.6, 1.4, 2.4)]
+    return np.shape(given)[2:] == q_a.shape and bool(np.ptp(given, axis=1).max() < 1e-12)
 
 
 def returned(got: Any) -> Any:
