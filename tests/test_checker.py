@@ -350,6 +350,21 @@ def test_a_law_that_listens_to_dead_encoders_only_does_listen():
     assert said.word == "wrong" and said.sentence.startswith("encoder 1 dead")
 
 
+def test_a_bill_that_is_too_high_is_not_to_be_mended_by_a_gain():
+    """Square roots of the right weights: with the least heat's own, the bill is lower at the same gains."""
+    exercise = exercises()["04.lean_law"]
+
+    def weighted(power, K_P, K_D):
+        return lambda robot: rk.AntagonismFilter(
+            rk.PD(K_P, K_D), W=(robot.resistance / robot.torque_constant**2) ** power
+        )
+
+    for gains in ((7.05, 0.225), (10.0, 0.27), (20.0, 0.4)):
+        said = judged(exercise, weighted(0.5, *gains))
+        assert said.word == "close" and "J (at most 3 J: missed)" in said.sentence and "weights" in said.sentence
+        assert judged(exercise, weighted(1.0, *gains)).word == "ok"
+
+
 @pytest.mark.parametrize("name", ["04.lean_law", "05.dead_encoder", "06.placement", "10.spare_law", "11.one_law"])
 def test_a_design_that_returns_nothing_is_not_tried_yet(name):
     assert judged(exercises()[name], lambda *arguments: None).word == "todo"

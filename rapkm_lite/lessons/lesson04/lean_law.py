@@ -72,7 +72,7 @@ LEAN_LAW = Exercise(
     ),
     judge=_runs,
     close=0.03,
-    improve="try another gain: a stiffer loop follows closer, and under a filter it costs nothing",
+    improve="a stiffer loop follows closer, and under a filter costs next to nothing; a high bill needs other weights",
     mistakes={
         "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
             lambda make: blind(make(_machine()), triangle(_machine(), dt=2e-3)[300])
