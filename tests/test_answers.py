@@ -46,6 +46,30 @@ def test_every_exercise_has_answers_of_its_own(name):
     assert kinds.count("right") >= 1 and kinds.count("wrong") >= 4, words
 
 
+@pytest.mark.parametrize("name", [name for name, exercise in exercises().items() if exercise.invariant])
+def test_a_law_of_nature_is_broken_by_an_answer_that_is_off(name):
+    """One number of the right answer moved, by a hundredth or by twenty times what is allowed."""
+    exercise = exercises()[name]
+    cases = exercise.cases(np.random.default_rng(20_111_130))
+    for place in (0, -1):
+        broken = []
+        for case in (cases[0], cases[-1]):
+            answer = np.array(exercise.reference(*case), dtype=float)
+            answer.reshape(-1)[place] += max(0.01 * np.abs(answer).max(), 20 * exercise.tolerance)
+            broken.append(exercise.invariant(answer[()], *case)[0])
+        assert max(broken) > exercise.tolerance
+
+
+def test_the_law_of_filtered_torques_has_two_halves():
+    """All torques keep the force and leave the antagonism; half of the filtered ones do the opposite."""
+    exercise = exercises()["04.filtered_torques"]
+    for A, c in exercise.cases(np.random.default_rng(1)):
+        n = np.cross(*A.T) / np.linalg.norm(np.cross(*A.T))
+        assert exercise.invariant(c, A, c)[0] == pytest.approx(abs(n @ c))
+        half = A @ np.linalg.lstsq(A, c)[0] / 2
+        assert exercise.invariant(half, A, c)[0] == pytest.approx(np.abs(A.T @ c).max() / 2)
+
+
 class Odd:
     """An answer that is a class, and whose instances stop at everything."""
 
