@@ -1,5 +1,7 @@
 """What `check`, `hint` and `draw_own` promise, on exercises made up for it and on those of the lessons."""
 
+import json
+import re
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -319,6 +321,18 @@ def test_a_lean_law_for_known_offsets_is_none_for_others(known):
         return law
 
     assert judged(exercises()["04.lean_law"], make).word == "wrong"
+
+
+@pytest.mark.parametrize("name", ["04.lean_law", "05.dead_encoder"])
+def test_limits_of_a_design_are_those_that_its_lesson_states(name):
+    """A number in bold type with its unit is a limit."""
+    (path,) = (Path(__file__).parents[1] / "notebooks").glob(f"{name[:2]}_*.ipynb")
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    sources = ["".join(cell["source"]) for cell in cells]
+    (code,) = (k for k, text in enumerate(sources) if f'check("{name}"' in text)
+    stated = {(float(value), unit) for value, unit in re.findall(r"\*\*([\d.]+) (mm|J)\*\*", sources[code - 1])}
+    exercise = exercises()[name]
+    assert stated == {(found.limit, found.unit) for found in exercise.judge(exercise.reference)}
 
 
 @pytest.mark.parametrize("overlooked", range(3))

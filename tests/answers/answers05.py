@@ -174,6 +174,14 @@ def stacked(A, rows):
     return np.vstack([L - B @ bottom, bottom])
 
 
+def sorted_rows(A, rows):
+    """The blocks in the order of `rows`, put into place as if it were sorted."""
+    first, rest, L, B, bottom = blocks(A, rows)
+    result = np.empty_like(A)
+    result[sorted(first)], result[rest] = L - B @ bottom, bottom
+    return result
+
+
 def three_arms_only(A, rows):
     first, rest, L, B, bottom = blocks(A, rows)
     b = B[:, :1]
@@ -198,6 +206,7 @@ INVERSES = [
     ("wrong", "numpy's pinv of A~", lambda A, rows: np.linalg.pinv(A).T, "cut-off"),
     ("wrong", "a cut-off that is too small", lambda A, rows: np.linalg.pinv(A.T, rcond=1e-13), "or one as small"),
     ("wrong", "stacked", stacked, "order"),
+    ("wrong", "taken as sorted", sorted_rows, "order"),
     ("wrong", "transposed", lambda A, rows: explicit(A, rows).T, "transposed"),
     ("wrong", "opposite", lambda A, rows: -explicit(A, rows), "sign"),
     ("wrong", "others off", assembled(lambda L, B, b: (L, 0 * b)), "switched off"),
