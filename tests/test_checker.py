@@ -291,6 +291,22 @@ def test_what_stops_for_one_kind_of_case_only_says_for_which():
     assert "while it goes through" not in judged(known, lambda K, v, m: K[:2]).sentence
 
 
+def test_a_kind_of_cases_is_called_wrong_only_where_none_of_it_is_right():
+    some = cases(np.random.default_rng(1))
+    kinds = [Case("strong", *case) for case in some[:2]] + [Case("weak", *case) for case in some[2:]]
+    known = Exercise(scaled, ("a", "b", "c"), "N m", lambda rng: kinds)
+
+    def off_in(places):
+        def answer(K, v, m):
+            place = next(k for k, case in enumerate(kinds) if np.array_equal(v, case[1]))
+            return scaled(K, v, m) + np.sin(1e3 * v) * (place in places)
+
+        return judged(known, answer).sentence
+
+    assert off_in({2, 3, 4}).startswith("it is right in 2 of 5 cases, and wrong for weak; ")
+    assert off_in({2, 4}).startswith("it is right in 3 of 5 cases; ")
+
+
 @pytest.mark.parametrize("name", ["04.lean_law", "05.dead_encoder", "10.spare_law", "11.one_law"])
 def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
     """It is no run that the machine lost."""
