@@ -224,6 +224,8 @@ ANSWERS = {
         ("wrong", "in mm", scaled(tasks.model_error, 1e3), "1000"),
         ("wrong", "exchanged", lambda r, m, *rest: tasks.model_error(m, r, *rest), "exchanged"),
         ("wrong", "no velocity", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, 0 * v, a, K), "velocity"),
+        ("wrong", "C - C_hat", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, -v, a, K), "masses"),
+        ("wrong", "C xd / 2", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v / 2, a, K), "masses"),
         ("wrong", "no acceleration", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v, 0 * a, K), "accel"),
         ("wrong", "at rest", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, 0 * qd, v, a, K), ""),
         ("wrong", "zero", lambda r, m, q, *rest: np.zeros((len(q), 2)), "zero"),
