@@ -86,6 +86,7 @@ ANSWERS = {
         ("close", "only three drives", null_vector_of_three),
         ("wrong", "squares", lambda r, q, g: ((q - best(r, q, g)) ** 2).sum(axis=1), "root"),
         ("wrong", "largest entry", lambda r, q, g: np.abs(q - best(r, q, g)).max(axis=1), "largest"),
+        ("wrong", "mean size", lambda r, q, g: np.abs(q - best(r, q, g)).mean(axis=1), "averaged"),
         ("wrong", "sum", lambda r, q, g: np.abs(q - best(r, q, g)).sum(axis=1), "added"),
         ("wrong", "root mean square", lambda r, q, g: np.sqrt(((q - best(r, q, g)) ** 2).mean(axis=1)), "mean"),
         ("wrong", "all entries", lambda r, q, g: q - best(r, q, g), "size"),
