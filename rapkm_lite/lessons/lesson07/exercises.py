@@ -109,7 +109,7 @@ EXERCISES = {
         points=10.0,
         mistakes={
             "these are equal distances, which waste points where the edge is quiet": (
-                lambda answer: 0 < len(shares := tasks.chosen(answer)) and np.ptp(np.diff([0, *shares, 1])) < 1e-3
+                lambda answer: 0 < len(shares := tasks.chosen(answer)) and np.ptp(np.diff([0, *shares, 1])) < 5e-3
             ),
             "the density should grow with the square root of the demand, not with the demand itself": (
                 lambda answer: tasks.as_dense_as_the_demand(tasks.chosen(answer))
