@@ -505,6 +505,29 @@ def test_the_one_number_of_a_log_of_one_place_has_the_sign_of_eta_which_is_ours_
         assert lesson03.refusal(answer).word == "ok"
 
 
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("07.via_points", ["at most nine shares", "more than 15 mN m"]),
+        ("09.quiet_gears", ["4 and 85 mN m", "below 14 J", "below 0.1 mm"]),
+        ("11.one_law", ["at most **4 J**", "more than **3 mN m**", "more than **2.6 mm**", "at most **10.5 J**"]),
+    ],
+)
+def test_a_design_is_judged_by_the_limits_that_its_lesson_asks_for(name, asked):
+    cells = teaching.lessons()[name[:2]].cells
+    text = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    assert all(words in text for words in asked)
+    limits = {(f"{m.limit:.4g}", m.unit) for m in exercises()[name].judge(exercises()[name].reference)}
+    told = re.findall(r"([\d.]+)\** (mN m|mm|J)", " ".join(asked).replace("4 and", "4 mN m and"))
+    assert limits == {*told, *([("9", "in all")] if name == "07.via_points" else [])}
+
+
+def test_equal_distances_press_with_almost_30_mN_m():
+    """So lesson 07 says before its design, of nine via points on the edge."""
+    count, most = lesson07.quarrel(lambda part, demand: np.linspace(0, 1, 11)[1:-1])
+    assert count.value == 9 and most.unit == "mN m" and 29 < most.value < 30
+
+
 def test_a_drive_of_the_carriage_may_not_be_overloaded_for_a_moment():
     """A short push of 90 mN m makes hardly any heat, keeps all signs and the path: the limit of torque forbids it."""
 
