@@ -101,6 +101,7 @@ ANSWERS = {
             "guess",
         ),
         ("wrong", "nothing", lambda r, q, g: np.zeros(len(q)), "zero"),
+        ("wrong", "always the testbed", lambda r, q, g: tasks.contradiction(rk.load(), q, g), "three different arms"),
     ],
     "07.delay_torque": [
         ("right", "reference", tasks.delay_torque),

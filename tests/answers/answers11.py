@@ -182,6 +182,7 @@ GAINS = [
     ("wrong", "each pose", lambda r, q, w: w**2 / shares(r, q).min(axis=1), "shape"),
     ("wrong", "K_D", lambda r, q, w: 2 * gain(r, q, w) / w, "factor omega"),
     ("close", "three drives", lambda r, q, w: w**2 / (shares(r, q).min() * 3 / r.n_arms)),
+    ("wrong", "always the testbed", lambda r, q, w: gain(rk.load(), q, w), "unequal arms"),
     ("wrong", "3/7 everywhere", lambda r, q, w: w**2 * 7 / 3, "centroid"),
     ("wrong", "matrix", lambda r, q, w: rk.effective_gain(rk.orthogonal_complement(r, q), driven(r)), "shape"),
 ]
@@ -210,6 +211,7 @@ ANSWERS = {
             lambda *c: np.sort(np.sqrt(np.linalg.eigvals(terms(*c)[0] @ terms(*c)[1]).real)) / 2 / np.pi,
             "inverted",
         ),
+        ("wrong", "always the testbed", lambda r, q, K: right(rk.load(), q, K), "unequal arms"),
         ("wrong", "both the same", lambda *case: np.full(2, right(*case).mean()), ""),
         ("wrong", "kHz", scaled(right, 1e-3), "1000"),
         ("wrong", "zero", lambda *case: np.zeros(2), "zero"),
