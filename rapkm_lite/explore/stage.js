@@ -236,9 +236,8 @@ function line(panel, { points }, style) {
 
 /** Closed rings of pixels, filled and with an edge. */
 function area(panel, path, style) {
-  const { ctx, theme } = panel;
-  trace(ctx, path, true);
-  Object.assign(ctx, { fillStyle: theme.colour(style.face, true) ?? "transparent" }).fill("evenodd");
+  trace(panel.ctx, path, true);
+  Object.assign(panel.ctx, { fillStyle: panel.theme.colour(style.face, true) ?? "transparent" }).fill("evenodd");
   stroke(panel, path, style, true);
 }
 
@@ -527,8 +526,9 @@ export default {
   render({ model, el }) {
     const send = (message) => { try { model.send(message); } catch { /* the kernel has gone */ } };
     const link = { send, receive: (callback) => model.on("msg:custom", callback) };
-    const leave = mount(el, model.get("scene"), link);
-    model.on("comm_live_update", () => leave.say("The kernel has gone: run the cell again."));
-    return leave;
+    const leave = mount(el, model.get("scene"), link), end = model.widget_manager?.kernel?.disposed;
+    const over = () => leave.say("The kernel has gone: run the cell again.");
+    model.on("comm_live_update", over), end?.connect(over); // a restart tells the model, a shut-down only the kernel
+    return () => (end?.disconnect(over), leave());
   },
 };

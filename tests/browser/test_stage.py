@@ -368,9 +368,10 @@ def test_two_views_stay_in_step(shown):
     assert notebook.ask("() => stage.drawn(0) - stage.drawn(1)") <= 2
 
 
-def test_restarted_kernel_leaves_the_picture_and_says_so(shown):
+@pytest.mark.parametrize("end", ["restartKernel", "shutdown"])
+def test_kernel_that_goes_leaves_the_picture_and_says_so(end, shown):
     notebook = shown("prestress", alone=True)
-    notebook.ask("() => jupyterapp.shell.currentWidget.sessionContext.restartKernel()")
+    notebook.ask("end => jupyterapp.shell.currentWidget.sessionContext[end]()", end)
     notebook.wait("() => /run the cell again/.test(stage.root().querySelector('.rapkm-note').textContent)", 20)
     assert min(notebook.ask("() => stage.colours()")) > 10
 
