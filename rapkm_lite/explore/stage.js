@@ -342,12 +342,12 @@ export function mount(el, scene, link) {
   stage.style.setProperty("--shape", scene.size.join(" / "));
   const panels = Object.entries(scene.panels).map(([name, spec]) => new Panel(name, spec, stage));
   const known = { styles: {}, images: {} }, knobs = [], open = new Set(), me = Math.random().toString(36).slice(2);
-  const state = { fixed: [], marks: [], handles: [], frames: null, places: {}, drawn: 0 };
+  const state = { fixed: null, marks: [], handles: [], frames: null, places: {}, drawn: 0 };
   let held = null, rest = 0, seq = 0, waiting = { to: {}, by: {} }, look = null;
 
   // Sizes and colours are noted when they are new: whoever asks for them at every step lays out the page every time.
   function paint(renewed = !look) {
-    if (!state.frames || (renewed && !root.clientWidth)) return;
+    if (!state.fixed || (renewed && !root.clientWidth)) return;
     if (renewed) {
       const style = getComputedStyle(root), floor = parseFloat(style.getPropertyValue("--least")) || 12;
       look = { theme: themeOf(root), floor, base: parseFloat(style.fontSize), family: style.fontFamily };
@@ -400,7 +400,7 @@ export function mount(el, scene, link) {
     const marks = message.marks && decode(message, buffers, known);
     state.frames = message.frames ?? state.frames;
     if (message.kind === "fixed") state.fixed = marks;
-    if (message.kind === "picture") show(message, marks);
+    if (message.kind === "picture" && state.fixed) show(message, marks); // an earlier one is for other views
     pump();
   }
   function show(message, marks) {

@@ -4,10 +4,12 @@ import inspect
 import json
 
 import nbformat
+import numpy as np
 import pytest
 from lab import Notebook
 
 from rapkm_lite import explore
+from rapkm_lite.figures.marks import encode
 
 NAMES = sorted(
     name
@@ -366,6 +368,29 @@ def test_two_views_stay_in_step(shown):
         still(notebook)
         assert notebook.ask("() => stage.places(0)") == notebook.ask("() => stage.places(1)")
     assert notebook.ask("() => stage.drawn(0) - stage.drawn(1)") <= 2
+
+
+def test_view_that_is_new_waits_for_what_was_told_before(browser):
+    """A picture on its way to older views names a map that the new one does not know; "fixed" comes with all."""
+    machine, told = explore.machine(), {}
+    marks = [machine.picture.fixed, machine.picture.marks, machine.picture.marks]
+    messages = []
+    for kind, shown in zip(("fixed", "picture", "picture"), marks, strict=True):
+        header, buffers = encode(machine.picture, shown, told)
+        messages.append([{"kind": kind} | header, [np.frombuffer(b, "<f4").tolist() for b in buffers]])
+    assert messages[1][0]["images"] and not messages[2][0]["images"]
+    mounted = """async ([source, scene, messages]) => {
+        const { mount } = await import(URL.createObjectURL(new Blob([source], { type: "text/javascript" })));
+        let receive;
+        mount(document.body, scene, { send: () => {}, receive: (callback) => (receive = callback) });
+        return messages.map(([message, numbers]) => {
+            receive(message, numbers.map((n) => Float32Array.from(n)));
+            return Number(document.querySelector(".rapkm").dataset.drawn ?? 0);
+        }); }"""
+    page = browser.new_page()
+    source, scene = machine.canvas._esm, machine.canvas.scene
+    assert page.evaluate(mounted, [source, scene, messages[2:] + messages]) == [0, 0, 1, 2]
+    page.close()
 
 
 @pytest.mark.parametrize("end", ["restartKernel", "shutdown"])
