@@ -263,8 +263,7 @@ function image(panel, { points, words: [key, palette], images }) {
   const now = [key, width, height, theme.dark].join();
   if (panel.map.key !== now) {
     const canvas = make("canvas", { width, height }), picture = ctx.createImageData(width, height);
-    const out = new Uint32Array(picture.data.buffer), bounds = palette.levels;
-    const colours = palette[theme.dark ? "dark" : "light"].map(rgb);
+    const out = new Uint32Array(picture.data.buffer), colours = palette[theme.dark ? "dark" : "light"].map(rgb);
     const packed = colours.map(([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0);
     const place = (k, n, count) => Math.min(Math.max(((k + 0.5) / n) * count - 0.5, 0), count - 1.000001);
     for (let j = 0; j < height; j++) {
@@ -275,7 +274,7 @@ function image(panel, { points, words: [key, palette], images }) {
         const low = values[at] + a * (values[at + 1] - values[at]);
         const value = low + (v % 1) * (values[over] + a * (values[over + 1] - values[over]) - low);
         let level = packed.length - 1;
-        while (level > 0 && value < bounds[level]) level--;
+        while (level > 0 && value < palette.levels[level]) level--;
         if (!Number.isNaN(value)) out[j * width + i] = packed[level];
       }
     }
@@ -510,10 +509,11 @@ export function mount(el, scene, link) {
 }
 
 /** Page up and down turn the screens of a dashboard, also on a slider; all pictures listen, the first one acts.
-    Saving and other shortcuts with a letter go on to JupyterLab, but for those that edit a text. */
+    Running a cell, saving and other shortcuts with a letter, but for those that edit a text, go on to JupyterLab. */
 function page(event) {
   const letter = (event.ctrlKey || event.metaKey) && /^[bd-uw]$/i.test(event.key);
-  const shut = letter && event.target.closest?.(".rapkm-explorer [data-lm-suppress-shortcuts]");
+  const run = event.key === "Enter" && (event.ctrlKey || event.shiftKey || event.altKey);
+  const shut = (letter || run) && event.target.closest?.(".rapkm-explorer [data-lm-suppress-shortcuts]");
   if (shut) delete shut.dataset.lmSuppressShortcuts, setTimeout(() => (shut.dataset.lmSuppressShortcuts = "true"));
   const screens = [...document.querySelectorAll(".rapkm-screen")].filter((screen) => screen.getClientRects().length);
   const way = { PageDown: 1, PageUp: -1 }[event.key], written = event.target.closest?.("textarea, .cm-content");
@@ -525,10 +525,10 @@ function page(event) {
 export default {
   render({ model, el }) {
     const send = (message) => { try { model.send(message); } catch { /* the kernel has gone */ } };
-    const link = { send, receive: (callback) => model.on("msg:custom", callback) };
-    const leave = mount(el, model.get("scene"), link), end = model.widget_manager?.kernel?.disposed;
+    const leave = mount(el, model.get("scene"), { send, receive: (callback) => model.on("msg:custom", callback) });
     const over = () => leave.say("The kernel has gone: run the cell again.");
-    model.on("comm_live_update", over), end?.connect(over); // a restart tells the model, a shut-down only the kernel
+    const end = model.widget_manager?.kernel?.disposed; // a restart tells the model, a shut-down only the kernel
+    model.on("comm_live_update", over), end?.connect(over);
     return () => (end?.disconnect(over), leave());
   },
 };

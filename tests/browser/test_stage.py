@@ -443,6 +443,16 @@ def test_saving_is_saving_wherever_the_focus_is(part, shown):
         assert still(notebook)["x"] == x + 2
 
 
+@pytest.mark.parametrize("part", [".noUi-handle", ".rapkm-control select", ".rapkm-knob", ".rapkm-foot button"])
+def test_cell_is_run_wherever_the_focus_is(part, shown):
+    """As with any slider of ipywidgets: Ctrl+Enter runs the selected cell."""
+    notebook = shown("machine")
+    notebook.ask("() => (window.ran = lab.cells().map(c => c.execution_count).join())")
+    notebook.page.locator(part).first.focus()
+    notebook.page.keyboard.press("Control+Enter")
+    notebook.wait("() => lab.idle() && lab.cells().map(c => c.execution_count).join() !== ran", 20)
+
+
 def typed(notebook, text, i=0):
     """Write a number beside a slider in place of the one that stands there."""
     notebook.page.locator(".widget-readout").nth(i).click()
