@@ -526,7 +526,7 @@ export default {
   render({ model, el }) {
     const send = (message) => { try { model.send(message); } catch { /* the kernel has gone */ } };
     const leave = mount(el, model.get("scene"), { send, receive: (callback) => model.on("msg:custom", callback) });
-    const over = () => leave.say("The kernel has gone: run the cell again.");
+    const over = () => leave.say("The kernel has gone: run the cell again; without cells, load the page again.");
     const end = model.widget_manager?.kernel?.disposed; // a restart tells the model, a shut-down only the kernel
     model.on("comm_live_update", over), end?.connect(over);
     return () => (end?.disconnect(over), leave());
