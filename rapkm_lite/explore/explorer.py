@@ -149,12 +149,10 @@ class Explorer:
         """Show it as one screen of a projector: a question, the controls beside the picture, the answer on demand."""
         bar, canvas = self.widget.children
         bar.layout.grid_template_columns = "minmax(0, 1fr)"
-        show = widgets.ToggleButton(description="Show the answer", layout={"width": "auto"})
-        said = widgets.HTML(f"<p>{answer}</p>", layout={"display": "none"})
-        show.observe(lambda change: setattr(said.layout, "display", "block" if change["new"] else "none"), "value")
-        show.observe(
-            lambda change: setattr(show, "description", f"{('Show', 'Hide')[change['new']]} the answer"), "value"
-        )
+        show = widgets.ToggleButton(layout={"width": "auto"})
+        said = widgets.HTML(f"<p>{answer}</p>")
+        traitlets.dlink((show, "value"), (said.layout, "display"), lambda on: "block" if on else "none")
+        traitlets.dlink((show, "value"), (show, "description"), lambda on: f"{'Hide' if on else 'Show'} the answer")
         beside = widgets.VBox([bar, show, said], layout={"flex": "0 0 300px"})
         self.widget.children = [widgets.HTML(f"<h2>{question}</h2>"), widgets.HBox([beside, canvas])]
         self.widget.add_class("rapkm-screen")
