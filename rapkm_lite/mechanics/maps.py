@@ -128,16 +128,8 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
 
 
 def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    """Smallest singular value of the rows of A~, which are those of A L^-T with the Cholesky factor F^T F = L L^T."""
-    F = at(robot, q).F
-    f, g = F[..., 0], F[..., 1]
-    l11 = np.sqrt((f * f).sum(-1))
-    l21 = (f * g).sum(-1) / l11
-    u = F[..., drives, 0] / l11[..., None]
-    rest = g - f * (l21 / l11)[..., None]
-    l22 = np.sqrt((rest * rest).sum(-1))
-    v = rest[..., drives] / l22[..., None]
-    return singular_values(np.stack([u, v], axis=-1))[..., 1]
+    """Smallest singular value of the rows of A~ = Q_a Q^T, with the columns of F made orthonormal in Q."""
+    return singular_values(np.linalg.qr(at(robot, q).F).Q[..., drives, :])[..., 1]
 
 
 def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
