@@ -54,33 +54,24 @@ def magnified(factor: float, dt: float) -> str:
     return f"doubles an error in {math.log(2.0) / math.log(factor):.3g} samples of {dt:g} s"
 
 
-def swinging(c: np.ndarray) -> float:
-    """How much larger torques (k, N) became within the last dozen samples of a run, if they swung to and fro there.
+def swung(c: np.ndarray, dt: float) -> str:
+    """The sentence on torques (k, N) that swung to and fro within the last dozen samples of a run and grew there.
 
-    The largest ones of the second half over those of the first; 0 where less than a quarter of the signs changed.
+    By more than half, the largest ones of the second half over those of the first; empty where they did not, or where
+    less than a quarter of the signs changed.
 
-    >>> swinging((-2.0) ** np.arange(12)[:, None]), swinging(2.0 ** np.arange(12)[:, None])
-    (64.0, 0.0)
+    >>> swung((-2.0) ** np.arange(12)[:, None], 1e-3), swung(2.0 ** np.arange(12)[:, None], 1e-3)
+    ('unstable gain: in the end the torques swung to and fro within 12 samples of 0.001 s and grew 64-fold', '')
     """
     last = c[-12:]
     half = len(last) // 2
     if half == 0:
-        return 0.0
+        return ""
     drive = last[:, np.abs(last).max(axis=0).argmax()]
     changes, first = np.count_nonzero(np.sign(drive[1:]) * np.sign(drive[:-1]) < 0.0), np.abs(drive[:half]).max()
-    return float(np.abs(drive[half:]).max() / first) if changes >= max(1, len(last) // 4) and first > 0.0 else 0.0
-
-
-def swung(c: np.ndarray, dt: float) -> str:
-    """The sentence on torques (k, N) that swung so and grew by more than half; empty where they did not.
-
-    >>> swung((-2.0) ** np.arange(12)[:, None], 1e-3)
-    'unstable gain: in the end the torques swung to and fro within 12 samples of 0.001 s and grew 64-fold'
-    """
-    grown = swinging(c)
-    within = f"within {min(len(c), 12)} samples of {dt:g} s"
-    end = f"in the end the torques swung to and fro {within} and grew {grown:.3g}-fold"
-    return f"unstable gain: {end}" if grown > 1.5 else ""
+    grown = np.abs(drive[half:]).max() / first if changes >= max(1, len(last) // 4) and first > 0.0 else 0.0
+    end = f"the torques swung to and fro within {len(last)} samples of {dt:g} s and grew {grown:.3g}-fold"
+    return f"unstable gain: in the end {end}" if grown > 1.5 else ""
 
 
 def inner_law(law):
