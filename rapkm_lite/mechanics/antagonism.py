@@ -105,7 +105,13 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
     >>> rk.null_vector(robot, q).round(3)
     array([0.384, 0.711, 0.59 ])
     """
-    n, levers = null_direction(robot, q), cores.levers(robot.tree, at(robot, q)._v)
+    if manipulator(robot).n_arms != 3:
+        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (null_basis takes any number)")
+    pose = at(robot, q)
+    _ = pose._closed
+    d = pose.d / robot.lengths[:, 1:]
+    levers = cross(pose.a, d)
+    n = levers * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
     size = np.linalg.norm(n, axis=-1, keepdims=True)
     if np.any(size < 1e-12 * robot.lengths[:, 0].max()):
         raise ValueError(
@@ -113,16 +119,6 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
             "poses with degree of actuation 2"
         )
     return n / (size * np.where(levers < 0.0, -1.0, 1.0).prod(axis=-1, keepdims=True))
-
-
-def null_direction(robot: Manipulator, q) -> np.ndarray:
-    """The numerators (a_i x d_i) (d_j x d_k) of `null_vector`, (..., 3) in m, d of unit length; zero where it fails."""
-    if manipulator(robot).n_arms != 3:
-        raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 (null_basis takes any number)")
-    pose = at(robot, q)
-    _ = pose._closed
-    d = pose.d / robot.lengths[:, 1:]
-    return cross(pose.a, d) * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
 
 
 def common_sign(A) -> np.ndarray:

@@ -94,15 +94,10 @@ def check_tangent(tree: Tree, J: np.ndarray, qd: np.ndarray) -> None:
         )
 
 
-def levers(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """a_i x d_i = l1 l2 sin(elbow angle), (..., N)."""
-    N, n = tree.N, tree.n
-    return v[..., :N] * v[..., n + N :] - v[..., n : n + N] * v[..., N:n]
-
-
 def inner_levers(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """`levers`, after a check that no arm is stretched or folded; one for each entry of v, (..., 4N)."""
-    lever = levers(tree, v)
+    """a_i x d_i = l1 l2 sin(elbow angle), once for each entry of v, (..., 4N); no arm may be stretched or folded."""
+    N, n = tree.N, tree.n
+    lever = v[..., :N] * v[..., n + N :] - v[..., n : n + N] * v[..., N:n]
     small = np.abs(lever) < tree.edge
     if small.any():
         arm = np.argwhere(small)[0][-1]
