@@ -13,7 +13,7 @@ from ..control.sample import Controller, NoPose
 from ..machine.arguments import short
 from .compiled import DONE, LAW_FAILED, LEFT_WORKSPACE, NO_POSE, Plant
 from .sensors import Encoders
-from .setup import Outcome, Setup, blank
+from .setup import Outcome, Setup
 
 LOST = 1e9
 """Rates in rad/s that say that the machine was lost in the hold before; what a law makes of them is not its fault."""
@@ -40,7 +40,9 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
     controller = Controller(law, model, trajectory.dt)
     controller.nearest, controller.smooth = plant.nearest, sensors.count is None
-    x, xd, q_a, qd_a, c, pairs = history = blank(len(trajectory), robot.n_arms)
+    samples, N = len(trajectory), robot.n_arms
+    history = *(np.zeros((samples, size)) for size in (2, 2, N, N, N)), np.full((samples, 2), -1)
+    x, xd, q_a, qd_a, c, pairs = history
     times, dt = trajectory.t.tolist(), trajectory.dt
     state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
     last = len(times) - 1

@@ -89,11 +89,6 @@ def _reach(robot: Manipulator, x: float, y: float) -> None:
     inverse_kinematics(robot, [x, y])
 
 
-def blank(samples: int, N: int) -> tuple[np.ndarray, ...]:
-    """Room for the history of a run: x, xd, q_a, qd_a, c and pairs of an `Outcome`."""
-    return *(np.zeros((samples, size)) for size in (2, 2, N, N, N)), np.full((samples, 2), -1)
-
-
 def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=None, faults=()) -> Setup:
     """The one check of the arguments of `simulate` and `sweep`.
 
