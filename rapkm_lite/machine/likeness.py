@@ -63,8 +63,6 @@ def _equal_arrays(a, b) -> bool:
     if masked(a) or masked(b):
         masks = np.array_equal(np.ma.getmaskarray(a), np.ma.getmaskarray(b))
         return masks and _equal_arrays(np.ma.filled(a, 0), np.ma.filled(b, 0))
-    if a is None or b is None:
-        return False
     try:
         a, b = np.asarray(a), np.asarray(b)
         return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc" and b.dtype.kind in "fc")
