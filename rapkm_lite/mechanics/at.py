@@ -263,8 +263,7 @@ def at(robot: Manipulator, q, qd=None) -> At:
         if qd.shape != q.shape:
             check_leading(q=q.shape[:-1], qd=qd.shape[:-1])
     pose = object.__new__(At)
-    fields = pose.__dict__
-    fields["robot"], fields["q"], fields["qd"], fields["independent"] = robot, q, qd, None
+    pose.__dict__.update(robot=robot, q=q, qd=qd, independent=None)
     return pose
 
 
