@@ -19,20 +19,9 @@ from ..mechanics.antagonism import null_vector
 from ..mechanics.kinematics import cross, inverse_kinematics, working_modes
 from ..mechanics.trajectory import circle
 from ..simulation.energy import copper_loss
+from . import shared
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import (
-    central_triangle,
-    draw_forces,
-    force_panel,
-    frictionless,
-    held_machine,
-    length_slider,
-    over_time,
-    place_sliders,
-    ready_made,
-    size,
-)
 
 # Smallest singular value, in rad/m on the testbed, below which a number is marked; its centroid has 6.5.
 WEAK = 1.5
@@ -44,16 +33,16 @@ MAP = marks.Palette(
 )
 
 
-@ready_made
+@shared.ready_made
 def machine(robot: Manipulator | None = None) -> Explorer:
     """The end-effector by hand in every working mode, a map of sigma_min, and the five-bar of each pair.
 
     >>> machine().numbers["degree of actuation"]
     '2 of 2 (redundantly actuated)'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     # A goes with one over the lengths.
-    times = size(robot)
+    times = shared.size(robot)
     palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
     pairs = act.drive_pairs(robot)[:3]
     modes = {mode_name(m): m for m in working_modes(robot)}
@@ -81,7 +70,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, palette, clip=outline)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
-        point, q, _ = held_machine(picture, "machine", robot, x, y, modes[mode])
+        point, q, _ = shared.held_machine(picture, "machine", robot, x, y, modes[mode])
         for curve in curves(mode, which[drives]) if which[drives] else ():
             picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
             picture.line("machine", *curve.T, **pair_line(robot, which[drives]) | {"linewidth": 2.2}, zorder=2)
@@ -109,7 +98,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
     small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | bare
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
-    controls = place_sliders(robot, 20, 30) | {
+    controls = shared.place_sliders(robot, 20, 30) | {
         "mode": choice("working mode", modes),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
@@ -118,20 +107,20 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.0), setup=scale, live=True)
 
 
-@ready_made
+@shared.ready_made
 def actuation(robot: Manipulator | None = None) -> Explorer:
     """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce.
 
     >>> actuation().numbers["σ_min of all drives"]
     '4.62 rad/m'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     pairs = act.drive_pairs(robot)
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
         if path == "triangle":
-            t = central_triangle(robot, size, dt=0.01)
+            t = shared.central_triangle(robot, size, dt=0.01)
         else:
             t = circle(robot, 5e-4 * size, dt=0.01, centre=marks.middle(robot))
         A = act.control_matrix(robot, t.q)
@@ -163,7 +152,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         for panel in ("sigma", "null"):
             picture.line(panel, [place, place], picture.ylim(panel), color=NEUTRAL, linewidth=0.8, zorder=1)
             picture.handle(panel, place, None, place=(1, 0))
-        picture.fit("force", draw_forces(picture, A[k], torque))
+        picture.fit("force", shared.draw_forces(picture, A[k], torque))
         picture.limits("force", x=picture.ylim("force"))
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
@@ -174,19 +163,19 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             "null vector": marks.per_drive(null[k], 2),
         }
 
-    drives = marks.drive_lines(robot)
+    drives, whole = marks.drive_lines(robot), [("all drives", {"color": AFTER})]
     way = {"xlabel": "place on the path in %", "xlim": (0, 100)}
     measures = {"title": "Pairs", "ylabel": "σ_min in rad/m", "legend": marks.pair_lines(robot)}
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "sigma": way | measures | {"ylim": (0, 8 / size(robot))},
+        "sigma": way | measures | {"ylim": (0, 8 / shared.size(robot))},
         "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
-        "force": force_panel(2 / size(robot)) | {"title": "Forces", "legend": [("all drives", {"color": AFTER})]},
+        "force": shared.force_panel(2 / shared.size(robot)) | {"title": "Forces", "legend": whole},
     }
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
         "path": choice("path", ["triangle", "circle"]),
-        "size": length_slider(robot, "side or diameter in mm", 40, 320, 5, 240),
+        "size": shared.length_slider(robot, "side or diameter in mm", 40, 320, 5, 240),
         "torque": slider("torque limit in mN m", 20, 200, 5, 85),
     }
     layout = [["plane", "sigma"], ["force", "null"]]
@@ -194,18 +183,18 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, widths=[1, 1.35], size=(9.2, 6.6), setup=space, live=True)
 
 
-@ready_made
+@shared.ready_made
 def prestress(robot: Manipulator | None = None) -> Explorer:
     """Prestress along the path: torques with and without it, and the changes of sign that let backlash act.
 
     >>> prestress().set(level=0).numbers["largest prestress"]
     '0 mN m'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
 
     @lru_cache(maxsize=8)
     def along(side: int):
-        t = central_triangle(robot, side, dt=0.005)
+        t = shared.central_triangle(robot, side, dt=0.005)
         A = act.control_matrix(robot, t.q)
         return t, act.inverse_dynamics(robot, t.q, t.qd, t.qdd), act.prestress_projector(A)
 
@@ -226,11 +215,11 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
         }
 
-    torque = over_time("torque in mN m", robot=robot, ylim=(-100, 100))
+    torque = shared.over_time("torque in mN m", robot=robot, ylim=(-100, 100))
     panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
-        "side": length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
+        "side": shared.length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
     }
     return explorer(draw, controls, panels, live=True)
 

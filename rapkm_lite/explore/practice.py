@@ -19,21 +19,9 @@ from ..mechanics.trajectory import triangle
 from ..simulation.energy import antagonistic_energy, antagonistic_torque, copper_loss
 from ..simulation.faults import DeadDrive, EncoderDropout, TorqueLimit
 from ..simulation.runs import SimulationError, simulate
+from . import shared
 from .controls import choice, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import (
-    beyond,
-    carried,
-    central_triangle,
-    distance_panels,
-    draw_distance,
-    frictionless,
-    gain_slider,
-    over_time,
-    ready_made,
-    size,
-    usual_gains,
-)
 
 FAULTS = {
     "nothing": [],
@@ -44,7 +32,7 @@ FAULTS = {
 OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, kg/m
 
 
-@ready_made
+@shared.ready_made
 def imperfections(robot: Manipulator | None = None) -> Explorer:
     """Distance from the wanted place and torques that act, with links too long, weak drives and one fault.
 
@@ -52,9 +40,9 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = central_triangle(robot, 120 * size(robot), duration=2.5, dt=2e-3)
+    path = shared.central_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
     needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
-    usual = usual_gains(robot)
+    usual = shared.usual_gains(robot)
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
 
     def draw(picture, longer, K_P, limit, fault, filter):
@@ -67,7 +55,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
             if error.partial is None:
                 raise
             run, lost = error.partial, f", lost at {error.time:.2f} s"
-        off, torque = draw_distance(picture, run, (1.0, 20.0))
+        off, torque = shared.draw_distance(picture, run, (1.0, 20.0))
         if lost:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
@@ -79,24 +67,24 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
     controls = {
         "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
-        "K_P": gain_slider(robot, low=2.0),
+        "K_P": shared.gain_slider(robot, low=2.0),
         "limit": slider("torque limit in mN m", 40 * strong, 400 * strong, 10 * strong, 150 * strong),
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),
     }
-    return explorer(draw, controls, distance_panels(robot, 2.5, "torque that acts in mN m"), size=(9.2, 3.8))
+    return explorer(draw, controls, shared.distance_panels(robot, 2.5, "torque that acts in mN m"), size=(9.2, 3.8))
 
 
-@ready_made
+@shared.ready_made
 def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """Distance from the wanted place and torques under a law of choice, with offsets, a payload and coarse encoders.
 
     >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
     '1.19 mm'
     """
-    robot = frictionless(robot)
-    path = central_triangle(robot, 120 * size(robot), duration=2.5)
-    mass = carried(robot)
+    robot = shared.frictionless(robot)
+    path = shared.central_triangle(robot, 120 * shared.size(robot), duration=2.5)
+    mass = shared.carried(robot)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
         "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),
@@ -111,7 +99,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
         w, offset = 2 * np.pi * frequency, marks.offset_values(offsets, robot.n_arms)
         sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
         run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
-        off, torque = draw_distance(picture, run, (2.0, 60.0))
+        off, torque = shared.draw_distance(picture, run, (2.0, 60.0))
         return {
             "largest error": f"{off.max():.2f} mm",
             "largest jump of a torque": f"{np.abs(np.diff(torque, axis=0)).max():.1f} mN m",
@@ -124,7 +112,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
         "load": slider("unknown payload in g", 0, 200, 20, 0),
         "coarse": switch("2000 counts per turn"),
     } | offset_sliders(robot, (4.0, -2.0, 5.0), 10)
-    return explorer(draw, controls, distance_panels(robot, 2.5), size=(9.2, 3.8))
+    return explorer(draw, controls, shared.distance_panels(robot, 2.5), size=(9.2, 3.8))
 
 
 def _nearest(lengths, low: int, high: int) -> int:
@@ -132,7 +120,7 @@ def _nearest(lengths, low: int, high: int) -> int:
     return int(np.clip(5 * round(200 * float(np.mean(lengths))), low, high))
 
 
-@ready_made
+@shared.ready_made
 def own_machine(robot: Manipulator | None = None) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
 
@@ -142,7 +130,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     N, centre = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - centre
     away = np.linalg.norm(along, axis=1)
@@ -172,7 +160,7 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         for panel, torque in (("moving", moving), ("pressing", pressing)):
             marks.traces(picture, panel, path.t, 1e3 * torque)
             picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=most)
-            beyond(picture, panel, 1e3 * torque)
+            shared.beyond(picture, panel, 1e3 * torque)
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
@@ -185,8 +173,8 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     wide = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "xlim": (left, right), "ylim": (low, high)}
     panels = {
         "machine": wide | {"legend": marks.drive_lines(robot)},
-        "moving": over_time("torque in mN m", title="Moves"),
-        "pressing": over_time("torque in mN m", title="Only presses"),
+        "moving": shared.over_time("torque in mN m", title="Moves"),
+        "pressing": shared.over_time("torque in mN m", title="Only presses"),
     }
     controls = {
         "radius": slider("base joints from the middle in mm", 200, 320, 5, _nearest(away, 200, 320)),

@@ -18,31 +18,20 @@ from ..mechanics.kinematics import cross, inverse_kinematics
 from ..mechanics.trajectory import hold, triangle
 from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
+from . import shared
 from .controls import offset_sliders
 from .explorer import Explorer, explorer
-from .shared import (
-    curves,
-    frictionless,
-    gain_slider,
-    held_machine,
-    length_slider,
-    over_time,
-    place_sliders,
-    ready_made,
-    size,
-    usual_gains,
-)
 
 
-@ready_made
+@shared.ready_made
 def steady_state(robot: Manipulator | None = None) -> Explorer:
     """Offsets and gains of each drive: the error at rest of theory (14) beside a simulation that settles there.
 
     >>> steady_state().numbers["rest torque"]
     '-23.6 / -23.4 / -23.6 mN m'
     """
-    robot = frictionless(robot)
-    N, usual = robot.n_arms, usual_gains(robot)
+    robot = shared.frictionless(robot)
+    N, usual = robot.n_arms, shared.usual_gains(robot)
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
@@ -50,7 +39,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         K_P = np.array([values[f"K_P_{i + 1}"] for i in range(N)])
         # Critical damping for the load that the gains are designed for: K_D^2 = 4 J K_P.
         K_D = usual[1] * np.sqrt(K_P / usual[0])
-        point, q, stop = held_machine(picture, "plane", robot, x, y)
+        point, q, stop = shared.held_machine(picture, "plane", robot, x, y)
         A = act.control_matrix(robot, q)
         weight = act.required_wrench(robot, q, 0 * q, 0 * q)
         theory = 1e3 * steady_state_error(A, K_P, offset, weight)
@@ -58,7 +47,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error, held = 1e3 * run.error, 1e3 * run.c[-1]
         moves = bool(np.abs(error[-1] - error[-100]).max() > 0.02 * np.abs(error).max())
-        curves(picture, "error", run.t, error, 1.0)
+        shared.curves(picture, "error", run.t, error, 1.0)
         for i in range(N):
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
         picture.fit("error", error, theory, least=1.0)
@@ -79,25 +68,25 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     both = [("theory", wide | {"alpha": 0.45}), ("simulated", wide)]
     panels = {
         "plane": plane_limits(robot, 0.05),
-        "error": over_time("angle error in mrad", 1.5, robot),
+        "error": shared.over_time("angle error in mrad", 1.5, robot),
         "rest": {"ylabel": "error at rest in mrad", "legend": both, **marks.drive_axis(N)},
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0))
-    controls |= {f"K_P_{i + 1}": gain_slider(robot, f"K_P {i + 1} in N m/rad") for i in range(N)}
-    controls |= place_sliders(robot, 0, 0)
+    controls |= {f"K_P_{i + 1}": shared.gain_slider(robot, f"K_P {i + 1} in N m/rad") for i in range(N)}
+    controls |= shared.place_sliders(robot, 0, 0)
     layout = [["plane", "error"], ["rest", "torque"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=space)
 
 
-@ready_made
+@shared.ready_made
 def three_opinions(robot: Manipulator | None = None) -> Explorer:
     """Where each drive wants the end-effector: drag a line, the triangle of disagreement closes, the torques vanish.
 
     >>> three_opinions().set(offset_2=0).numbers["distances from the lines"]
     '0.65 / 0.88 / 0.72 mm'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     N = robot.n_arms
 
     def draw(picture, x, y, K_P, **offsets):
@@ -147,34 +136,34 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
         }
 
-    seen = (-3 * size(robot), 3 * size(robot))
+    seen = (-3 * shared.size(robot), 3 * shared.size(robot))
     away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": seen, "ylim": seen}
     panels = {
         "opinions": away | {"aspect": "equal", "title": "Where each drive is content"},
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
-    controls |= {"K_P": gain_slider(robot)}
-    controls |= place_sliders(robot, 20, 30, -100, 100, 5, "desired ")
+    controls |= {"K_P": shared.gain_slider(robot)}
+    controls |= shared.place_sliders(robot, 20, 30, -100, 100, 5, "desired ")
     return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
 
 
-@ready_made
+@shared.ready_made
 def landscape(robot: Manipulator | None = None) -> Explorer:
     """Level lines of the antagonistic energy over two offsets, and the share of each principal direction.
 
     >>> landscape().numbers["antagonistic energy"]
     '2.83 J'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
 
     @lru_cache(maxsize=64)
     def form(side: int, shift: int) -> np.ndarray:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=marks.middle(robot) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    times = size(robot)
-    cost = usual_gains(robot)[0] ** 2 * np.trace(form(120 * times, 40 * times))  # J/mrad^2, where the controls start
+    times = shared.size(robot)
+    cost = shared.usual_gains(robot)[0] ** 2 * np.trace(form(120 * times, 40 * times))  # J/mrad^2, where controls start
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     digits = max(0, 2 - math.ceil(math.log10(2.0 * levels[0])))
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
@@ -237,8 +226,8 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     }
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
-        "K_P": gain_slider(robot, high=30.0),
-        "side": length_slider(robot, "side of the triangle in mm", 20, 240, 10, 120),
-        "shift": length_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40),
+        "K_P": shared.gain_slider(robot, high=30.0),
+        "side": shared.length_slider(robot, "side of the triangle in mm", 20, 240, 10, 120),
+        "shift": shared.length_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40),
     }
     return explorer(draw, controls, panels, size=(9.4, 3.8))
