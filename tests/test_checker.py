@@ -704,6 +704,24 @@ def test_a_row_is_no_column(axis, word):
     assert f"only {word} 2 (counted from 0) is wrong" in judged(exercise, wrong(np.cos)).sentence
 
 
+def test_a_sign_that_is_lost_in_some_places_of_a_row_is_not_that_of_the_row():
+    """One entry of a row, or an entry that is opposite in some cases only: "the sign of row 0" is not true."""
+
+    def flipped(M, v):
+        X = np.sin(M)
+        X[0, 1] *= -1.0
+        return X
+
+    def positive(K, v, m):
+        w = scaled(K, v, m)
+        return np.array([w[0], abs(w[1]), w[2]])
+
+    matrix = Exercise(lambda M, v: np.sin(M), ("a", "b", "c"), "m", systems)
+    for exercise, answer in ((matrix, flipped), (VECTOR, positive)):
+        said = judged(exercise, answer).sentence
+        assert said.startswith("the size of every entry is right, but some have the opposite sign")
+
+
 def test_a_deviation_counts_against_its_own_case_or_against_the_usual_one_if_that_is_larger():
     def sizes(rng):
         return [(np.array([size, 0.3 * size]),) for size in (1.0, 1.0, 1.0, 100.0)]

@@ -57,16 +57,16 @@ def sign(seen: Seen) -> str:
 
 
 def _some_signs(seen: Seen) -> str:
-    """Words for the rows, columns or entries that have the opposite sign."""
+    """Words for the rows, columns or entries that have the opposite sign throughout."""
     if seen.want[0].ndim == 0:
         return "the size is right, but in some cases the sign is opposite"
-    scale = max(map(largest, seen.want))
-    flipped = {
-        tuple(int(i) for i in place) for g, w, _ in seen for place in np.argwhere(np.abs(g - w) > seen.slack * scale)
-    }
+    limit = seen.slack * max(map(largest, seen.want))
+    flipped = [(np.abs(g - w) > limit, np.abs(2.0 * w) > limit) for g, w, _ in seen]
     for axis, word in ((0, "row"), (1, "column")) if seen.want[0].ndim == 2 else ((0, "entry"),):
-        hit = sorted({place[axis] for place in flipped})
-        if len(hit) < seen.want[0].shape[axis] and len(hit) <= 2:
+        lines = [(off.swapaxes(0, axis), can.swapaxes(0, axis)) for off, can in flipped]
+        hit = sorted({int(place[0]) for off, _ in lines for place in np.argwhere(off)})
+        whole = all(np.array_equal(off[i : i + 1], can[i : i + 1]) for off, can in lines for i in hit)
+        if whole and len(hit) < seen.want[0].shape[axis] and len(hit) <= 2:
             return f"the sign of {word} {' and '.join(str(i) for i in hit)} (counted from 0) is opposite"
     return "the size of every entry is right, but some have the opposite sign"
 
