@@ -722,6 +722,15 @@ def test_a_sign_that_is_lost_in_some_places_of_a_row_is_not_that_of_the_row():
         assert said.startswith("the size of every entry is right, but some have the opposite sign")
 
 
+@pytest.mark.parametrize("reference", [np.square, np.diag, lambda v: np.outer(v, v), lambda v: (v @ v) ** 2])
+@pytest.mark.parametrize("draw", ["uniform", "normal"])
+def test_a_right_answer_that_was_rounded_shows_no_mistake(reference, draw):
+    """Positive numbers have lost no sign, a symmetric matrix is not transposed, and no entry is the only one."""
+    exercise = Exercise(reference, ("a", "b", "c"), "m", lambda rng: [(v,) for v in getattr(rng, draw)(size=(4, 3))])
+    said = judged(exercise, lambda v: np.round(reference(v), 7))
+    assert said.word == "wrong" and said.sentence.startswith("it is off by up to "), said.sentence
+
+
 def test_a_deviation_counts_against_its_own_case_or_against_the_usual_one_if_that_is_larger():
     def sizes(rng):
         return [(np.array([size, 0.3 * size]),) for size in (1.0, 1.0, 1.0, 100.0)]

@@ -137,10 +137,12 @@ FITTED: tuple[Callable[[Seen], str], ...] = argument_factor, constant_factor, sh
 
 
 def named(seen: Seen, secret: bool = False) -> str:
-    """The first detector that explains all cases; an empty string when none does.
+    """The first detector that explains all cases; an empty string when none does, or when they show no mistake.
 
     secret : the words must not tell the right answer.
     """
+    if seen.same(seen.want):
+        return ""
     with np.errstate(all="ignore"):
         return next(filter(None, (detect(seen) for detect in PLAIN + (() if secret else FITTED))), "")
 
@@ -165,7 +167,7 @@ def _wrong_lines(seen: Seen) -> str:
     for axis in range(len(shape)):
         lines = wrong if wrong.ndim == 1 else wrong.any(axis=1 - axis)
         hit = [str(i) for i in itertools.compress(range(len(lines)), lines)]
-        if len(hit) < len(lines):
+        if 0 < len(hit) < len(lines):
             word = "entry" if wrong.ndim == 1 else ("row", "column")[axis]
             return f"only {word} {', '.join(hit)} (counted from 0) is wrong"
     return ""
