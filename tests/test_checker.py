@@ -603,7 +603,13 @@ def failing(got, *case):
     raise ValueError("no machine")
 
 
-@pytest.mark.parametrize("law", [failing, lambda got, *case: (np.nan, "gap")], ids=["raises", "is NaN"])
+def fails_first(got, K_P, v, limit):
+    return (np.nan, "gap") if limit == cases(np.random.default_rng(20_111_130))[0][2] else (0.0, "gap")
+
+
+@pytest.mark.parametrize(
+    "law", [failing, lambda got, *case: (np.nan, "gap"), fails_first], ids=["raises", "is NaN", "is NaN at first"]
+)
 def test_an_answer_is_not_right_where_its_law_cannot_be_computed(law):
     assert judged(Exercise(scaled, ("a", "b", "c"), "N m", cases, law), scaled).word == "wrong"
 

@@ -182,9 +182,10 @@ def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
                     number, text = exercise.invariant(np.array(got)[()], *map(copied, case))
                 except (ValueError, ArithmeticError):  # an answer of no machine
                     number, text = np.inf, "nothing can be computed with it"
+                number = float(number) if number == number else np.inf
                 if not number < lawful:
-                    lawful, sentence = float(number), text
-    return (lawful if lawful == lawful else np.inf), sentence
+                    lawful, sentence = number, text
+    return lawful, sentence
 
 
 def _sign(mistake: Callable, seen: Seen) -> int:
