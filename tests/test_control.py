@@ -592,6 +592,15 @@ def test_one_measurement_or_many_and_one_desired_state_or_many():
     assert_allclose(law.torque(TESTBED, d.q, d.qd, q_a[0], qd_a[0], path[:]), rows, rtol=1e-14)
 
 
+def test_effective_gain_of_a_matrix_that_couples_joints_solves_its_normal_equations():
+    """(35) as it is defined: F^T F times it is F^T K F, with what stands beside the diagonal of K."""
+    rng = np.random.default_rng(11)
+    F, K = rng.normal(size=(4, 6, 2)), rng.normal(size=(6, 6))
+    assert_allclose(F.mT @ F @ rk.effective_gain(F, K), F.mT @ K @ F, atol=1e-12)
+    with pytest.raises(ValueError, match=r"leading axes do not fit together: F \(4,\), K \(3,\)"):
+        rk.effective_gain(F, np.stack([K] * 3))
+
+
 def test_a_gain_of_dependent_columns_is_refused_however_they_round():
     """(F^T F) of a product of two vectors is singular but for rounding."""
     rng = np.random.default_rng(10)
