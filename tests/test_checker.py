@@ -207,6 +207,18 @@ def test_a_matrix_that_is_singular_in_one_case_divides_nothing():
     assert judged(exercise, lambda M, v: M @ v + np.sin(5 * v)).word == "wrong"
 
 
+def test_an_answer_that_is_scattered_about_the_right_one_is_close_though_its_mean_is_off():
+    """`close` counts deviations; only what is the right answer times a constant in every case is another mistake."""
+    said = judged(VECTOR, lambda K, v, m: (1.013 + 0.004 * np.sin(1e3 * v)) * K * v / m)
+    assert said.word == "close", said.sentence
+
+
+def test_what_is_right_within_the_tolerance_is_no_reason_against_close():
+    """A number of 1 that is right within 0.1, beside a number of 100 that is off by 1 %."""
+    rough = Exercise(lambda v: v, cases=lambda rng: [(1.0,), (1.0,), (100.0,), (1.0,)], tolerance=0.5, close=0.015)
+    assert judged(rough, lambda v: v + 0.49 if v < 2 else 101.0).word == "close"
+
+
 def test_a_mistake_with_a_name_is_not_close():
     known = Exercise(
         scaled, ("a", "b", "c"), "N m", cases, close=0.02, mistakes={"too long": lambda *c: 1.001 * scaled(*c)}
@@ -287,6 +299,11 @@ def test_what_stops_for_one_kind_of_case_only_says_for_which():
     for answer in (lambda K, v, m: (K * v)[:3] / m, lambda K, v, m: np.cross(K, v) * m):
         said = judged(known, answer)
         assert said.word == "wrong" and said.sentence.endswith("; for four, while it goes through for three entries")
+    single = Exercise(scaled, ("a", "b", "c"), "N m", lambda rng: kinds(rng)[-2:])
+    said = judged(single, lambda K, v, m: (K * v)[:3] / m).sentence
+    assert said.endswith("; for four, while it goes through for three entries")
+    nothing = judged(single, lambda K, v, m: None if len(K) == 4 else K * v / m)
+    assert nothing.word == "wrong" and nothing.sentence.endswith("; some other case has one")
     # What stops everywhere stops for no kind in particular.
     assert "while it goes through" not in judged(known, lambda K, v, m: K[:2]).sentence
 
@@ -612,6 +629,11 @@ def fails_first(got, K_P, v, limit):
 )
 def test_an_answer_is_not_right_where_its_law_cannot_be_computed(law):
     assert judged(Exercise(scaled, ("a", "b", "c"), "N m", cases, law), scaled).word == "wrong"
+
+
+def test_a_law_that_holds_exactly_is_said():
+    lawful = Exercise(scaled, ("a", "b", "c"), "N m", cases, lambda got, *case: (0.0, "power of the torques, W"))
+    assert judged(lawful, scaled).sentence.endswith("; power of the torques, W: below 1e-09")
 
 
 def test_a_right_number_that_breaks_the_law_is_close_only_where_an_exercise_knows_close_answers():
