@@ -475,6 +475,36 @@ def test_a_wrong_answer_that_is_checked_again_stays_wrong(capsys):
     assert examine(name, check(name, ...))[0] == "todo"
 
 
+@pytest.mark.parametrize("word", ["ok", "close", "wrong", "todo"])
+def test_a_lesson_goes_on_with_a_right_function_and_else_with_the_packages(word):
+    """`check` says so; a wrong or close one is kept beside it, guarded, for the picture that it feeds."""
+
+    def own(K_P, v, limit):
+        v *= 0.0
+        return v
+
+    case, right = (np.full(3, 7.0), np.array([1.0, 2.0, 3.0]), 2.0), [3.5, 7.0, 10.5]
+    got = checker.going_on(VECTOR, word, None if word == "todo" else own)
+    assert got(*case).tolist() == ([0.0, 0.0, 0.0] if word == "ok" else right)
+    assert got.own is (None if word == "todo" else own)
+    if word in ("close", "wrong"):
+        assert got.student(*case).tolist() == [0.0, 0.0, 0.0]
+    else:
+        assert got.student is None
+    assert case[1].tolist() == [1.0, 2.0, 3.0]
+    # What is no function cannot be called.
+    assert checker.going_on(VECTOR, "wrong", 3.0).student is None
+
+
+@pytest.mark.parametrize("own", [[1, 2], lambda: [1, 2]])
+def test_a_lesson_goes_on_with_a_right_value_and_else_with_the_packages(own):
+    value = Exercise(lambda: np.array([3.0, 4.0]), ("a", "b", "c"), "m")
+    for word in ("ok", "close", "wrong"):
+        got = checker.going_on(value, word, own)
+        assert got.dtype == float and got.tolist() == ([1.0, 2.0] if word == "ok" else [3.0, 4.0])
+    assert checker.going_on(value, "todo", None).tolist() == [3.0, 4.0]
+
+
 def test_secrets_are_not_handed_out(capsys):
     secrets = [name for name, exercise in exercises().items() if exercise.secret]
     assert secrets
