@@ -10,6 +10,7 @@ import pytest
 
 import rapkm_lite as rk
 from rapkm_lite.checks import Case, Exercise, Measured, check, draw_own, examine, exercises, hint
+from rapkm_lite.figures import style
 from rapkm_lite.lessons import checker
 from rapkm_lite.lessons.answers import Answer, numbers
 from rapkm_lite.lessons.judging import judged
@@ -816,4 +817,15 @@ def test_a_wrong_answer_is_in_the_picture_unless_it_is_far_beyond_it(size, grows
     ax.autoscale()
     draw_own("04.filtered_torques", lambda f: ([0.0, 1.0], [0.0, size]), ax)
     assert (ax.get_ylim()[1] > size) == grows and len(ax.lines) == 2
+    plt.close("all")
+
+
+def test_columns_of_arms_are_dotted_in_their_colours_and_others_in_that_of_a_warning(capsys):
+    check("04.filtered_torques", lambda A, c: c)
+    for per_arm in (True, False):
+        _, ax = plt.subplots()
+        draw_own("04.filtered_torques", lambda f: ([0.0, 1.0], np.ones((2, 3))), ax, per_arm=per_arm)
+        assert [line.get_color() for line in ax.lines] == [
+            style.arm_colour(i) if per_arm else style.ALARM for i in range(3)
+        ]
     plt.close("all")
