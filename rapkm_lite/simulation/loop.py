@@ -41,8 +41,9 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     controller = Controller(law, model, trajectory.dt)
     controller.nearest, controller.smooth = plant.nearest, sensors.count is None
     samples, N = len(trajectory), robot.n_arms
-    history = *(np.zeros((samples, size)) for size in (2, 2, N, N, N)), np.full((samples, 2), -1)
-    x, xd, q_a, qd_a, c, pairs = history
+    x, xd, q_a, qd_a, c = (np.zeros((samples, size)) for size in (2, 2, N, N, N))
+    pairs = np.full((samples, 2), -1)
+    history = x, xd, q_a, qd_a, c, pairs
     times, dt = trajectory.t.tolist(), trajectory.dt
     state = (*trajectory.x[0].tolist(), *trajectory.xd[0].tolist())
     last = len(times) - 1
