@@ -829,3 +829,11 @@ def test_columns_of_arms_are_dotted_in_their_colours_and_others_in_that_of_a_war
             style.arm_colour(i) if per_arm else style.ALARM for i in range(3)
         ]
     plt.close("all")
+
+
+@pytest.mark.parametrize("factor", [3.0, 1 / 3.0, 60.0, 1 / 60.0])
+def test_a_rough_answer_gets_no_factor_that_it_is_not_off_by(factor):
+    """A sum over three drives is three times their mean, not pi times, although pi is within the roughness."""
+    exercise = exercises()["03.gain"]
+    said = judged(exercise, factor * exercise.reference()).sentence
+    assert " pi " not in said and "180/pi" not in said, said

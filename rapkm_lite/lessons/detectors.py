@@ -74,8 +74,10 @@ def _some_signs(seen: Seen) -> str:
 def known_factor(seen: Seen) -> str:
     """A constant factor that has a meaning of its own."""
     k = ratio_of(seen.got, seen.want)
+    # However rough an answer is, 3 is not pi, nor 60 a turn from radians to degrees.
+    near = min(1e-4 + seen.slack, 0.02)
     for factor, words in FACTORS.items():
-        if abs(abs(k) / factor - 1.0) < 1e-4 + seen.slack and seen.same([np.sign(k) * factor * w for w in seen.want]):
+        if abs(abs(k) / factor - 1.0) < near and seen.same([np.sign(k) * factor * w for w in seen.want]):
             return words + ", and the sign is opposite" * (k < 0)
     return ""
 
