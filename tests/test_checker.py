@@ -609,8 +609,8 @@ def solved(M, v):
     [
         (heat, machines, lambda robot, c: np.sum(c**2), "the factor R_el/k_t^2 is missing"),
         (heat, machines, lambda robot, c: np.sum(c**2) / robot.torque_constant[0] ** 2, "the factor R_el is missing"),
-        (lambda X: X.mean(axis=0), tables, lambda X: X.sum(axis=0), "the factor length of X is one too many"),
-        (lambda X: X.sum(axis=0), tables, lambda X: X.mean(axis=0), "the factor length of X is missing"),
+        (lambda X: X.mean(axis=0), tables, lambda X: X.sum(axis=0), "the factor number of rows of X is one too many"),
+        (lambda X: X.sum(axis=0), tables, lambda X: X.mean(axis=0), "the factor number of rows of X is missing"),
         (solved, systems, lambda M, v: np.cos(v), "the factor M is one too many"),
         (solved, systems, lambda M, v: np.linalg.solve(M, solved(M, v)), "the factor M is missing"),
         (solved, systems, lambda M, v: np.trace(M) * solved(M, v), "the factor trace of M is one too many"),
@@ -837,3 +837,15 @@ def test_a_rough_answer_gets_no_factor_that_it_is_not_off_by(factor):
     exercise = exercises()["03.gain"]
     said = judged(exercise, factor * exercise.reference()).sentence
     assert " pi " not in said and "180/pi" not in said, said
+
+
+def test_the_number_of_entries_or_rows_is_not_called_a_length():
+    """The length of a vector is its norm: |eta| is 1, and of a link it is in m; a mode of signs has three of them."""
+    for name, words in (
+        ("03.fight", "number of entries of eta"),
+        ("02.control_matrix", "number of rows of a"),
+        ("02.input_singularity", "number of entries of mode"),
+    ):
+        right = exercises()[name].reference
+        said = judged(exercises()[name], lambda *case, right=right: 3 * right(*case)).sentence
+        assert said.startswith(f"the factor {words} is one too many;"), said

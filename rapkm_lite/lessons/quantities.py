@@ -26,8 +26,10 @@ def _of(name: str, value: Any) -> dict[str, float]:
     if array.ndim == 0:
         return {name: float(array)}
     if array.ndim == 1 and array.size > 1 and np.ptp(array) == 0.0:
-        return {name: float(array[0]), "length of " + name: float(array.size)}
-    found = {"norm of " + name: float(np.linalg.norm(array)), "length of " + name: float(len(array))}
+        return {name: float(array[0]), "number of entries of " + name: float(array.size)}
+    # The length of a vector is its norm in all lessons; how many there are goes first, as it is the norm of signs.
+    found = {f"number of {'entries' if array.ndim == 1 else 'rows'} of {name}": float(len(array))}
+    found["norm of " + name] = float(np.linalg.norm(array))
     if array.ndim == 1:
         found["sum of " + name] = float(array.sum())
     elif array.ndim == 2 and array.shape[0] == array.shape[1]:
