@@ -61,6 +61,9 @@ def _whole_factor(seen: Seen) -> str:
                 fixed = f": as if a fixed {abs(rest[0]) ** (-1 / p):.4g} stood for it" if rest[0] > 0 else ""
                 more = f", beside a factor of {rest[0]:.4g}{fixed}"
                 more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else more
+                # A constant may stand beside a quantity that explains why the factor is not the same in all cases.
+                if more and np.ptp(rest) * abs(ratios[0]) > 0.1 * np.ptp(ratios) * abs(rest[0]):
+                    continue
                 return f"the factor {name}{_power(p)} {word}{more}"
     return ""
 
