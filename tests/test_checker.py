@@ -857,3 +857,10 @@ def test_an_error_in_one_case_is_no_factor_of_an_argument():
     first = exercise.cases(np.random.default_rng(20_111_130))[0][1]
     said = judged(exercise, lambda *case: (1.1 - 0.1 * np.array_equal(case[1], first)) * exercise.reference(*case))
     assert said.sentence.startswith("it is right in 1 of 2 cases"), said.sentence
+
+
+def test_a_rough_answer_whose_size_is_right_somewhere_lacks_no_factor():
+    """A tenth of a hertz in one of two frequencies changes the direction as much as the size."""
+    exercise = exercises()["11.pd_frequencies"]
+    said = judged(exercise, lambda *case: exercise.reference(*case) + np.array([0.1, 0.0])).sentence
+    assert "the direction is right" not in said, said

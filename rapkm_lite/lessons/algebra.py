@@ -86,7 +86,7 @@ def constant_factor(seen: Seen) -> str:
         sign = ", and the sign is opposite" * (k < 0)
         return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
-    somewhere_right = any(abs(r - 1.0) < 1e-9 for r in ratios)
+    somewhere_right = any(abs(r - 1.0) <= seen.slack for r in ratios)
     several = len(ratios) > 1 and any(w.size > 1 for w in seen.want) and not somewhere_right
     if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
         return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
