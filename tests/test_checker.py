@@ -864,3 +864,11 @@ def test_a_rough_answer_whose_size_is_right_somewhere_lacks_no_factor():
     exercise = exercises()["11.pd_frequencies"]
     said = judged(exercise, lambda *case: exercise.reference(*case) + np.array([0.1, 0.0])).sentence
     assert "the direction is right" not in said, said
+
+
+def test_an_answer_that_is_right_in_a_case_is_no_other_basis():
+    """With the control matrix of the first case, the first case is right."""
+    exercise = exercises()["03.rest_error"]
+    A = exercise.cases(np.random.default_rng(20_111_130))[0][0]
+    said = judged(exercise, lambda _, *case: exercise.reference(A, *case) if len(case[1]) == 3 else np.zeros(4))
+    assert said.sentence.startswith("it is right in 1 of 6 cases"), said.sentence

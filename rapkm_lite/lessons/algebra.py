@@ -139,6 +139,9 @@ def mixture(seen: Seen) -> str:
     M = got @ np.linalg.pinv(want)
     if np.abs(M - np.eye(len(M))).max() <= 5 * seen.slack:
         return ""
+    fine = [w for g, w, _ in seen if largest(g - w) <= 1e-9 * largest(w)]
+    if any(largest(M @ w - w) > 1e-4 * largest(w) for w in fine):
+        return ""
     return _mixed(M, "row" if len(shape) == 2 else "entry") if alike(M @ want, got, seen.slack) else ""
 
 
