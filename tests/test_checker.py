@@ -872,3 +872,15 @@ def test_an_answer_that_is_right_in_a_case_is_no_other_basis():
     A = exercise.cases(np.random.default_rng(20_111_130))[0][0]
     said = judged(exercise, lambda _, *case: exercise.reference(A, *case) if len(case[1]) == 3 else np.zeros(4))
     assert said.sentence.startswith("it is right in 1 of 6 cases"), said.sentence
+
+
+def test_who_stops_for_the_same_machine_is_not_asked_about_machines():
+    """A pose near the curve of the pair is one of the testbed, which went through before."""
+    exercise = exercises()["05.feedback_map"]
+    near = exercise.cases(np.random.default_rng(20_111_130))[-1]
+
+    def answer(*case):
+        return exercise.reference(*case) * (np.nan if np.array_equal(case[1], near[1]) else 1.0)
+
+    said = judged(exercise, answer).sentence
+    assert "for a pose near the curve of the pair" in said and "n_arms" not in said

@@ -115,7 +115,8 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
             if end.result.sentence == NOTHING and got:
                 raise Ended("wrong", f"{NOTHING}; some other case has one", "none") from None
             if all(labels[: k + 1]) and label not in labels[:k] and k > 0:
-                own = _OWN * any(isinstance(v, Manipulator) for v in cases[k])
+                before = {repr(v) for case in cases[:k] for v in case}
+                own = _OWN * any(isinstance(v, Manipulator) and repr(v) not in before for v in cases[k])
                 end.add_note(f"; for {label}, while it goes through for {labels[0]}{own}")
             raise
     return got
