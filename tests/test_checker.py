@@ -884,3 +884,10 @@ def test_who_stops_for_the_same_machine_is_not_asked_about_machines():
 
     said = judged(exercise, answer).sentence
     assert "for a pose near the curve of the pair" in said and "n_arms" not in said
+
+
+def test_a_law_that_gives_no_number_is_told_without_one():
+    """Encoders off by a radian fit no pose, so nothing contradicts anything by a number of radians."""
+    off = Exercise(scaled, ("a", "b", "c"), "N m", cases, lambda got, *case: (np.nan, "they contradict by rad"))
+    said = judged(off, lambda *case: scaled(*case) ** 2 + np.arange(3.0)).sentence
+    assert said.endswith("; nothing can be computed with it"), said

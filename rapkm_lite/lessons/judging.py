@@ -143,7 +143,8 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
         near = f", {off}, that is {100 * share:.2g} %" if off else ""
         return Result("close", f"the method is right{near}. To improve: {exercise.improve}")
     _explained(exercise, seen, right)
-    law = f"; {sentence}" + f": {lawful:.3g}" * (not exercise.secret) if lawful > exercise.tolerance else ""
+    number = f": {lawful:.3g}" * (not exercise.secret and lawful < np.inf)
+    law = f"; {sentence}{number}" if lawful > exercise.tolerance else ""
     raise Ended("wrong", f"it is {off or 'off'}{law}", "no name found")
 
 
@@ -183,7 +184,9 @@ def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
                     number, text = exercise.invariant(np.array(got)[()], *map(copied, case))
                 except (ValueError, ArithmeticError):  # an answer of no machine
                     number, text = np.inf, "nothing can be computed with it"
-                number = float(number) if number == number else np.inf
+                if number != number:
+                    number, text = np.inf, "nothing can be computed with it"
+                number = float(number)
                 if not number < lawful:
                     lawful, sentence = number, text
     return lawful, sentence
