@@ -891,3 +891,10 @@ def test_a_law_that_gives_no_number_is_told_without_one():
     off = Exercise(scaled, ("a", "b", "c"), "N m", cases, lambda got, *case: (np.nan, "they contradict by rad"))
     said = judged(off, lambda *case: scaled(*case) ** 2 + np.arange(3.0)).sentence
     assert said.endswith("; nothing can be computed with it"), said
+
+
+def test_a_shape_alone_does_not_say_that_an_answer_is_transposed():
+    """A pseudoinverse has that shape, too."""
+    right = exercises()["02.control_matrix"].reference
+    said = judged(exercises()["02.control_matrix"], lambda a, d: np.linalg.pinv(right(a, d))).sentence
+    assert said == "the answer has the shape of the transposed one: (2, 3), expected (3, 2)"

@@ -200,7 +200,8 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         got = got.reshape(())
     if got.shape != shape:
         if got.ndim == 2 and got.shape == shape[::-1]:
-            raise Ended("wrong", f"the answer is transposed: shape {got.shape}, expected {shape}", "transposed")
+            words = f"the answer has the shape of the transposed one: {got.shape}, expected {shape}"
+            raise Ended("wrong", words, "transposed")
         flat, other = "; a flat array is wanted", "; their number is right, the rows and columns are not"
         extra = (flat if len(shape) == 1 else other) * (got.size == int(np.prod(shape)) and got.size > 1)
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
