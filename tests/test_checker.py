@@ -898,3 +898,10 @@ def test_a_shape_alone_does_not_say_that_an_answer_is_transposed():
     right = exercises()["02.control_matrix"].reference
     said = judged(exercises()["02.control_matrix"], lambda a, d: np.linalg.pinv(right(a, d))).sentence
     assert said == "the answer has the shape of the transposed one: (2, 3), expected (3, 2)"
+
+
+def test_an_entry_that_is_zero_is_told_so():
+    """A factor of 0 is none that somebody got wrong."""
+    right = exercises()["04.filtered_torques"].reference
+    gone = judged(exercises()["04.filtered_torques"], lambda A, c: right(A, c) * np.array([0.0, 1.0, 1.0])).sentence
+    assert gone.startswith("entry 0 (counted from 0) is zero; off by")

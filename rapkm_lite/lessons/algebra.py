@@ -148,7 +148,10 @@ def mixture(seen: Seen) -> str:
 def _mixed(M: np.ndarray, part: str) -> str:
     """Words for what the matrix M does to the rows or entries of the right answer."""
     if not np.any(np.abs(M - np.diag(np.diag(M))) > 1e-4):
-        rows = ", ".join(f"{i} ({f:.4g})" for i, f in enumerate(np.diag(M)) if abs(f - 1.0) > 1e-4)
+        off = {i: f for i, f in enumerate(np.diag(M)) if abs(f - 1.0) > 1e-4}
+        if not np.any(np.abs(list(off.values())) > 1e-4):
+            return f"{part} {', '.join(map(str, off))} (counted from 0) is zero"
+        rows = ", ".join(f"{i} ({f:.4g})" for i, f in off.items())
         return f"a constant factor is wrong in {part} {rows}, counted from 0"
     one, zero = np.abs(np.abs(M) - 1) < 1e-4, np.abs(M) < 1e-4
     if np.all(one.sum(axis=1) == 1) and np.all(zero.sum(axis=1) == len(M) - 1):
