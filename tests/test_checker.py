@@ -905,3 +905,14 @@ def test_an_entry_that_is_zero_is_told_so():
     right = exercises()["04.filtered_torques"].reference
     gone = judged(exercises()["04.filtered_torques"], lambda A, c: right(A, c) * np.array([0.0, 1.0, 1.0])).sentence
     assert gone.startswith("entry 0 (counted from 0) is zero; off by")
+
+
+def test_a_vector_that_points_the_other_way_in_some_cases_is_told_so():
+    """As a null vector does whose sign is left to a decomposition."""
+    asked = []
+
+    def answer(*case):
+        asked.append(case)
+        return scaled(*case) * (-1) ** len(asked)
+
+    assert judged(VECTOR, answer).sentence.startswith("the size is right, but in some cases the sign is opposite")

@@ -58,7 +58,7 @@ def sign(seen: Seen) -> str:
 
 def _some_signs(seen: Seen) -> str:
     """Words for the rows, columns or entries that have the opposite sign throughout."""
-    if seen.want[0].ndim == 0:
+    if all(alike(w, g, seen.slack) or alike(-w, g, seen.slack) for g, w, _ in seen):
         return "the size is right, but in some cases the sign is opposite"
     limit = seen.slack * max(map(largest, seen.want))
     flipped = [(np.abs(g - w) > limit, np.abs(2.0 * w) > limit) for g, w, _ in seen]
