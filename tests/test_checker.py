@@ -916,3 +916,10 @@ def test_a_vector_that_points_the_other_way_in_some_cases_is_told_so():
         return scaled(*case) * (-1) ** len(asked)
 
     assert judged(VECTOR, answer).sentence.startswith("the size is right, but in some cases the sign is opposite")
+
+
+def test_an_array_that_holds_no_numbers_is_called_by_what_it_holds():
+    """An array is wanted, so its type says nothing."""
+    for kind, word in ((bool, "bool"), (str, "str")):
+        said = judged(VECTOR, lambda *case, kind=kind: scaled(*case).astype(kind)).sentence
+        assert said.startswith(f"the answer is not numeric but of type ndarray of {word}")

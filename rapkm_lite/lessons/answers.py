@@ -190,7 +190,8 @@ def numbers(got: Any) -> np.ndarray:
         real = " (.real of it, since all imaginary parts are zero, as after np.linalg.eig)" * (not array.imag.any())
         raise Ended("wrong", f"the answer is complex; a real one is wanted{real}", "complex")
     if array.dtype.kind not in "iuf":
-        raise Ended("wrong", f"the answer is not numeric but of type {type(got).__name__}", "not numeric")
+        of = f" of {array.dtype.name}" * isinstance(got, np.ndarray)
+        raise Ended("wrong", f"the answer is not numeric but of type {type(got).__name__}{of}", "not numeric")
     return np.array(array, dtype=float)
 
 
