@@ -923,3 +923,10 @@ def test_an_array_that_holds_no_numbers_is_called_by_what_it_holds():
     for kind, word in ((bool, "bool"), (str, "str")):
         said = judged(VECTOR, lambda *case, kind=kind: scaled(*case).astype(kind)).sentence
         assert said.startswith(f"the answer is not numeric but of type ndarray of {word}")
+
+
+def test_a_list_of_kinds_of_cases_can_be_read():
+    """They are joined by commas, so none has a comma of its own."""
+    for name, exercise in exercises().items():
+        for case in [] if exercise.raw else exercise.cases(np.random.default_rng(0)):
+            assert "," not in getattr(case, "label", ""), (name, case.label)

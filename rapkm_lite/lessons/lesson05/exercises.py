@@ -84,7 +84,7 @@ def _partitions(rng) -> list[tuple]:
         rounded = A + 1e-12 * left[..., 2:3] * right[..., 2:3, :]
         for k, rows in enumerate(select_independent(A)):
             cases.append(Case(words, A[k], rows))
-            nudged.append(Case(f"{words}, rounding errors of 1e-12", rounded[k], rows))
+            nudged.append(Case(f"{words} with rounding errors of 1e-12", rounded[k], rows))
     robot = load()
     A = redundant_control_matrix(robot, inverse_kinematics(robot, [0.01, 0.02]))
     return [*cases, *nudged, *(Case("another order of rows", A, np.array(rows)) for rows in ((0, 2), (2, 0), (2, 1)))]

@@ -46,7 +46,7 @@ def wrong_models(rng) -> list[tuple]:
         shifted = robot.replace(base=robot.base + rng.normal(0, 5e-4, robot.base.shape))
         for model, what in ((stretched, "wrong lengths"), (shifted, "wrong base points")):
             x, K_P = rng.uniform(-0.05, 0.05, 2), rng.uniform(3, 12)
-            cases.append(Case(f"{label}, {what}", robot, model, x, K_P, beyond=name == "four_arms"))
+            cases.append(Case(f"{label} with {what}", robot, model, x, K_P, beyond=name == "four_arms"))
     return cases
 
 

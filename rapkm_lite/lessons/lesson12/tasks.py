@@ -37,13 +37,13 @@ def fight(J, m, K_P, offset) -> np.ndarray:
 
 def fight_cases(rng) -> list[Case]:
     cases = []
-    for label, pose in (("the 4RRR machine", [0.05, 0.03, 0.1]), ("the 4RRR machine, turned", [-0.08, 0.02, -0.3])):
+    for label, pose in (("the 4RRR machine", [0.05, 0.03, 0.1]), ("the turned 4RRR machine", [-0.08, 0.02, -0.3])):
         cases.append(Case(label, four_rrr.four_rrr().J(four_rrr.angles(pose)), 4, 40.0, rng.normal(0, 4e-3, 4)))
-    for name, label in (("testbed", "the testbed"), ("four_arms", "four arms, two freedoms")):
+    for name, label in (("testbed", "the testbed"), ("four_arms", "four arms with two freedoms")):
         robot = load(name)
         J = constraint_jacobian(robot, inverse_kinematics(robot, rng.uniform(-0.05, 0.05, 2)))
         cases.append(Case(label, J, robot.n_arms, 7.05, rng.normal(0, 4e-3, robot.n_arms)))
-    return [*cases, Case("six drives, two of them too many", rng.normal(size=(5, 9)), 6, 3.0, rng.normal(0, 4e-3, 6))]
+    return [*cases, Case("six drives with two too many", rng.normal(size=(5, 9)), 6, 3.0, rng.normal(0, 4e-3, 6))]
 
 
 def moves(got, J, m, K_P, offset) -> tuple[float, str]:
