@@ -700,7 +700,8 @@ def test_a_close_answer_that_fails_beyond_the_idea_is_told_so():
 
     known = Exercise(scaled, ("a", "b", "c"), "N m", more, close=0.02)
     said = judged(known, lambda K, v, m: 1.005 * (K * v)[:3] / m)
-    assert said.word == "close" and said.sentence.startswith("the method is right, but not for four entries")
+    assert said.word == "close" and said.sentence.startswith("the method is right, off by up to ")
+    assert "(allowed 1e-09), that is 0.5 %, but not for four entries, where the answer has shape" in said.sentence
 
 
 def test_the_mistake_itself_goes_before_the_opposite_of_another_one():

@@ -64,7 +64,7 @@ def _near_and_far(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result
     if whole.word == "ok" or whole.word == result.word:
         return whole if result.word == "ok" else result
     said = _failures(exercise, answer, far, whole.sentence)
-    right = "it is right" if result.word == "ok" else "the method is right"
+    right = "it is right" if result.word == "ok" else result.sentence.partition(". To improve: ")[0]
     words, _, advice = next(iter(said.values())).partition(". To improve: ")
     words = words.replace("the method is right, off", "it is off")
     if _sizes([case for case in far if case.label in said]) - _sizes(near):
