@@ -931,3 +931,12 @@ def test_a_list_of_kinds_of_cases_can_be_read():
     for name, exercise in exercises().items():
         for case in [] if exercise.raw else exercise.cases(np.random.default_rng(0)):
             assert "," not in getattr(case, "label", ""), (name, case.label)
+
+
+def test_readings_that_fit_no_pose_are_told_so():
+    """Encoders off by two radians: there is no contradiction in rad to tell."""
+    right = exercises()["08.self_calibrate"].reference
+    said = judged(
+        exercises()["08.self_calibrate"], lambda *case: right(*case) + np.resize([2.0, -2.0], case[1].shape[1])
+    )
+    assert said.sentence.endswith("; less these offsets the readings fit no pose"), said.sentence

@@ -92,7 +92,7 @@ def still_contradicts(got, robot, q_a, guess) -> tuple[float, str]:
     try:
         return float(np.abs(left_over(robot, q_a - got, guess)).max()), words
     except ValueError:  # no pose is near
-        return np.inf, words
+        return np.inf, "less these offsets the readings fit no pose"
 
 
 def null_vectors(places) -> np.ndarray:
