@@ -940,3 +940,10 @@ def test_readings_that_fit_no_pose_are_told_so():
         exercises()["08.self_calibrate"], lambda *case: right(*case) + np.resize([2.0, -2.0], case[1].shape[1])
     )
     assert said.sentence.endswith("; less these offsets the readings fit no pose"), said.sentence
+
+
+def test_two_errors_that_are_a_little_different_are_no_constant():
+    """Rounded to three digits, 1433.31 and 3453.19 are off by -3.31 and -3.19."""
+    right = exercises()["11.gain_for_bandwidth"].reference
+    said = judged(exercises()["11.gain_for_bandwidth"], lambda *case: float(f"{right(*case):.3g}")).sentence
+    assert "off by a constant" not in said, said

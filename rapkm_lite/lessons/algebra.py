@@ -166,6 +166,6 @@ def shifted(seen: Seen) -> str:
     """The right answer plus a constant."""
     gaps = np.concatenate([(g - w).ravel() for g, w, _ in seen])
     scale = max(map(largest, seen.want))
-    if len(gaps) > 1 and np.ptp(gaps) <= min(seen.slack * max(scale, abs(gaps[0])), 0.1 * abs(gaps[0])):
+    if len(gaps) > 1 and np.ptp(gaps) <= min(seen.slack * max(scale, abs(gaps[0])), 0.02 * abs(gaps[0])):
         return f"the answer is off by a constant, {gaps[0]:.4g}, in every entry and case"
     return ""
