@@ -57,15 +57,19 @@ def _whole_factor(seen: Seen) -> str:
             if (steady or np.ptp(values) < 1e-9 * abs(values[0])) and abs(abs(rest[0]) - 1.0) > 1e-6:
                 continue
             if np.ptp(rest) <= (1e-6 + 2 * seen.slack) * abs(rest[0]):
-                word = "is missing" if p < 0 else "is one too many"
-                fixed = f": as if a fixed {abs(rest[0]) ** (-1 / p):.4g} stood for it" if rest[0] > 0 else ""
-                more = f", beside a factor of {rest[0]:.4g}{fixed}"
-                more = "" if abs(rest[0] - 1.0) < 1e-5 + seen.slack else more
+                more = _beside(rest[0], p, 1e-5 + seen.slack)
                 # A constant may stand beside a quantity that explains why the factor is not the same in all cases.
-                if more and np.ptp(rest) * abs(ratios[0]) > 0.1 * np.ptp(ratios) * abs(rest[0]):
-                    continue
-                return f"the factor {name}{_power(p)} {word}{more}"
+                if not more or np.ptp(rest) * abs(ratios[0]) <= 0.1 * np.ptp(ratios) * abs(rest[0]):
+                    return f"the factor {name}{_power(p)} {'is missing' if p < 0 else 'is one too many'}{more}"
     return ""
+
+
+def _beside(constant: float, p: float, slack: float) -> str:
+    """Words for the constant that is left beside a quantity to the power p; none for 1."""
+    if abs(constant - 1.0) < slack:
+        return ""
+    fixed = f": as if a fixed {constant ** (-1 / p):.4g} stood for it" if constant > 0 else ""
+    return f", beside a factor of {constant:.4g}{fixed}"
 
 
 def argument_factor(seen: Seen) -> str:
@@ -137,12 +141,15 @@ def mixture(seen: Seen) -> str:
     if want.shape[1] < 2 * shape[0] or np.linalg.matrix_rank(want, 1e-6 * np.abs(want).max()) < shape[0]:
         return ""
     M = got @ np.linalg.pinv(want)
-    if np.abs(M - np.eye(len(M))).max() <= 5 * seen.slack:
-        return ""
-    fine = [w for g, w, _ in seen if largest(g - w) <= 1e-9 * largest(w)]
-    if any(largest(M @ w - w) > 1e-4 * largest(w) for w in fine):
+    if np.abs(M - np.eye(len(M))).max() <= 5 * seen.slack or _harms(M, seen):
         return ""
     return _mixed(M, "row" if len(shape) == 2 else "entry") if alike(M @ want, got, seen.slack) else ""
+
+
+def _harms(M: np.ndarray, seen: Seen) -> bool:
+    """Does the matrix M change the right answer in a case where the given one is right?"""
+    fine = [w for g, w, _ in seen if largest(g - w) <= 1e-9 * largest(w)]
+    return any(largest(M @ w - w) > 1e-4 * largest(w) for w in fine)
 
 
 def _mixed(M: np.ndarray, part: str) -> str:

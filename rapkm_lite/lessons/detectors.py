@@ -53,13 +53,13 @@ def sign(seen: Seen) -> str:
         return "the answer has the opposite sign"
     if seen.same([np.abs(w) for w in seen.want]):
         return "the answer has lost its signs: it is the absolute value"
+    if all(alike(w, g, seen.slack) or alike(-w, g, seen.slack) for g, w, _ in seen):
+        return "the size is right, but in some cases the sign is opposite"
     return _some_signs(seen) if all(alike(np.abs(w), np.abs(g), seen.slack) for g, w, _ in seen) else ""
 
 
 def _some_signs(seen: Seen) -> str:
     """Words for the rows, columns or entries that have the opposite sign throughout."""
-    if all(alike(w, g, seen.slack) or alike(-w, g, seen.slack) for g, w, _ in seen):
-        return "the size is right, but in some cases the sign is opposite"
     limit = seen.slack * max(map(largest, seen.want))
     flipped = [(np.abs(g - w) > limit, np.abs(2.0 * w) > limit) for g, w, _ in seen]
     for axis, word in ((0, "row"), (1, "column")) if seen.want[0].ndim == 2 else ((0, "entry"),):
