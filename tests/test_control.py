@@ -593,7 +593,7 @@ def test_one_measurement_or_many_and_one_desired_state_or_many():
 
 
 def test_effective_gain_of_a_matrix_that_couples_joints_solves_its_normal_equations():
-    """(35) as it is defined: F^T F times it is F^T K F, with what stands beside the diagonal of K."""
+    """Of (35) corrected: F^T F times it is F^T K F, with what stands beside the diagonal of K."""
     rng = np.random.default_rng(11)
     F, K = rng.normal(size=(4, 6, 2)), rng.normal(size=(6, 6))
     assert_allclose(F.mT @ F @ rk.effective_gain(F, K), F.mT @ K @ F, atol=1e-12)
