@@ -215,8 +215,8 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
         }
 
-    torque = shared.over_time("torque in mN m", robot=robot, ylim=(-100, 100))
-    panels = {"without": torque | {"title": "No prestress"}, "with": torque | {"title": "With prestress"}}
+    without, also = shared.over_time("torque in mN m", robot=robot), shared.over_time("torque in mN m")
+    panels = {"without": without | {"title": "No prestress"}, "with": also | {"title": "With prestress"}}
     controls = {
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
         "side": shared.length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),

@@ -183,16 +183,17 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
                 ring = centre[:, None] + np.sqrt(level - rest) * root @ wheel
                 shade = str(0.62 - 0.55 * k / (len(levels) - 1))
                 picture.line("map", *ring, color=shade, linewidth=1.6)
-                # The number stands where the lines are far apart, and on no other.
-                away = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1]
-                away[np.abs(ring).max(axis=0) > 10.5] = -1.0
+                # The number stands where the lines are far apart, and on no other; `half` is of its width.
+                words = f"{float(f'{level:.2g}'):g}"
+                away, half = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1], max(2.0, 0.45 * len(words))
+                away[np.abs(ring).max(axis=0) > 12.5 - half] = -1.0
                 for other in taken:
-                    away[np.all(np.abs(ring.T - other) < [4.0, 1.8], axis=1)] = -1.0
+                    away[np.all(np.abs(ring.T - other) < [2 * half, 1.8], axis=1)] = -1.0
                 k = np.argmax(away)
                 if away[k] > 0:
                     taken.append(ring[:, k])
                     look = {"color": min(shade, "0.45"), "ha": "center", "va": "center"}
-                    picture.text("map", *ring[:, k], f"{level:.2g}", fontsize=9, **look)
+                    picture.text("map", *ring[:, k], words, fontsize=9, **look)
         picture.line("map", *dq[:2], color=ALARM, marker="D", markersize=8, linestyle="none", zorder=4)
         picture.handle("map", *dq[:2], offset_1=(1, 0), offset_2=(0, 1))
         costs, directions = np.linalg.eigh(S)

@@ -112,7 +112,12 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
 
 
 def _bar_words(value: float, form: str) -> str:
-    """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart."""
+    """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart.
+
+    >>> _bar_words(-11750.04, ".1f")
+    '−11750'
+    """
+    form = form if abs(value) < 1000 else ".0f"
     return re.sub("^−(?=[0.]+$)", "", format(np.round(value, 9), form).replace("-", "−"))
 
 
