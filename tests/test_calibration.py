@@ -853,7 +853,10 @@ def test_readings_that_are_counts_are_known_by_their_steps():
         assert_allclose(rounding(count * whole), count / np.sqrt(12), rtol=1e-9)
         # Each encoder may have a zero of its own between two counts.
         assert_allclose(rounding(count * (whole + [0.2, 0.65])), count / np.sqrt(12), rtol=1e-9)
-        assert rounding(count * (whole + [[0.0, 0.0], [0.0, 0.0], [0.3, 0.0], [0.0, 0.0]])) == 0.0
+        assert rounding(count * (whole + np.sqrt([[0.0, 0.0], [0.0, 0.0], [2.0, 0.0], [0.0, 0.0]]))) == 0.0
+        # No two of few readings need lie one count apart.
+        far = np.array([[0, 20], [15, 50], [36, 44], [70, -30]])  # smallest step 6, greatest common divisor 1
+        assert_allclose(rounding(count * far), count / np.sqrt(12), rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)

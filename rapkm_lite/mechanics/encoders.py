@@ -57,10 +57,12 @@ def rounding(angles: np.ndarray) -> float:
     steps = np.diff(np.sort(angles, axis=0), axis=0).ravel()
     # Below 1e-12 rad a step is floating-point rounding.
     steps = steps[steps > 1e-12]
-    count = steps.min(initial=np.inf)
-    if not len(steps) or np.abs(steps / count - np.rint(steps / count)).max() > 0.01:
-        return 0.0
-    return float(count) / math.sqrt(12)
+    # Of few readings no two need lie one count apart: then the count is a part of the smallest step.
+    for parts in range(1, 101 if len(steps) > 5 else 2):
+        count = steps.min(initial=np.inf) / parts
+        if len(steps) and np.abs(steps / count - np.rint(steps / count)).max() <= (0.01 if parts == 1 else 1e-3):
+            return float(count) / math.sqrt(12)
+    return 0.0
 
 
 def changed(robot: Manipulator, p: np.ndarray) -> Manipulator:
