@@ -294,6 +294,18 @@ def test_one_place_is_refused_with_what_it_does_say():
     assert_allclose(error.known @ hidden("offset_c")[0], error.value, rtol=0, atol=2e-4)
 
 
+@pytest.mark.parametrize("unknowns", ["offsets", "offsets+lengths", "all"])
+def test_what_is_known_of_lengths_is_said_to_be_of_their_changes(unknowns):
+    change = np.array([[3e-4, 0.0], [0.0, -2e-4], [1e-4, 2e-4]]) * (unknowns != "offsets")
+    machine = TESTBED.replace(lengths=TESTBED.lengths + change)
+    q_a = rk.inverse_kinematics(machine, [[0.03, -0.04], [0.05, 0.02]][: 1 if unknowns == "offsets" else 2])[:, :3]
+    with pytest.raises(rk.CalibrationError) as caught:
+        rk.calibrate(TESTBED, q_a + OFFSET[:3] / 10, unknowns)
+    truth = np.concatenate([OFFSET[:3] / 10, change.ravel(), np.zeros(6)])[: caught.value.known.shape[1]]
+    assert_allclose(caught.value.value, caught.value.known @ truth, rtol=0, atol=1e-6)
+    assert (", geometry as changes from nominal: " in str(caught.value)) == (unknowns != "offsets")
+
+
 def test_a_calibration_prints_its_offsets_in_mrad():
     found = rk.calibrate(TESTBED, rk.mystery_run("offset_a"))
     said = re.search(r"offset \[(.*)\] mrad, rank 3", repr(found)).group(1)

@@ -31,7 +31,7 @@ class CalibrationError(ValueError):
     rank : how many combinations the samples determine.  needed : how many there are to find.
     known : (rank, p) their coefficients, p unknowns in the order of `Calibration.names`; orthonormal rows, of each the
     coefficient largest in size is positive.
-    value : (rank,) what these combinations are, rad and m.
+    value : (rank,) what these combinations are, rad and m; of lengths and base points, of their changes from nominal.
 
     >>> import rapkm_lite as rk
     >>> try:
@@ -270,9 +270,10 @@ def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
     spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
     within = (f" ± {s:.2g}" if s > 0.0 else "" for s in spread)
     terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])
+    changes = ", geometry as changes from nominal" if len(moved) > robot.n_arms else ""
     words = (
         f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so more places and "
-        f"further apart, or fewer unknowns. Known to first order, in rad and m: "
+        f"further apart, or fewer unknowns. Known to first order, in rad and m{changes}: "
     ) + "; ".join(f"{sum_} = {number:.4g}{s}" for sum_, number, s in zip(terms, value, within, strict=False))
     unsure = "" if spread.any() else "; no reading is left over to show the noise: pass noise"
     return CalibrationError(words + unsure, rank, needed, known, value)
