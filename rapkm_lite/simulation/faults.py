@@ -109,7 +109,8 @@ class DeadDrive(Fault):
 class EncoderDropout(Fault):
     """An encoder repeats its last reading before `start` for start <= t < stop; at the first sample it reads once.
 
-    Its rate is that of the repeated reading: zero where rates are ideal, else what the velocity filter makes of it.
+    Its rate is that of the repeated reading: zero where rates are ideal and at the first sample, else what the velocity
+    filter makes of it.
 
     >>> import rapkm_lite as rk
     >>> rk.EncoderDropout(drive=0, start=0.5, stop=0.7)
