@@ -344,3 +344,15 @@ def test_a_panel_in_which_no_curve_is_left_has_limits_too():
     hidden.fit("a", *[])
     gaps.fit("a", [np.nan])
     assert hidden.ylim("a") == gaps.ylim("a")
+
+
+def test_each_weight_of_a_stack_is_judged_by_its_own_size():
+    """With a multiple of the identity, (A^T)_W^+ is the pseudoinverse of A^T, whatever the multiple."""
+    weights = np.array([1e-3, 1e12])[:, None, None] * np.eye(3)
+    assert_allclose(rk.weighted_pseudoinverse(A, weights), [np.linalg.pinv(A.T)] * 2, rtol=0, atol=1e-15)
+    lopsided = np.stack([[[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1e12 * np.eye(3)])
+    for W in (lopsided, lopsided[0]):
+        with pytest.raises(ValueError, match=r"W is not symmetric \(by 0\.5\); allowed: symmetric positive definite"):
+            rk.weighted_pseudoinverse(A, W)
+    with pytest.raises(ValueError, match=r"W has the eigenvalue -1; allowed: symmetric positive definite"):
+        rk.weighted_pseudoinverse(A, weights - np.array([0.0, 1e12 + 1.0])[:, None, None] * np.eye(3))

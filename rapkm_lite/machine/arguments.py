@@ -183,12 +183,12 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     shaped(name, array, fits, f"one number, ({size},) or ({size}, {size})")
     if array.ndim == 1:
         return np.diag(bounded(name, array, 0.0, strict=True))
-    skew = np.abs(array - array.mT).max(initial=0.0)
-    if skew > 1e-12 * np.abs(array).max(initial=0.0):
+    largest, skew = (np.abs(part).max(axis=(-2, -1), initial=0.0) for part in (array, array - array.mT))
+    if skew := np.where(skew > 1e-12 * largest, skew, 0.0).max(initial=0.0):
         raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
-    smallest = np.linalg.eigvalsh(array).min(initial=np.inf)
-    if smallest <= max(1e-14 * np.abs(array).max(initial=0.0), _LEAST):
-        raise ValueError(f"{name} has the eigenvalue {smallest:.3g}; allowed: symmetric positive definite")
+    least = np.linalg.eigvalsh(array).min(axis=-1, initial=np.inf)
+    if (least := np.where(least <= np.maximum(1e-14 * largest, _LEAST), least, np.inf).min(initial=np.inf)) < np.inf:
+        raise ValueError(f"{name} has the eigenvalue {least:.3g}; allowed: symmetric positive definite")
     return array
 
 
