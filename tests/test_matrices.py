@@ -216,6 +216,18 @@ def test_lost_rank_is_seen_whatever_the_signs_of_the_constraints(sign):
     assert_allclose(rk.projector(independent) @ np.cross(*independent), np.cross(*independent), rtol=0, atol=1e-15)
 
 
+def test_constraints_of_a_stack_may_be_written_in_any_units():
+    """h = 0 and 1e14 h = 0 are the same constraints, with the same tangent space, also beside each other."""
+    rng = np.random.default_rng(2)
+    J, J_dot = rng.normal(size=(2, 3, 5))
+    units = np.array([1.0, 1e-8, 1e14])[:, None, None]
+    assert_allclose(rk.projector(units * J), [rk.projector(J)] * 3, rtol=0, atol=1e-14)
+    rates = rk.projector_dot(units * J, units * J_dot)
+    assert_allclose(rates, [rk.projector_dot(J, J_dot)] * 3, rtol=1e-12, atol=1e-13)
+    with pytest.raises(ValueError, match="J has lost rank"):
+        rk.projector(units * np.stack([J, J, J[[0, 1, 1]]]))
+
+
 def test_a_drive_without_any_direction_changes_no_common_sign():
     """A^T n does not hold its n_i, which may be anything: what counts is whether the others balance."""
     left, right = [[-1.0, 1.0], [-1.0, -1.0]], [[0.0, 1.0], [-1.0, -0.5], [1.0, -0.5]]

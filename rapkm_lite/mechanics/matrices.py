@@ -111,7 +111,9 @@ def _independent(J: np.ndarray, independent) -> list[int]:
 
 
 def _row_space(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return cores.row_space(J, max(float(np.abs(J).max(initial=0.0)), 1e-300), of_pose=False)
+    size = np.maximum(np.abs(J).max(axis=(-2, -1), keepdims=True), 1e-300)
+    Q, R = cores.row_space(J / size, 1.0, of_pose=False)
+    return Q, size * R
 
 
 def _tree(n: int, lead: tuple[int, ...], G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
