@@ -12,9 +12,10 @@ import rapkm_lite as rk
 from rapkm_lite.checks import Case, Exercise, Measured, check, draw_own, examine, exercises, hint
 from rapkm_lite.figures import style
 from rapkm_lite.lessons import checker
-from rapkm_lite.lessons.answers import Answer, numbers
+from rapkm_lite.lessons.answers import NOTHING, Answer, numbers
 from rapkm_lite.lessons.judging import judged
 from rapkm_lite.lessons.lesson04 import lean_law
+from rapkm_lite.lessons.lesson09.tasks import quiet_gears
 
 SHAPES = "make it hold there too; shapes of the arguments tell the numbers"
 
@@ -339,6 +340,17 @@ def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
 
     said = judged(exercises()[name], broken)
     assert said.word == "wrong" and said.sentence.startswith("your code stops with ") and "a word of" in said.sentence
+
+
+def test_torques_that_are_missing_late_in_a_run_are_told_in_words():
+    """A branch without a return, or a solver that finds nothing there: the carriage goes up before it goes down."""
+
+    def upward_only(A, f):
+        return quiet_gears(A, f) if f[1] > 0 else None
+
+    said = judged(exercises()["09.quiet_gears"], upward_only)
+    assert said.word == "wrong" and said.sentence.startswith("at t = ")
+    assert said.sentence.endswith(f" s of a run {NOTHING}")
 
 
 @pytest.mark.parametrize("known", lean_law.OFFSETS)

@@ -118,6 +118,9 @@ def guarded(action: Callable, *arguments) -> Any:
     except BaseException as error:
         if _unfinished(error):
             raise Ended("todo", "not yet") from None
+        if isinstance(error, SimulationError) and isinstance(error.__cause__, Ended):
+            result = error.__cause__.result  # earlier samples of this run had an answer
+            raise Ended("wrong", f"at t = {error.time:.4f} s of a run {result.sentence}", result.mistake) from None
         if isinstance(error, SimulationError) and error.__cause__ is None:
             raise Ended("wrong", f"a run is lost: {_words(error).partition(': ')[2]}", "a lost run") from None
         kind = f"stops with {type(error).__name__}"
