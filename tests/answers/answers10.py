@@ -57,6 +57,10 @@ def row_by_row(A, fight, limit):
     return min((limit - abs(c)) / np.hypot(*g) for c, g in zip(fight, G, strict=True))
 
 
+def of_one_drive(i, A, fight, limit):
+    return (limit - abs(fight[i])) / shares(A)[i]
+
+
 def around(steps):
     def force(A, fight, limit):
         turn = np.linspace(0, 2 * np.pi, steps)
@@ -136,6 +140,8 @@ ANSWERS = {
         ("wrong", "times rows of A", lambda A, c, top: np.min((top - abs(c)) * np.linalg.norm(A, axis=1)), "alone"),
         ("wrong", "worst of both", lambda A, c, top: (top - abs(c).max()) / shares(A).max(), "two drives"),
         ("wrong", "one for each drive", lambda A, c, top: (top - abs(c)) / shares(A), "smallest"),
+        ("wrong", "the largest share", lambda *case: of_one_drive(shares(case[0]).argmax(), *case), "right in"),
+        ("wrong", "drive of the largest fight", lambda *case: of_one_drive(abs(case[1]).argmax(), *case), "right in"),
         ("wrong", "mN", lambda A, c, top: 1e3 * tasks.force_left(A, c, top), "1000"),
         ("wrong", "minus", lambda A, c, top: -tasks.force_left(A, c, top), "sign"),
         ("wrong", "zero", lambda A, c, top: 0.0, "zero"),
