@@ -128,7 +128,7 @@ ANSWERS = {
         ("close", "a shade too little", little(3.9e-3)),
         ("wrong", "least size", tasks.smallest, "no prestress"),
         ("wrong", "within limits only", lambda A, f: rk.allocate_torques(A, f, 85e-3), "no prestress"),
-        ("wrong", "constant prestress", constant(0.095), "constant"),
+        ("wrong", "constant prestress", constant(0.095), "of this sign"),
         ("wrong", "a constant one, too small", constant(0.03), "smallest torque"),
         ("wrong", "too little", little(1e-3), "smallest"),
         ("wrong", "too hot", in_the_middle, "heat"),

@@ -109,7 +109,7 @@ EXERCISES = {
                 tasks.another_force
             ),
             "there is no prestress in this choice, so drives change their sign with the force": tasks.without_prestress,
-            "a constant prestress: what is enough for the worst moment is too much for the limit and the heat": (
+            "a constant prestress of this sign: what is enough for the worst moment is too much for limit and heat": (
                 tasks.with_a_constant_one
             ),
         },
