@@ -342,6 +342,18 @@ def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
     assert said.word == "wrong" and said.sentence.startswith("your code stops with ") and "a word of" in said.sentence
 
 
+@pytest.mark.parametrize(("factor", "named"), [(1e3, True), (np.rad2deg(1.0), False)])
+def test_offsets_in_degrees_are_not_called_a_thousand_times_too_large(factor, named):
+    """180/pi is no factor of 1000."""
+
+    def offsets(robot, x):
+        A = rk.control_matrix(robot, rk.inverse_kinematics(robot, x))
+        return factor * A @ np.array([2.6e-3, 1.5e-3])
+
+    said = judged(exercises()["03.unseen_offsets"], offsets)
+    assert said.word == "wrong" and ("1000 times" in said.sentence) is named
+
+
 def test_torques_that_are_missing_late_in_a_run_are_told_in_words():
     """A branch without a return, or a solver that finds nothing there: the carriage goes up before it goes down."""
 
