@@ -121,6 +121,8 @@ ANSWERS = {
         ("wrong", "three places twice", fixed(tasks.ring([60, 60, 180, 180, 300, 300], 0.12)), "nearest two places"),
         ("wrong", "too far out", fixed(tasks.ring(PAIRS, 0.14)), "farthest"),
         ("wrong", "in mm", fixed(1e3 * tasks.ring(PAIRS, 0.12)), "mm"),
+        ("wrong", "in cm", fixed(1e2 * tasks.ring(PAIRS, 0.12)), "given in m"),
+        ("wrong", "out of reach", fixed(tasks.ring(PAIRS, 0.3)), "outside the workspace"),
         ("wrong", "three places", fixed(tasks.ring([60, 180, 300], 0.12)), "shape"),
         ("wrong", "on a line", fixed(np.column_stack([np.linspace(-0.1, 0.1, 6), np.zeros(6)])), "condition"),
         ("wrong", "transposed", fixed(tasks.ring(PAIRS, 0.12).T), "transposed"),

@@ -114,8 +114,10 @@ def known(answer) -> list[Measured]:
     """Six places against what is asked of them."""
     places = chosen(answer)
     far = np.linalg.norm(places, axis=-1).max()
-    if far > 1.0 or not np.all(reachable(load(), places)):
+    if far > 1.0:
         raise Ended("wrong", f"a place lies {far:.3g} m from the middle; places are given in m", "units")
+    if not np.all(reachable(load(), places)):
+        raise Ended("wrong", f"a place lies outside the workspace; the disc has a radius of {DISC:g} m", "outside")
     apart = np.linalg.norm(places[:, None] - places, axis=-1)[~np.eye(len(places), dtype=bool)].min()
     sigma = np.linalg.svd(null_vectors(places), compute_uv=False)
     return [
