@@ -718,6 +718,29 @@ def test_a_measured_number_that_is_none_misses_its_limit(first):
     assert judged(Exercise(3.0, ("a", "b", "c"), judge=judge, close=0.05), 3.0).word == "wrong"
 
 
+def test_a_size_that_is_wrong_in_every_case_does_not_hide_the_sign():
+    """A factor below zero turns a vector round."""
+    known = Exercise(scaled, ("a", "b", "c"), "N m", cases)
+    for factor, said in (
+        (lambda v: 2.0 + np.sin(40.0 * v[0]), "the direction is right and the size is not"),
+        (lambda v: -2.0 - np.sin(40.0 * v[0]), "the direction is right, but for its sign, and the size is not"),
+        (lambda v: 3.0 * np.cos(40.0 * v[0]), "the direction is right, but for its sign in some cases, and the size"),
+    ):
+        assert judged(known, lambda K, v, m, factor=factor: factor(v) * scaled(K, v, m)).sentence.startswith(said)
+
+
+def test_one_case_shows_no_constant_factor():
+    """Another case may have another one."""
+
+    def more(rng):
+        return [*cases(rng), Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)]
+
+    said = judged(
+        Exercise(scaled, ("a", "b", "c"), "N m", more), lambda K, v, m: scaled(K, v, m) * (1.3 if len(K) > 3 else 1)
+    )
+    assert said.word == "close" and "in every case" not in said.sentence and "the size is not" in said.sentence
+
+
 def test_a_close_answer_that_fails_beyond_the_idea_is_told_so():
     def more(rng):
         return [*cases(rng), Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)]

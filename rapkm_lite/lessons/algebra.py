@@ -85,15 +85,17 @@ def argument_factor(seen: Seen) -> str:
 
 def constant_factor(seen: Seen) -> str:
     """Any other constant factor."""
-    k = ratio_of(seen.got, seen.want)
-    if abs(abs(k) - 1.0) > 2 * seen.slack and k != 0.0 and seen.same([k * w for w in seen.want]):
+    k, single = ratio_of(seen.got, seen.want), len(seen.want) == 1
+    if not single and abs(abs(k) - 1.0) > 2 * seen.slack and k != 0.0 and seen.same([k * w for w in seen.want]):
         sign = ", and the sign is opposite" * (k < 0)
         return f"the answer is {abs(k):.4g} times the right one in every case: a constant factor{sign}"
     ratios = [ratio_of([g], [w]) for g, w, _ in seen]
     somewhere_right = any(abs(r - 1.0) <= seen.slack for r in ratios)
-    several = len(ratios) > 1 and any(w.size > 1 for w in seen.want) and not somewhere_right
-    if several and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
-        return "the direction is right and the size is not: one factor is missing, or is not the one of this case"
+    vectors = any(w.size > 1 for w in seen.want) and not somewhere_right
+    if vectors and seen.same([k * w for k, w in zip(ratios, seen.want, strict=True)]):
+        turned = "" if min(ratios) >= 0 else f", but for its sign{' in some cases' * (max(ratios) > 0)},"
+        size = "the size is not: one factor is missing, or is not the one of this case"
+        return f"the direction is right{turned} and {size}"
     return ""
 
 
