@@ -342,6 +342,21 @@ def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
     assert said.word == "wrong" and said.sentence.startswith("your code stops with ") and "a word of" in said.sentence
 
 
+@pytest.mark.parametrize(
+    ("name", "answer", "said"),
+    [
+        ("06.placement", lambda robot, offset: 0.1, "it cannot be tried: the place is "),
+        ("06.placement", lambda robot, offset: rk.triangle(robot, side=0.08), "the answer is not numeric"),
+        ("12.own_machine", lambda: rk.load("four_arms"), "it cannot be tried: the machine has 4 arms; allowed: 3"),
+        ("12.own_machine", lambda: rk.load("no such file"), "your code stops with ValueError: "),
+        ("10.spare_law", lambda drawing: (19.0, 0.55), "it cannot be tried: law = (19.0, 0.55)"),
+    ],
+)
+def test_a_design_that_does_not_stop_is_not_told_that_it_stops(name, answer, said):
+    """The check stops when it tries it; whose code raised the error, the traceback says."""
+    assert judged(exercises()[name], answer).sentence.startswith(said)
+
+
 @pytest.mark.parametrize(("factor", "named"), [(1e3, True), (np.rad2deg(1.0), False)])
 def test_offsets_in_degrees_are_not_called_a_thousand_times_too_large(factor, named):
     """180/pi is no factor of 1000."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 import copy
 import functools
 import inspect
+import os
+import traceback
 from collections.abc import Callable
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +17,8 @@ import numpy as np
 from ..simulation.runs import SimulationError
 
 NOTHING = "no value is returned: is a return missing, or has a solver found nothing?"
+# Where the code of the package, of libraries and of Python itself lies.
+_HOMES = Path(__file__).parents[1], Path(np.__file__).parents[1], Path(os.__file__).parent
 
 
 class Result(NamedTuple):
@@ -109,6 +114,12 @@ def _unfinished(error: BaseException | None) -> bool:
     return False
 
 
+def _outside(error: BaseException) -> bool:
+    """True when code that is neither the package's nor a library's was at work when the error was raised."""
+    files = {frame.f_code.co_filename for frame, _ in traceback.walk_tb(error.__traceback__)}
+    return any(not file.startswith(tuple(f"{home}{os.sep}" for home in _HOMES)) for file in files)
+
+
 def guarded(action: Callable, *arguments) -> Any:
     """The result of code from outside; every way to stop but Ctrl-C ends in `Ended`."""
     try:
@@ -123,6 +134,9 @@ def guarded(action: Callable, *arguments) -> Any:
             raise Ended("wrong", f"at t = {error.time:.4f} s of a run {result.sentence}", result.mistake) from None
         if isinstance(error, SimulationError) and error.__cause__ is None:
             raise Ended("wrong", f"a run is lost: {_words(error).partition(': ')[2]}", "a lost run") from None
+        if isinstance(error, ValueError) and not _outside(error):  # what the package says of a design that it tries
+            words = _words(error).removeprefix(f"{type(error).__name__}: ")
+            raise Ended("wrong", f"it cannot be tried: {words}", "cannot be tried") from None
         kind = f"stops with {type(error).__name__}"
         raise Ended("wrong", f"your code stops with {_words(error)}", kind) from None
 

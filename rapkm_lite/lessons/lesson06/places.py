@@ -12,7 +12,7 @@ from ...mechanics.kinematics import reachable
 from ...mechanics.trajectory import triangle
 from ...simulation.energy import antagonism_form
 from ...simulation.sweeps import sweep
-from ..answers import returned
+from ..answers import numbers, returned
 from ..checker import Measured
 
 SIDE, GAIN = 0.08, 7.05
@@ -68,7 +68,7 @@ def _places(answer) -> tuple[np.ndarray, ...]:
 
 
 def _point(centre) -> np.ndarray:
-    point = np.asarray(returned(centre), dtype=float)
+    point = numbers(returned(centre))
     if point.shape != (2,) or not np.all(np.isfinite(point)):
         raise ValueError(f"the place is {centre!r}; allowed: two finite coordinates of the centre, in m")
     return point
