@@ -43,6 +43,11 @@ def along_n(A, f, least):
     return c + max((least - c) / n) * n
 
 
+def lifting_the_weakest(A, f, least):
+    c, n = tasks.smallest(A, f), rk.null_basis(A)[:, 0]
+    return c + (least - c.min()) / n[c.argmin()] * n
+
+
 def general_solver(A, f, least):
     start = np.abs(tasks.smallest(A, f)) + least
     demand = {"type": "eq", "fun": lambda c: A.T @ c - f}
@@ -113,6 +118,7 @@ ANSWERS = {
         ("wrong", "all negative", lambda A, f, least: -tasks.one_sign(A, -f, least), "sign"),
         ("wrong", "opposite force", lambda A, f, least: tasks.one_sign(A, -f, least), "sign"),
         ("wrong", "no force", lambda A, f, least: tasks.one_sign(A, 0 * f, least), "force"),
+        ("wrong", "only the weakest drive lifted to the least", lifting_the_weakest, ""),
         ("wrong", "least on top", lambda A, f, least: tasks.smallest(A, f) + least, "added to every drive"),
         ("wrong", "far too much", box, ""),
         ("wrong", "all equal", lambda A, f, least: np.full(len(A), least), ""),
