@@ -503,6 +503,17 @@ def test_a_formula_of_a_users_is_asked_or_refused():
     doubled, gained = rk.simulate(ROBOT, rk.PD(14.0, 0.2), PATH, OFFSET), Doubled(7.0, 0.2)
     assert_allclose(rk.simulate(ROBOT, gained, PATH, OFFSET).c, doubled.c, rtol=0, atol=1e-9)
 
+    # As within every other law: what a step of the user's asks of its base is the formula of the class.
+    for base in (kicked(rk.PD), Doubled, kicked(rk.CTC)):
+
+        class Halved(base):
+            def step(self, memory, sample):
+                c, memory = super().step(memory, sample)
+                return 0.5 * c, memory
+
+        whole, half = (rk.simulate(ROBOT, kind(7.0, 0.2), PATH, OFFSET).c[0] for kind in (base, Halved))
+        assert_allclose(half, 0.5 * whole, rtol=0, atol=1e-12)
+
     class Pairs(rk.SwitchedCTC):
         def pairs(self, model, q):
             return np.tile([0, 1], (len(q), 1))
