@@ -7,7 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, matvec, positive_definite, real_array, shaped, short, whole_number
+from ..machine.arguments import (
+    bounded,
+    exact_array,
+    masked,
+    matvec,
+    positive_definite,
+    real_array,
+    shaped,
+    short,
+    whole_number,
+)
 from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
@@ -113,10 +123,10 @@ def torque_limit(limit) -> np.ndarray:
 
 
 def _is_infinite(value) -> np.ndarray:
+    """Where a number is infinite; nowhere in what `real_array` refuses, such as text and masked entries."""
     try:
-        with np.errstate(over="ignore"):  # numbers of more digits
-            return np.asarray(value, dtype=float) == math.inf
-    except Exception:  # whatever an object answers that is asked for a number; `real_array` refuses it
+        return np.zeros((), bool) if masked(value) and np.ma.is_masked(value) else np.asarray(value) == math.inf
+    except Exception:  # whatever an object answers that is asked for a number
         return np.zeros((), bool)
 
 
