@@ -444,6 +444,15 @@ def test_a_model_that_cannot_follow_is_refused_before_the_run():
         rk.simulate(ROBOT, PD, TRIANGLE, model=ROBOT.replace(lengths=0.12))
 
 
+def test_a_start_that_the_machine_does_not_reach_is_refused_although_the_model_does():
+    far = rk.hold(ROBOT, [0.0, -0.15], 0.05)  # 0.381 m from base point 3
+    for call in (rk.simulate, rk.sweep):
+        with pytest.raises(
+            ValueError, match=r"x = \(0, -0\.15\) m lies outside the workspace: .*; allowed: 0 to 0\.38 m"
+        ):
+            call(ROBOT.replace(lengths=0.19), PD, far, [0.0, 0.0, 0.0], model=ROBOT)
+
+
 def lost(**options):
     with pytest.raises(rk.SimulationError) as error:
         rk.simulate(ROBOT, options.pop("law", FILTER), options.pop("path", TRIANGLE), **options)
