@@ -540,6 +540,14 @@ def test_table_1_measured_and_simulated():
     assert np.abs(table.deviation).max() < 0.04  # the chapter's six energies, by one reading of many
 
 
+def test_filter_of_table_1_leaves_no_antagonism():
+    """It works at the true pose, where R of (15) leaves no torque that moves nothing."""
+    reading = rk.experiment("table1_reading")
+    run = reading.run(rk.AntagonismFilter(reading.law, pose="true"))
+    assert rk.antagonistic_energy(run) < 1e-20
+    assert_allclose(rk.table1().simulated, [reading.run().energy, run.energy], rtol=1e-12)
+
+
 def test_deviations_of_table_1_are_shares_of_what_was_measured():
     table = Table1(measured=np.full((2, 3), 2.0), simulated=np.full((2, 3), 3.0))
     assert_allclose(table.deviation, 0.5)

@@ -106,7 +106,8 @@ def measured_energies() -> np.ndarray:
 def table1() -> Table1:
     """Table 1 as measured, and as simulated by the one consistent reading in ``data/table1_reading.toml``.
 
-    The chapter leaves offsets, path placement and gains open; the reading is a plausible explanation, one of many.
+    The filter works at the true pose.  The chapter leaves offsets, path placement and gains open; the reading is a
+    plausible explanation, one of many.
 
     >>> import rapkm_lite as rk
     >>> bool(abs(rk.table1().deviation).max() < 0.05)
