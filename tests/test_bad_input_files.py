@@ -1,5 +1,8 @@
 """TOML experiments as nobody should write them: each is refused by one sentence, and a name stays in its folder."""
 
+import csv
+import errno
+import os
 import re
 from pathlib import Path
 
@@ -295,6 +298,52 @@ def test_a_path_ends_in_toml(tmp_path):
 def test_no_two_records_of_a_log_have_one_time(t):
     with pytest.raises(ValueError, match=r"t\[2\] = .* follows 0\.1 s; allowed: increasing"):
         rk.Log("mine", t, *np.zeros((3, 3, 3)))
+
+
+@pytest.mark.parametrize(
+    ("t", "q_a", "others", "words"),
+    [
+        ((3, 1), (3, 3), (3, 3), r"t has shape \(3, 1\) and q_a \(3, 3\); allowed: \(k,\) and \(k, N\)"),
+        ((2,), (3, 3), (3, 3), r"t has shape \(2,\) and q_a \(3, 3\); allowed: \(k,\) and \(k, N\)"),
+        ((3,), (3, 1, 3), (3, 1, 3), r"q_a \(3, 1, 3\); allowed: \(k,\) and \(k, N\)"),
+        ((3,), (3, 3), (3, 2), r"q_a_desired has shape \(3, 2\); allowed: \(3, 3\), as q_a"),
+    ],
+)
+def test_columns_of_a_log_fit_together(t, q_a, others, words):
+    with pytest.raises(ValueError, match=words):
+        rk.Log("odd", np.arange(np.prod(t)).reshape(t), np.zeros(q_a), np.zeros(others), np.zeros(others))
+
+
+def test_lists_of_a_log_are_kept_as_arrays_that_nobody_writes_into():
+    log = rk.Log("lists", [0, 1], *np.zeros((3, 2, 3)).tolist())
+    for column in (log.t, log.q_a, log.q_a_desired, log.c):
+        assert column.dtype == float and not column.flags.writeable
+
+
+def test_a_log_that_cannot_be_read_says_why(tmp_path):
+    with pytest.raises(ValueError, match=rf"cannot be read \({os.strerror(errno.ENOENT)}\); allowed: a CSV file"):
+        rk.read_log(tmp_path / "missing.csv")
+    latin, long = tmp_path / "latin.csv", tmp_path / "long.csv"
+    latin.write_bytes("t in s, Kräfte".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"cannot be read \(not UTF-8 text\)"):
+        rk.read_log(latin)
+    long.write_text("0" * (csv.field_size_limit() + 1))
+    with pytest.raises(ValueError, match=r"cannot be read \(field larger than field limit"):
+        rk.read_log(long)
+    with pytest.raises(ValueError, match=rf"cannot be written \({os.strerror(errno.ENOENT)}\); allowed: a CSV file"):
+        rk.write_log(rk.mystery_run("gain"), tmp_path / "missing" / "mine.csv")
+
+
+def test_the_long_header_of_a_log_of_many_drives_is_told_where_it_is_wrong(tmp_path):
+    file, header = tmp_path / "nine.csv", ["t in s"]
+    header += [f"q{i} {what} in rad" for what in ("measured", "desired") for i in range(1, 10)]
+    header += [f"c{i} in N m" for i in range(1, 10)]
+    header[12] = "q3 wished in rad"
+    file.write_text(",".join(header))
+    words = "column 13 holds 'q3 wished in rad'; allowed: the header t in s, q1 measured in rad, q2 measured in rad, "
+    words += "..., q2 desired in rad, q3 desired in rad, q4 desired in rad, ..."
+    with pytest.raises(ValueError, match=f"{re.escape(words)}$"):
+        rk.read_log(file)
 
 
 def dimension(unit):
