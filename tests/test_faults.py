@@ -352,6 +352,8 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
         (0, lambda table: table, r"mark returns something; allowed: to write into the table"),
         (0, lambda table: table.jump.fill(np.nan), r"writes NaN or an infinite table\.jump; allowed"),
         (0, lambda table: table.jump.fill(np.inf), r"writes NaN or an infinite table\.jump; allowed"),
+        (0, lambda table: table.jump.__setitem__((3, 1), np.inf), r"writes NaN or an infinite table\.jump; allowed"),
+        (0, lambda table: table.limit.__setitem__(1, np.nan), r"writes NaN or an infinite table\.jump; allowed"),
         (0, lambda table: table.limit.fill(np.nan), r"writes NaN or an infinite table\.jump; allowed"),
         (
             0,
@@ -359,6 +361,7 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
             r"Wrong.*mark raised AttributeError: .*; allowed: to write",
         ),
         (0, lambda table: table.limit.__setitem__(..., np.ones(7)), r"mark raised ValueError: .*; allowed: to write"),
+        (0, lambda table: table.limit.__setitem__(1, -0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
         (0, lambda table: table.limit.fill(-0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
     ],
 )
