@@ -267,7 +267,7 @@ def test_rules_measures_and_numbers():
         refused(rk.switching_map, "rule", TESTBED, bad)
     for bad in (1, 0, -5, 2.5, np.nan, "9", [5, 5], True):
         refused(rk.actuation_map, "n", TESTBED, n=bad)
-    for bad in ((0, 0, 0, 1), (1, 0, 0, 1), (0, 1, 0), "box", (0, 1, 0, np.inf)):
+    for bad in ((0, 0, 0, 1), (1, 0, 0, 1), (0, 1, 0, 0), (0, 1, 1, 0), (0, 1, 0), "box", (0, 1, 0, np.inf)):
         refused(rk.actuation_map, "box", TESTBED, n=5, box=bad)
     for bad in ((0, 0), (0, 3), 1, "01"):
         refused(rk.actuation_map, "pair", TESTBED, n=5, pair=bad)

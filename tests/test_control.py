@@ -165,6 +165,23 @@ def test_closed_loop_of_the_apd(pair):
     assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        rk.APD([7.0, 8.0], [0.2, 0.3], [0, 1], [1.0, 2.0, 3.0]),
+        rk.CTC([400.0, 300.0], [40.0, 30.0], np.array([0, 1]), [1.0, 2.0, 3.0]),
+        rk.SwitchedCTC([400.0, 300.0], [40.0, 30.0], np.array(1.5)),
+        rk.RedundantCTC([400.0] * 3, [40.0] * 3, projected=np.False_),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_what_a_law_is_given_as_a_list_it_keeps_as_an_array_that_nobody_writes_into(law):
+    kept = [getattr(law, name) for name in ("K_P", "K_D", "W") if getattr(law, name, None) is not None]
+    assert all(isinstance(K, np.ndarray) and not K.flags.writeable for K in kept) and len(kept) >= 2
+    assert getattr(law, "independent", (0, 1)) == (0, 1)
+    assert type(getattr(law, "hysteresis", 1.5)) is float and type(getattr(law, "projected", False)) is bool
+
+
 # Switching.
 def test_switching_takes_the_best_pair_and_hysteresis_saves_switches():
     path = rk.triangle(FRICTIONLESS)
@@ -178,8 +195,15 @@ def test_switching_takes_the_best_pair_and_hysteresis_saves_switches():
     x, y, chosen = rk.switching_map(FRICTIONLESS, n=200)
     i, j = np.rint((path.x[:, 1] - y[0]) / (y[1] - y[0])).astype(int), np.rint((path.x[:, 0] - x[0]) / (x[1] - x[0]))
     assert np.mean(chosen[i, j.astype(int)] == best) > 0.98
-    law = rk.SwitchedCTC(400, 40, hysteresis=1.5)
-    assert law.choose(FRICTIONLESS, path.q[0], (1, 0)) in rk.drive_pairs(FRICTIONLESS)
+
+
+def test_pairs_along_a_path_are_those_chosen_one_by_one_given_the_last_in_either_order():
+    law, q, now, kept = rk.SwitchedCTC(400, 40, hysteresis=1.5), rk.triangle(FRICTIONLESS, dt=2e-2).q, None, 0
+    for pose, pair in zip(q, law.pairs(FRICTIONLESS, q), strict=True):
+        now = law.choose(FRICTIONLESS, pose, None if now is None else now[::-1])
+        assert now == tuple(pair)
+        kept += now != law.choose(FRICTIONLESS, pose)
+    assert kept > 10
 
 
 @pytest.mark.parametrize("hysteresis", [1.0, 1.3, 2.0])
