@@ -414,6 +414,15 @@ def printed_27(A_tilde, rows):
     return whole, small
 
 
+@pytest.mark.parametrize("scale", [1e-9, -1.0, 1e9])
+def test_explicit_pseudoinverse_knows_the_rank_whatever_the_unit(scale):
+    A_tilde = scale * rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, [0.02, 0.05]))
+    found = rk.explicit_pseudoinverse(A_tilde, (0, 1))
+    assert_allclose(found, np.linalg.pinv(A_tilde.T), rtol=0, atol=1e-12 / abs(scale))
+    with pytest.raises(ValueError, match="rows holds 1 of the rows, below the rank of A_tilde; allowed: delta of them"):
+        rk.explicit_pseudoinverse(A_tilde, (0,))
+
+
 @pytest.mark.parametrize("name", ["testbed", "four_arms", "five_bar"])
 def test_explicit_pseudoinverse_is_27_as_printed(name):
     robot = MACHINES[name]

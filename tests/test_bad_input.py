@@ -168,12 +168,20 @@ ROWS = [
     np.zeros((5, 3), int),
     np.array([[0.0, 1.0]] * 5),
     np.array([[-1, 1]] * 5),
+    np.zeros((5, 0), int),
 ]
 
 
 @pytest.mark.parametrize("rows", ROWS, ids=range(len(ROWS)))
 def test_row_choices(rows):
     refused(rk.explicit_pseudoinverse, "rows", A_TILDE, rows)
+
+
+def test_one_choice_of_rows_may_be_an_array_and_the_wrong_one_of_many_is_told():
+    both = rk.explicit_pseudoinverse(A_TILDE, np.array([0, 1])), rk.explicit_pseudoinverse(A_TILDE, (0, 1))
+    assert np.array_equal(*both)
+    with pytest.raises(ValueError, match=r"rows holds \[2, 2\]; allowed: different indices from 0 to 2"):
+        rk.explicit_pseudoinverse(A_TILDE, np.array([[0, 1], [0, 2], [0, 1], [2, 2], [1, 2]]))
 
 
 NOT_SPD = [

@@ -290,6 +290,17 @@ def test_work_of_drives_that_fall_turns_behind_is_the_energy_of_the_machine(wrap
         np.testing.assert_allclose(energy, rk.simulate(ROUND, law, LAP).energy, rtol=1e-9)
 
 
+def test_pose_of_a_sample_is_on_the_turn_of_what_was_measured_and_found_once():
+    robot = rk.load()
+    path, turns = rk.hold(robot, [0.02, 0.03], 0.05), 2 * np.pi * np.array([1.0, 0.0, -2.0])
+    controller = rk.Controller(rk.PD(7.0, 0.2), robot)
+    sample = rk.Sample(controller, 0.0, path.q_a[0] + turns, path.qd_a[0], path[0], (path.x[0], path.xd[0]))
+    q, _ = sample.pose("measured")
+    np.testing.assert_allclose(q[:3], path.q_a[0] + turns, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sample.pose("true")[0][:3], path.q_a[0], rtol=0, atol=1e-12)
+    assert sample.pose("measured")[0] is q
+
+
 def test_filter_finds_the_pose_of_drives_that_are_turns_behind():
     """A matrix for W is the same law, but one of the textbook layer."""
     filters = [rk.AntagonismFilter(rk.PD(0.02, 0.001), W=W) for W in (None, np.eye(3))]
