@@ -94,7 +94,7 @@ class Manipulator(Value):
             raise ValueError(f"mode = {self.mode}; allowed: +1 or -1 for each of the {N} arms")
         super().__post_init__(**given)
         J_a, J_d, P = self.arm_inertias.T
-        if np.any(J_d <= 0.0) or np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
+        if np.any(J_a * J_d - P**2 <= 1e-12 * J_a * J_d):
             raise ValueError(
                 f"inertias = {short(given['inertias'].tolist())} with masses, centers and load = {given['load']:g} let "
                 "an arm move freely; allowed: values with a positive definite mass matrix"
