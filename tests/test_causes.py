@@ -392,6 +392,24 @@ def test_a_loop_that_swung_before_a_fault_is_called_unstable():
         assert "unstable gain" in lost(law=stiff, path=HOLD, offset=OFFSET, faults=[broken])
 
 
+def test_of_two_faults_that_a_users_law_may_have_met_the_first_is_named_unless_a_pose_was_lost():
+    """No pose is needed for its torques, so the drive that died long before the jump of an encoder may be to blame."""
+    broken = [rk.DeadDrive(0, 0.1), rk.DeadDrive(1, 0.1), rk.OffsetJump(2, 0.15, 2.0)]
+    words = lost(law=mine, faults=broken)
+    assert words.startswith("the machine left the workspace (DeadDrive(0, 0.1) acts from t = 0.1 s on")
+
+
+@pytest.mark.parametrize("pair", [(0, 4), (3, 4)])
+def test_coordinates_that_are_no_pair_of_drives_are_in_no_table_of_their_singularities(pair):
+    assert "unstable gain: near the desired state" in lost(law=rk.CTC(9e6, 6e3, pair))
+
+
+def test_the_largest_friction_of_all_drives_is_told_where_it_is_too_stiff():
+    sticky = ROBOT.replace(friction=[0.0, 50.0, 1.0], friction_velocity=1e-6)
+    with pytest.raises(rk.SimulationError, match=r"f_c / v0 = 5e\+07 N m s/rad \(friction 50 N m, "):
+        rk.simulate(sticky, PD, CIRCLE)
+
+
 def test_a_run_of_few_samples_swings_within_these():
     assert "within 2 samples of 0.001 s and grew 2-fold" in swung((-2.0) ** np.arange(2)[:, None], 1e-3)
     with np.errstate(all="raise"):

@@ -1,6 +1,7 @@
 """Nothing is lost: a run that stops keeps its samples and the reason, a sweep its finished rows."""
 
 import copyreg
+import json
 import os
 import pickle
 import signal
@@ -649,8 +650,10 @@ def test_a_process_that_dies_takes_no_finished_rows_along():
     [
         (lambda: np.linalg.solve(np.zeros((3, 3)), np.ones(3)), "LinAlgError"),
         (lambda: os.environ["no gain"], "KeyError"),
+        (lambda: json.loads("{"), "JSONDecodeError"),
+        (lambda: rk.inverse_kinematics(ROBOT, [9.0, 9.0]), "ValueError"),
     ],
-    ids=["installed", "frozen"],
+    ids=["installed", "frozen", "standard", "ours"],
 )
 def test_a_law_that_fails_within_a_library_is_named_by_its_own_line(fails, kind):
     """Of the traceback the last line that is neither of an installed library nor of one that came with Python."""
