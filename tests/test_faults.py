@@ -376,6 +376,11 @@ def test_a_new_fault_that_marks_wrongly_is_named(drive, write, words):
             call(ROBOT, PD, PATH, OFFSET, faults=[Wrong()])
 
 
+def test_a_fault_of_the_package_says_itself_what_does_not_fit():
+    with pytest.raises(ValueError, match=r"^limit has shape \(2,\); allowed: one number or \(3,\)$"):
+        rk.simulate(ROBOT, PD, PATH, faults=rk.TorqueLimit([0.1, 0.2]))
+
+
 def test_a_new_fault_that_raises_is_the_cause_of_its_error():
     class Odd(Fault):
         def mark(self, table, t):

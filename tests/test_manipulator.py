@@ -132,6 +132,8 @@ def test_a_machine_without_inertia_is_refused():
         ([[-0.2, 0], [0.2, 0]], 0.0999, False),
         ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.04]], False),  # the small arm inside the hole of the large one
         ([[0, 0], [0.3, 0]], [[0.5, 0.1], [0.05, 0.06]], True),
+        ([[0, 0], [0.3, 0]], [[0.1, 0.5], [0.04, 0.05]], False),  # so it does not with the shorter links at the bases
+        ([[0, 0], [0.3, 0]], [[0.1, 0.5], [0.06, 0.05]], True),
         ([[0, 0], [1, 0], [0.5, 5]], 0.3, False),  # two meet, the third does not
         ([[0, 0], [0.01, 0]], [[0.1, 0.1], [1, 1]], True),  # one annulus inside the other
     ],
