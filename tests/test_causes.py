@@ -581,6 +581,11 @@ def test_what_is_seen_of_sensors_is_named_from_a_bound_on(options, words, named)
     assert (words in said) == named
 
 
+def test_a_pull_downwards_that_is_off_is_told_as_a_share_of_its_size():
+    words = _difference(HANGING.replace(gravity=[0.0, -8.829]), HANGING)
+    assert words == "gravity that are off by 10 %"
+
+
 @pytest.mark.parametrize("name", ["lengths", "masses", "friction"])
 def test_a_model_that_is_too_small_is_named_like_one_that_is_too_large(name):
     own = getattr(rk.load(), name)

@@ -125,6 +125,7 @@ def test_a_machine_without_inertia_is_refused():
     assert rk.Manipulator(**GOOD, centers=[0.1, 0.1], inertias=0.0).n_arms == 2
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-13, 1e6 / 3])
 @pytest.mark.parametrize(
     ("base", "lengths", "meet"),
     [
@@ -138,7 +139,8 @@ def test_a_machine_without_inertia_is_refused():
         ([[0, 0], [0.01, 0]], [[0.1, 0.1], [1, 1]], True),  # one annulus inside the other
     ],
 )
-def test_arms_must_be_able_to_meet(base, lengths, meet):
+def test_arms_must_be_able_to_meet(base, lengths, meet, unit):
+    base, lengths = unit * np.array(base), unit * np.array(lengths)
     if meet:
         rk.Manipulator(base=base, lengths=lengths, masses=1.0)
     else:
