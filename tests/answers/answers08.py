@@ -49,6 +49,13 @@ def corners(angle, radius=0.12, duration=4.0):
     return lambda robot: rk.polygon(robot, tasks.ring(np.asarray(angle), radius), duration)
 
 
+def wider_than_its_path(robot):
+    """Set-points that swing out to 150 mm, on a path of 115 mm."""
+    path = rk.circle(robot, 0.115, 4.0)
+    wide = path.x * (1 + 35 / 115 * np.sin(np.pi * path.t / 4)[:, None] ** 4)
+    return path.with_set_points(np.unwrap(rk.inverse_kinematics(robot, wide)[:, :3], axis=0))
+
+
 def fixed(places):
     return lambda robot: places
 
@@ -140,6 +147,7 @@ ANSWERS = {
         ("wrong", "ten turns of a small circle", lambda robot: rk.circle(robot, 0.04, 4.0, turns=10), "torque"),
         ("wrong", "the course's triangle", lambda robot: rk.triangle(robot), "duration"),
         ("wrong", "too far out", lambda robot: rk.triangle(robot, duration=4.0), "farthest"),
+        ("wrong", "set-points of a wider circle", wider_than_its_path, "farthest"),
         ("wrong", "too fast", lambda robot: rk.circle(robot, 0.12, 4.0, turns=4), "torque"),
         ("wrong", "corners instead of a path", lambda robot: tasks.ring([60, 180, 300], 0.12), "path"),
         ("wrong", "in mm", lambda robot: rk.circle(robot, 120.0, 4.0), ""),

@@ -13,7 +13,7 @@ from ...mechanics.actuation import control_matrix
 from ...mechanics.antagonism import null_basis
 from ...mechanics.calibration import CalibrationError, calibrate
 from ...mechanics.closure import estimate_pose
-from ...mechanics.kinematics import inverse_kinematics, reachable
+from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable
 from ...mechanics.trajectory import Trajectory, circle
 from ...simulation.runs import simulate
 from ..answers import Ended, fitting, given, numbers
@@ -162,8 +162,9 @@ def _found(path: Trajectory) -> tuple[float, float]:
 
 
 def shown(answer) -> list[Measured]:
-    path = driven(answer)
-    far = np.linalg.norm(path.x, axis=-1).max()
+    path, robot = driven(answer), load()
+    # Set-points may lead elsewhere than the path that they come with.
+    far = np.linalg.norm(forward_kinematics(robot, estimate_pose(robot, path.q_a, path.x)), axis=-1).max()
     limits = [
         Measured("duration", path.t[-1], "s", LONGEST * (1 + 1e-9)),
         Measured("farthest from the middle", 1e3 * far, "mm", 1e3 * DISC * (1 + 1e-9)),
