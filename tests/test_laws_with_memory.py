@@ -476,15 +476,16 @@ def test_what_a_law_on_one_of_the_package_sets_besides_its_fields_belongs_to_it(
     assert around[0] != around[1] and rk.simulate(ROBOT, around[0], PATH) != rk.simulate(ROBOT, around[1], PATH)
 
 
+def kicked(base):
+    class Kicked(base):
+        def torque(self, *given):
+            return super().torque(*given) + 1e-3
+
+    return Kicked
+
+
 def test_a_formula_of_a_users_is_asked_or_refused():
     """A run asks for `step`; a class that overrides `torque` alone must not run as if it had not."""
-
-    def kicked(base):
-        class Kicked(base):
-            def torque(self, *given):
-                return super().torque(*given) + 1e-3
-
-        return Kicked
 
     plain, law = rk.PD(7.0, 0.2), kicked(rk.PD)(7.0, 0.2)
     expected = rk.simulate(ROBOT, lambda t, q, qd, d: -7.0 * (q - d.q_a) - 0.2 * (qd - d.qd_a) + 1e-3, PATH, OFFSET)
@@ -535,6 +536,37 @@ def test_a_formula_of_a_users_is_asked_or_refused():
     for more in (law, gained, Kicking(7.0, 0.2, 1e-3)):
         with pytest.raises(ValueError, match="is more than its gains; allowed: PD, whose commands are filtered"):
             rk.CommandFilter(more)
+
+
+def test_a_step_of_a_users_does_not_pass_by_a_formula_of_a_users():
+    """It asks a step of the package that does not use the formula: refused, unless its class has both."""
+    plain = rk.PD(7.0, 0.2)
+    for base, given in ((rk.PID, (7.0, 1.0, 0.2)), (rk.AntagonismFilter, (plain,)), (rk.SwitchedCTC, (400.0, 40.0))):
+
+        class Asking(kicked(base)):
+            def step(self, memory, sample):
+                return super().step(memory, sample)
+
+        class Pushing(base):
+            def step(self, memory, sample):
+                c, memory = super().step(memory, sample)
+                return c + 1e-3, memory
+
+            def torque(self, *told):
+                return super().torque(*told) + 1e-3
+
+        pushed, whole = (rk.simulate(ROBOT, kind(*given), PATH).c[0] for kind in (Pushing, base))
+        assert_allclose(pushed, whole + 1e-3, rtol=0, atol=1e-12)
+        for refused in (Asking(*given), rk.AntagonismFilter(Asking(*given))):
+            with pytest.raises(ValueError, match=rf"Kicked\.torque is of your own, but {base.__name__}\.step does not"):
+                rk.simulate(ROBOT, refused, PATH, OFFSET)
+
+    class Called(rk.CompiledLaw):
+        def __call__(self, *given):
+            return 2.0 * super().__call__(*given)
+
+    with pytest.raises(ValueError, match=r"Called\.__call__ is of your own, but CompiledLaw\.step does not use it"):
+        rk.simulate(ROBOT, Called(lambda t, q_a, qd_a, d: np.zeros(3)), PATH)
 
 
 class Slotted(rk.PD):

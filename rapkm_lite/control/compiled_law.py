@@ -14,7 +14,7 @@ import numpy as np
 
 from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
-from .grammar import UNASKED, LawValue, in_order
+from .grammar import UNASKED, LawValue, check_asked, in_order
 
 SOURCES = ("desired", "measured", "true")
 
@@ -32,7 +32,7 @@ class CompiledLaw(LawValue):
     function: Callable
     at: str | None = None
     memory: int = 0
-    _unasked = UNASKED
+    _unasked = UNASKED | {"__call__": "step"}
 
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type | LawValue):
@@ -87,6 +87,7 @@ class CompiledLaw(LawValue):
         return getattr(self.function, "__name__", type(self.function).__name__)
 
     def step(self, memory, sample):
+        check_asked(type(self), CompiledLaw)
         desired, given = sample.desired, []
         if self.at is not None:
             q, qd = (desired.q, desired.qd) if self.at == "desired" else sample.pose(self.at)

@@ -33,7 +33,7 @@ from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matri
 from ..mechanics.kinematics import forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .grammar import UNASKED, LawValue, gain, joint_gain, measured, seen
+from .grammar import UNASKED, LawValue, check_asked, gain, joint_gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,6 +131,7 @@ class SwitchedCTC(LawValue):
         super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), hysteresis=float(hysteresis))
 
     def step(self, memory, sample):
+        check_asked(type(self), SwitchedCTC)
         q, qd = seen(sample).pose(self.pose)
         pair = self.choose(sample.model, q, memory)
         return self.fixed(pair).torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair

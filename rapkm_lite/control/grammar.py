@@ -132,7 +132,7 @@ def begin(law, model: Manipulator, dt: float):
     Raises ValueError where a method of a user's law takes other arguments, or is one that no run would ask.
     """
     law = as_law(law)
-    _check_asked(type(law))
+    check_asked(type(law), next((c for c in type(law).__mro__ if "step" in vars(c)), Law))
     if type(law).step is Law.step:
         one_of("pose", law.pose, ("measured", "true", None))
     for name, given in _METHODS.items():
@@ -153,14 +153,19 @@ def in_order(name: str, function, *given: str) -> None:
         raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: ({', '.join(given)})")
 
 
-def _check_asked(kind: type) -> None:
-    """Raise ValueError where a user's class has a formula of its own, and the step of a law of the package."""
-    base = next((c for c in kind.__mro__ if "step" in vars(c)), kind)
+def check_asked(kind: type, base: type) -> None:
+    """Raise ValueError where a user's class has a formula of its own that the step of `base` does not use.
+
+    A step of the user's may ask that of a law of the package: a class that has both a formula and a step knows of it.
+    """
     for name, instead in vars(base).get("_unasked", {}).items():
-        if getattr(kind, name) is not getattr(base, name) and getattr(kind, instead) is getattr(base, instead):
+        if getattr(kind, name) is getattr(base, name):
+            continue
+        owner = next(c for c in kind.__mro__ if name in vars(c))
+        if getattr(kind, instead) is getattr(base, instead) or (instead == "step" and instead not in vars(owner)):
             raise ValueError(
-                f"{kind.__name__}.{name} is of your own, but {base.__name__}.step does not use it; "
-                f"allowed: also a {instead} of your own, which is what a run asks for"
+                f"{owner.__name__}.{name} is of your own, but {base.__name__}.step does not use it; "
+                f"allowed: also a {instead} of your own in that class, which is what a run asks for"
             )
 
 

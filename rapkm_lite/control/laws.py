@@ -22,7 +22,7 @@ from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
-from .grammar import UNASKED, LawLike, LawValue, as_law, ask, begin, coordinates, gain, measured, seen
+from .grammar import UNASKED, LawLike, LawValue, as_law, ask, begin, check_asked, coordinates, gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,6 +101,7 @@ class PID(LawValue):
         return np.zeros(N)
 
     def step(self, memory, sample):
+        check_asked(type(self), PID)
         e, ed = seen(sample).errors()
         memory = exact_array("memory", memory, len(e))
         integral = memory + _times(self.K_I, sample.dt * e)
@@ -157,6 +158,7 @@ class AntagonismFilter(LawValue):
         return begin(self.law, manipulator(model, "model"), dt)
 
     def step(self, memory, sample):
+        check_asked(type(self), AntagonismFilter)
         c, memory = ask(self.law, memory, seen(sample))
         q, _ = sample.pose(self.pose)
         return self.matrix(sample.model, q) @ c, memory
