@@ -383,3 +383,27 @@ def test_no_law_of_the_package_takes_an_attribute():
 def test_a_matrix_of_six_joints_prints_as_it_is_typed():
     value = Sample(np.diag(np.arange(1.0, 7.0)))
     assert eval(repr(value), {"Sample": Sample}) == value
+
+
+def test_a_value_in_the_body_of_a_class_is_no_silent_default():
+    """A dataclass reads defaults of fields with a type only; what it does not read is refused, not passed by."""
+    robot = rk.load()
+    for kind, made, body in (
+        (rk.CTC, (400.0, 40.0), {"independent": None}),
+        (rk.AntagonismFilter, (rk.PD(7.0, 0.2),), {"pose": "true"}),
+        (rk.PID, (7.0, 1.0, 0.2), {"limit": 0.05}),
+        (rk.Manipulator, (robot.base, robot.lengths, robot.masses), {"friction": [0.1, 0.2, 0.1]}),
+        (rk.Sensors, (), {"encoder": 2000}),
+    ):
+        (name,), mine = body, type("Mine", (kind,), dict(body))
+        with pytest.raises(ValueError, match=rf"Mine\.{name} = .* in the body of the class does not reach the field"):
+            mine(*made)
+        # Given, or handed on by an `__init__` of the class, it is the field.
+        assert repr(mine(*made, **body)).replace("Mine", kind.__name__) == repr(kind(*made, **body))
+    assert type("Same", (rk.CTC,), {"pose": "measured", "K_P": 3.0})(400.0, 40.0).K_P == 400.0
+
+    @dataclass(frozen=True, eq=False, repr=False)
+    class Typed(rk.CTC):
+        independent: tuple | None = None
+
+    assert Typed(400.0, 40.0).independent is None

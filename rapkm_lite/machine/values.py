@@ -139,10 +139,25 @@ class Value:
 
     def __post_init__(self, **checked):
         self._set(**checked)
+        self._check_class()
         for name, value in self._fields().items():
             kept = _frozen(self._checked(name, value))
             if kept is not value:
                 object.__setattr__(self, name, kept)
+
+    def _check_class(self) -> None:
+        """Refuse a value in the body of a user's class that is meant for a field, which kept its default."""
+        for field in dataclasses.fields(self) if _names(type(self)) else ():
+            own = getattr(type(self), field.name, field.default)
+            if own is field.default or hasattr(type(own), "__set__"):  # a property sets what it likes
+                continue
+            value = getattr(self, field.name, own)
+            if _same(value, field.default) and not _same(value, own):
+                raise ValueError(
+                    f"{type(self).__name__}.{field.name} = {short(own)} in the body of the class does not reach the "
+                    f"field, which is {_typed(value)}; allowed: to give {field.name} when the value is made, or "
+                    f"`{field.name}: type = ...` in a class under @dataclass(frozen=True, eq=False, repr=False)"
+                )
 
     def _checked(self, name: str, value):
         """The value of a field in full precision; refuses what is not of the declared kind, for the kinds below."""
@@ -239,6 +254,14 @@ _CACHES = ("_hash", "_tables", "_codes")
 @cache
 def _names(cls: type) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls)) if dataclasses.is_dataclass(cls) else ()
+
+
+def _same(value, other) -> bool:
+    """Are they equal, where one number may stand for many?"""
+    try:
+        return equal(value, other) or bool(np.all(value == np.asarray(other)))
+    except Exception:
+        return False
 
 
 def _typed(value) -> str:
