@@ -581,3 +581,19 @@ def test_a_dead_drive_takes_a_five_bar_through_a_singularity_and_no_loop_loses_t
         assert_allclose(rk.simulate(robot, here, path, faults=faults).x, truth.x, atol=1e-7)
     study = rk.sweep(robot, law, path, np.zeros((9, 2)), faults=faults)
     assert_allclose(study.x_final, np.tile(truth.x[-1], (9, 1)), atol=1e-7)
+
+
+@pytest.mark.parametrize("time", [(0.005, 0.1), "early", None])
+def test_a_fault_of_a_users_may_tell_several_times_or_none(time):
+    """Its run is lost in words, with all samples before: the cause looks at when faults begin."""
+
+    class Slips(Fault):
+        def __init__(self):
+            self.time = time
+
+        def mark(self, table, t):
+            table.jump[t >= 0.005, 0] += 0.3
+
+    with pytest.raises(rk.SimulationError, match="left the workspace") as lost:
+        rk.simulate(ROBOT, rk.PD(7.05, 30.0), PATH, faults=[Slips()])
+    assert len(lost.value.partial) > 5

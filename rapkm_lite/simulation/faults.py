@@ -170,8 +170,11 @@ def _from(t: np.ndarray, time: float) -> np.ndarray:
 
 
 def begins(fault: Fault) -> float:
-    """When a fault begins, in s."""
-    return float(getattr(fault, "time", getattr(fault, "start", 0.0)))
+    """When a fault begins, in s; of several times the first, and the start of the run where it tells no number."""
+    try:
+        return float(np.min(getattr(fault, "time", getattr(fault, "start", 0.0))))
+    except (TypeError, ValueError):
+        return 0.0
 
 
 def described(fault: Fault) -> str:
