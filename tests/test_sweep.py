@@ -296,3 +296,27 @@ CLOSED.shutdown()
 def test_bad_arguments(arguments, message):
     with pytest.raises(ValueError, match=message):
         rk.sweep(**{"robot": ROBOT, "law": PD, "trajectory": PATH, "offsets": np.zeros((2, 3))} | arguments)
+
+
+def test_a_law_that_is_itself_a_tuple_or_list_is_one_law():
+    class Gains(collections.namedtuple("Gains", "K_P K_D")):
+        def __call__(self, t, q_a, qd_a, desired):
+            return -self[0] * (q_a - desired.q_a) - self[1] * (qd_a - desired.qd_a)
+
+    class Listed(list):
+        __call__ = Gains.__call__
+
+    path = rk.hold(ROBOT, [0.0, 0.0], 0.05)
+    for law in (Gains(7.05, 0.225), Listed([7.05, 0.225])):
+        study = rk.sweep(ROBOT, law, path, OFFSETS[:2])
+        assert study.law == law and study.reasons == (None, None)
+        np.testing.assert_allclose(study.energies, rk.sweep(ROBOT, PD, path, OFFSETS[:2]).energies, rtol=1e-9)
+
+
+def test_an_executor_whose_answers_are_no_futures_is_named():
+    class Now:
+        def submit(self, function, *given):
+            return function(*given)
+
+    with pytest.raises(ValueError, match=r"executor\.submit\(\.\.\.\) = .*; allowed: a Future of concurrent\.futures"):
+        rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=Now())

@@ -58,9 +58,9 @@ class Sweep(Value):
     stopped: tuple[str | None, ...] = ()
 
     def __post_init__(self):
-        if isinstance(self.law, list | tuple):
+        if isinstance(self.law, list | tuple) and not callable(self.law) and not hasattr(self.law, "step"):
             self._set(law=tuple(self.law))  # also of a class of a user's
-        for law in self.law if isinstance(self.law, tuple) else [self.law]:
+        for law in self.law if type(self.law) is tuple else [self.law]:
             as_law(law)
         self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
         if type(self.stopped) not in (list, tuple) or any(not isinstance(w, str | None) for w in self.stopped):
@@ -79,7 +79,7 @@ class Sweep(Value):
         for name in ("offsets", *Columns._fields[:-2]):
             given, shape = getattr(self, name), getattr(blank, name, blank.energies).shape
             shaped(name, given, given.shape == shape, f"{shape}, a row per run")
-        if isinstance(self.law, tuple) and len(self.law) != len(self):
+        if type(self.law) is tuple and len(self.law) != len(self):
             raise ValueError(f"law holds {len(self.law)} for {len(self)} rows; allowed: one law, or one per row")
 
     @cached_property
@@ -96,7 +96,7 @@ class Sweep(Value):
         """
         words = list(self.stopped)
         for i in np.flatnonzero([word in REASONS.values() for word in words]):  # what ran in Python knows why
-            law = self.law[i] if isinstance(self.law, tuple) else self.law
+            law = self.law[i] if type(self.law) is tuple else self.law
             sensors = self.sensors.with_offset(self.offsets[i])
             try:
                 complete(prepare(self.robot, self.trajectory, sensors, self.model, self.faults), law)
