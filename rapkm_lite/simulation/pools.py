@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 from inspect import isfunction
 
-from ..machine.arguments import short
+from ..machine.arguments import having, short
 
 
 @contextmanager
@@ -25,9 +25,9 @@ def pool_of(executor: Executor | None, threads: int):
 
 
 def handed(pool: Executor, *job) -> Future:
-    """`submit` of an executor; raises ValueError for one that was shut down."""
+    """`submit` of an executor; raises ValueError for one that was shut down, and for an answer that is no Future."""
     try:
-        return pool.submit(*job)
+        return having("executor.submit(...)", pool.submit(*job), "a Future of concurrent.futures", "result", "cancel")
     except RuntimeError as error:
         if "after shutdown" not in str(error):
             raise
