@@ -1,6 +1,7 @@
 """The explorers: drawn at corners and defaults of their controls, honest about mistakes, and without leaks."""
 
 import datetime
+import functools
 import importlib.util
 import inspect
 import itertools
@@ -986,3 +987,34 @@ def test_a_picture_is_drawn_by_one_thread(monkeypatch):
     done.set()
     page.join()
     assert len(sent) > 60 and set(sent) == {usual}
+
+
+def test_whatever_python_calls_may_draw():
+    """An object, a method and a partial function are named after what somebody wrote, and described in its words."""
+
+    class Line:
+        """A line through the origin."""
+
+        def __call__(self, picture, gain):
+            picture.line("p", [0.0, 1.0], [0.0, gain])
+            return {"gain": str(gain)}
+
+        def again(self, picture, gain):
+            """The same line."""
+            return self(picture, gain)
+
+    def draw(scale, picture, gain):
+        """A line that is scaled."""
+        return Line()(picture, scale * gain)
+
+    panels = {"p": {"xlabel": "x", "ylabel": "y", "xlim": (0, 1), "ylim": (0, 9)}}
+    for call, name, about in (
+        (Line(), Line.__qualname__, "A line through the origin."),
+        (Line().again, Line.__qualname__, "The same line."),
+        (functools.partial(draw, 1.0), draw.__qualname__, "A line that is scaled."),
+        (functools.partial(Line()), Line.__qualname__, "A line through the origin."),
+    ):
+        made = explore.explorer(call, {"gain": explore.slider("gain in 1", 1.0, 3.0, 1.0, 2.0)}, panels)
+        assert made.name == name.split(".")[0] and made.about == about and made.set(gain=3.0).numbers == {"gain": "3.0"}
+        with pytest.raises(ValueError, match=r"controls are named \(none\), but \w+ takes gain after the picture"):
+            explore.explorer(call, {}, panels)

@@ -107,6 +107,13 @@ def _within(low: float, high: float, value: float) -> None:
         raise ValueError(f"value = {value!r}; allowed: low to high, {low!r} to {high!r}")
 
 
+def written(draw):
+    """What somebody wrote of a draw function, and named: the function within a partial one, the class of an object."""
+    while isinstance(draw, functools.partial):
+        draw = draw.func
+    return draw if hasattr(draw, "__qualname__") else type(draw)
+
+
 def parts(draw, controls, play, live, about) -> None:
     """Refuse what is no part of an explorer."""
     function("draw", draw)
@@ -123,7 +130,7 @@ def parts(draw, controls, play, live, about) -> None:
     rest = len(names) < len(parameters)
     if not set(names) <= set(controls) or (not rest and set(controls) - set(names)):
         raise ValueError(
-            f"controls are named {', '.join(controls) or '(none)'}, but {draw.__name__} takes "
+            f"controls are named {', '.join(controls) or '(none)'}, but {written(draw).__name__} takes "
             f"{', '.join(names) or '(none)'} after the picture; allowed: the same names"
         )
 

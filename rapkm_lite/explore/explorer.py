@@ -18,7 +18,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Player, Shown, alone, follow, moved, moving, parts, put, ranges, snap, tidied
+from .controls import Player, Shown, alone, follow, moved, moving, parts, put, ranges, snap, tidied, written
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -88,9 +88,10 @@ class Explorer:
         self.numbers: dict[str, str] = {}
         self._alone = threading.RLock()
         # The draw function of a ready-made explorer is local to the function that bears its name.
-        self.name = draw.__qualname__.split(".")[0]
-        maker = getattr(sys.modules[draw.__module__], self.name, draw)
-        self.about = about or (inspect.getdoc(draw) or inspect.getdoc(maker) or "").split("\n")[0]
+        told = written(draw)
+        self.name = told.__qualname__.split(".")[0]
+        maker = getattr(sys.modules[told.__module__], self.name, told)
+        self.about = about or (inspect.getdoc(told) or inspect.getdoc(maker) or "").split("\n")[0]
         self._defaults = self._first = self.values
         self.made, self.problem, self._told, self._held, self._watched, self._slow = "explorer", "", {}, False, False, 0
         named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
