@@ -1018,3 +1018,12 @@ def test_whatever_python_calls_may_draw():
         assert made.name == name.split(".")[0] and made.about == about and made.set(gain=3.0).numbers == {"gain": "3.0"}
         with pytest.raises(ValueError, match=r"controls are named \(none\), but \w+ takes gain after the picture"):
             explore.explorer(call, {}, panels)
+
+
+@pytest.mark.parametrize("told", [7.0, "7 mm", (x for x in "ab")])
+def test_numbers_that_are_no_dict_are_named_in_the_picture(told):
+    made = explore.explorer(
+        lambda picture, gain: told, {"gain": explore.slider("gain in 1", 1.0, 3.0, 1.0, 2.0)}, {"p": {}}
+    )
+    assert "what draw returns = " in made.problem and "allowed: a dict of name -> text, or None" in made.problem
+    assert made.numbers == {} and made.problem in made.sentence

@@ -15,7 +15,7 @@ import ipywidgets as widgets
 import traitlets
 
 from ..figures.marks import Picture, bundle, encode, png, scene
-from ..machine.arguments import ConvergenceError, of_kind
+from ..machine.arguments import ConvergenceError, having, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
 from .controls import Player, Shown, alone, follow, moved, moving, parts, put, ranges, snap, tidied, written
@@ -171,7 +171,8 @@ class Explorer:
         self.picture.begin()
         self.problem, start = "", time.perf_counter()
         try:
-            self.numbers = self.draw(self.picture, **self.values) or {}
+            told = self.draw(self.picture, **self.values) or {}
+            self.numbers = having("what draw returns", told, "a dict of name -> text, or None", "items")
         except (ValueError, SimulationError, ConvergenceError) as error:
             self.problem, self.numbers = f"No result for this setting: {error}", {}
         moving(self.picture.handles, self.controls)
