@@ -148,3 +148,16 @@ def test_what_one_offset_can_save_of_the_fight():
     assert round(fight(OFFSET), 1) == 2.8 and round(fight(OFFSET - OFFSET.mean()), 1) == 0.1
     one_at_its_best = [OFFSET - np.eye(3)[k] * (S @ OFFSET)[k] / S[k, k] for k in range(3)]
     assert {round(fight(offset), 1) for offset in one_at_its_best} == {0.1, 0.3}
+
+
+def test_with_offsets_a_fixed_pair_goes_to_a_point_of_its_own():
+    """Lesson 11: laws that ask all drives go to A^+ offset beside the path; a pair to its own, by chance as far off."""
+    path, w = rk.triangle(FRICTIONLESS, 0.12, 2.5), 10 * np.pi
+    A = rk.control_matrix(FRICTIONLESS, path.q)
+    best = -np.linalg.pinv(A) @ OFFSET
+    runs = [rk.simulate(FRICTIONLESS, rk.CTC(w**2, 2 * w, of), path, OFFSET) for of in (None, (0, 1))]
+    at_end_effector, pair = (np.linalg.norm(run.x - path.x - best, axis=1)[300:] for run in runs)
+    assert at_end_effector.max() < 0.06e-3 and pair.max() > 1e-3
+    own = -np.linalg.solve(A[:, :2], np.tile(OFFSET[:2, None], (len(A), 1, 1)))[..., 0]
+    assert np.linalg.norm(runs[1].x - path.x - own, axis=1)[300:].max() < 0.1e-3
+    assert_allclose(*[np.sqrt(np.mean(run.path_error**2)) for run in runs], rtol=0.02)
