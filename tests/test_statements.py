@@ -161,3 +161,16 @@ def test_with_offsets_a_fixed_pair_goes_to_a_point_of_its_own():
     own = -np.linalg.solve(A[:, :2], np.tile(OFFSET[:2, None], (len(A), 1, 1)))[..., 0]
     assert np.linalg.norm(runs[1].x - path.x - own, axis=1)[300:].max() < 0.1e-3
     assert_allclose(*[np.sqrt(np.mean(run.path_error**2)) for run in runs], rtol=0.02)
+
+
+def test_a_clipped_drive_is_asked_for_more_than_the_motion_needs():
+    """Lesson 09: the motion exceeds the limit of drive 1 by a third, less than a quarter of the time; the loop exceeds
+    it by more, and longer."""
+    limit, machine = 85e-3, FRICTIONLESS.replace(load=0.7)
+    path, law = rk.polygon(machine, [[0, -0.06], [0, 0.06]], duration=2.0, dt=5e-3), rk.CTC(400.0, 40.0, None)
+    needed = np.abs(rk.inverse_dynamics(machine, path.q, path.qd, path.qdd))
+    run = rk.simulate(machine, law, path, faults=[rk.TorqueLimit(limit)])
+    asked = np.abs([law.torque(machine, *state) for state in zip(run.q, run.qd, run.q_a, run.qd_a, path, strict=True)])
+    assert needed[:, 1:].max() < limit and asked[:, 1:].max() < limit
+    assert 1.3 < needed.max() / limit < 4 / 3 and asked.max() / limit > 2
+    assert np.mean(needed > limit, axis=0)[0] < 0.25 < np.mean(asked > limit, axis=0)[0]
