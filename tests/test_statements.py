@@ -174,3 +174,17 @@ def test_a_clipped_drive_is_asked_for_more_than_the_motion_needs():
     assert needed[:, 1:].max() < limit and asked[:, 1:].max() < limit
     assert 1.3 < needed.max() / limit < 4 / 3 and asked.max() / limit > 2
     assert np.mean(needed > limit, axis=0)[0] < 0.25 < np.mean(asked > limit, axis=0)[0]
+
+
+def test_the_filter_shortens_the_forces_of_the_drives_on_the_whole_not_each():
+    """Lesson 00 and the dashboard: squares of torques never grow in sum, the force of a single drive may."""
+    path = rk.triangle(TESTBED)
+    plain, calm = (
+        rk.simulate(TESTBED, law, path, OFFSET) for law in (rk.PD(7.05, 0.225), rk.AntagonismFilter(rk.PD(7.05, 0.225)))
+    )
+    lever = np.linalg.norm(rk.control_matrix(TESTBED, plain.q), axis=-1)
+    before, after = lever * np.abs(plain.c), lever * np.abs(calm.c)  # lengths of the coloured arrows, N
+    assert after.sum() < 0.6 * before.sum()
+    assert np.mean(np.any(after > before + 0.02, axis=1)) > 0.25
+    force = [np.einsum("kij,ki->kj", rk.control_matrix(TESTBED, run.q), run.c) for run in (plain, calm)]
+    assert np.linalg.norm(force[1] - force[0], axis=1)[50:].max() < 0.1 * before.max()
