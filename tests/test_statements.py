@@ -188,3 +188,15 @@ def test_the_filter_shortens_the_forces_of_the_drives_on_the_whole_not_each():
     assert np.mean(np.any(after > before + 0.02, axis=1)) > 0.25
     force = [np.einsum("kij,ki->kj", rk.control_matrix(TESTBED, run.q), run.c) for run in (plain, calm)]
     assert np.linalg.norm(force[1] - force[0], axis=1)[50:].max() < 0.1 * before.max()
+
+
+def test_a_gap_is_more_than_the_integral_of_its_rate():
+    """Lesson 01: a step along a possible velocity leaves the curved surface: gaps open, every rate being zero."""
+    path = rk.circle(FRICTIONLESS, radius=0.1, duration=5.0, turns=5, dt=2e-3)
+    q = path.q[0]
+    for qd in path.qd:
+        J = rk.constraint_jacobian(FRICTIONLESS, q)
+        qd = qd - np.linalg.pinv(J) @ J @ qd
+        assert np.abs(J @ qd).max() < 1e-13
+        q = q + path.dt * qd
+    assert np.abs(rk.loop_constraints(FRICTIONLESS, q)).max() > 5e-3
