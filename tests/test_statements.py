@@ -200,3 +200,15 @@ def test_a_gap_is_more_than_the_integral_of_its_rate():
         assert np.abs(J @ qd).max() < 1e-13
         q = q + path.dt * qd
     assert np.abs(rk.loop_constraints(FRICTIONLESS, q)).max() > 5e-3
+
+
+def test_pairs_agree_about_the_place_where_offsets_are_tangent():
+    """Lesson 04: our offsets make the pairs disagree all along the path; others, A times a shift, agree at a place."""
+
+    def claims(q, offset):
+        A = rk.control_matrix(FRICTIONLESS, q)
+        return np.stack([np.linalg.solve(A[list(pair)], offset[list(pair)]) for pair in rk.drive_pairs(FRICTIONLESS)])
+
+    assert min(np.ptp(claims(q, OFFSET), axis=0).max() for q in PATH.q[::50]) > 0.05e-3
+    q = rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0])
+    assert np.ptp(claims(q, np.array([5e-3, -2e-3, -3e-3])), axis=0).max() < 1e-15
