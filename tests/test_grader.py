@@ -339,6 +339,43 @@ def test_all_that_an_answer_needs_is_run(tmp_path, before):
     assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
 
 
+UNCOMPILED = [
+    "def g(a, a):\n    return a\n",
+    "def g():\n    k = 1\n    global k\n",
+    "def g():\n    from math import *\n",
+]
+
+
+@pytest.mark.parametrize("before", UNCOMPILED)
+def test_a_cell_that_cannot_be_compiled_costs_only_itself(tmp_path, before):
+    """What Python parses and does not compile: in a notebook such a cell does not run, and the others do."""
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [SETUP, before, *checked(RIGHT)[1:]])
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["one = " + " + ".join(["two"] * 900), "one = f\"{two}\\n\\'\\'\\' {two['c']} \\\"\\\"\\\" \""],
+    ids=["a long sum", "quotes within quotes"],
+)
+def test_what_a_statement_uses_is_read_where_python_cannot_write_it_anew(text):
+    read, broken = statements(["two = 1", text, "check('04.x', one)"])
+    assert not broken and needed(read, set()) == read
+
+
+def test_a_return_outside_its_function_is_said_to_be_there(tmp_path):
+    body = "def filtered_torques(A, c):\n    z = A.T @ c\nreturn A @ z\n"
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", checked([body, *RIGHT[1:]]))
+    said = {one.exercise: one for one in grade(tmp_path)}[NAMES[0]]
+    assert said.verdict == "wrong" and "'return' outside function" in said.sentence
+
+
+def test_what_is_awaited_is_waited_for(tmp_path):
+    """A notebook may await outside a function."""
+    before = "import asyncio\nasync def give():\n    await asyncio.sleep(0)\n    return 1.0\none = await give()\n"
+    assert graded_alone(tmp_path, before) == "ok"
+
+
 INDIRECT = [
     "def test():\n    check(NAME, mine)\n\ntest()\n",
     "def test(f):\n    return check(NAME, f)\n\nresult = test(mine)\n",

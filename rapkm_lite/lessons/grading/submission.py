@@ -19,6 +19,8 @@ from ..exercise import Exercise
 _EXERCISE = re.compile(r"\d\d\.\w+")
 _NUMBER = re.compile(r"(?<!\d)(\d\d)_")
 _BUILT_IN = {*dir(builtins), "display"}
+# A notebook may await outside a function; nothing of this module's own way to be compiled is passed on.
+RULES = {"flags": ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, "dont_inherit": True}
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,8 @@ def statements(texts: list[str]) -> tuple[list[Statement], dict[int, str]]:
     for cell, text in enumerate(texts):
         try:
             body = ast.parse(text).body
-        except (SyntaxError, ValueError) as error:
+            compile(text, f"<cell {cell}>", "exec", **RULES)  # finds what parsing does not: a return outside a function
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             broken[cell] = f"{type(error).__name__}: {error}"
             continue
         read += [Statement(cell, number, node) for number, node in enumerate(body)]
@@ -186,7 +189,11 @@ def _changes(node: ast.stmt) -> set[str]:
 
 def _uses(node: ast.stmt) -> set[str]:
     """Names that a statement takes from outside itself; the arguments and variables of a function are its own."""
-    names, tables = set(), [symtable.symtable(ast.unparse(node), "cell", "exec")]
+    names: set[str] = set()
+    try:
+        tables = [symtable.symtable(ast.unparse(node), "cell", "exec")]
+    except (SyntaxError, ValueError, RecursionError):  # quotes within quotes, or a sum too long to be written anew
+        return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
     while tables:
         table = tables.pop()
         top = table.get_type() == "module"
@@ -197,7 +204,8 @@ def _uses(node: ast.stmt) -> set[str]:
 
 def _only_calls(node: ast.stmt) -> bool:
     """True for a statement that is one call for its effect; np.random.seed(1) has one on what follows."""
-    return isinstance(node, ast.Expr) and ".random." not in ast.unparse(node)
+    seeds = any(isinstance(part, ast.Attribute) and part.attr == "random" for part in ast.walk(node))
+    return isinstance(node, ast.Expr) and not seeds
 
 
 def _asks(node: ast.stmt) -> bool:

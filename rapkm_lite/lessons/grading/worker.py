@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import ast
+import asyncio
+import inspect
 import io
 import json
 import linecache
@@ -18,11 +20,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from rapkm_lite.lessons import checker
 from rapkm_lite.lessons.answers import Answer, Ended, Result, guarded
-from rapkm_lite.lessons.grading.submission import Statement, called, hides_check, needed, sources, statements
+from rapkm_lite.lessons.grading.submission import RULES, Statement, called, hides_check, needed, sources, statements
 
 
 class Bench:
@@ -75,10 +78,10 @@ class Bench:
             if statement.key in self.skip or statement.cell in self.failed:
                 continue
             self.tell(begin=statement.key)
-            code = compile(ast.Module([statement.node], []), f"<cell {statement.cell}>", "exec")
+            code = compile(ast.Module([statement.node], []), f"<cell {statement.cell}>", "exec", **RULES)
             try:
                 with quiet():
-                    guarded(exec, code, space)
+                    guarded(awaited, code, space)
             except Ended as end:
                 if end.result.word != "todo":
                     self.failed[statement.cell] = end.result.sentence
@@ -114,6 +117,12 @@ class Bench:
         tried = [self.judged(name, value) for cell, value in self.bound[name] if cell not in cells][:5]
         order = ["ok", "close", "wrong", "todo"]
         return min(tried, key=lambda result: order.index(result.word), default=Result("todo", "not yet"))
+
+
+def awaited(code: CodeType, space: dict[str, Any]) -> None:
+    """Run a statement, to its end where it awaits something."""
+    if inspect.iscoroutine(waits := eval(code, space)):
+        asyncio.run(waits)
 
 
 class NoNotebook:
