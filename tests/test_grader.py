@@ -376,6 +376,14 @@ def test_what_is_awaited_is_waited_for(tmp_path):
     assert graded_alone(tmp_path, before) == "ok"
 
 
+def test_a_number_in_a_name_that_is_no_lesson_is_corrected_by_the_exercises(tmp_path):
+    """A team, or the month of a date, has a number like a lesson."""
+    for name in ("team_07_lesson_04.ipynb", "filter_2026_03_12.ipynb"):
+        write(tmp_path / "ada" / name, checked(RIGHT))
+        assert [(one.lesson, one.path.name) for one in found(tmp_path, {"03", "04", "07"})] == [("04", name)]
+        (tmp_path / "ada" / name).unlink()
+
+
 INDIRECT = [
     "def test():\n    check(NAME, mine)\n\ntest()\n",
     "def test(f):\n    return check(NAME, f)\n\nresult = test(mine)\n",

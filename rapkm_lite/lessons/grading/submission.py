@@ -8,6 +8,7 @@ import json
 import os
 import re
 import symtable
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -49,7 +50,8 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
     """All submissions under a folder: STUDENT/.../04_title.ipynb, or loose notebooks, whose names are the student's.
 
     known : numbers of the lessons that have exercises; for notebooks without such a number in their name see `unnamed`.
-    Of several such numbers in a name, as in 04_title_v10_final.ipynb, that counts whose exercises the notebook names.
+    Of several such numbers in a name, as in 04_title_v10_final.ipynb, that counts whose exercises the notebook names,
+    and where it names exercises of another lesson only, that lesson.
     Raises ValueError when the folder does not exist or holds none.
     """
     if not os.path.isdir(folder):  # also where the name is longer than a name can be
@@ -63,7 +65,7 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
 def _handed_in(folder: Path, known: set[str]) -> Iterator[Submission]:
     for path, parts in _notebooks(folder):
         if numbers := [n for n in dict.fromkeys(_NUMBER.findall(path.name)) if n in known]:
-            yield Submission(parts[0] if len(parts) > 1 else path.stem, path, _told(path, numbers))
+            yield Submission(parts[0] if len(parts) > 1 else path.stem, path, _told(path, numbers, known))
 
 
 def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
@@ -71,13 +73,16 @@ def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
     return [str(one.path) for one in _handed_in(folder, known) if str(one.path) not in counted]
 
 
-def _told(path: Path, numbers: list[str]) -> str:
-    """Of some numbers of lessons, in the order of a name, the one whose exercises a notebook names most often."""
+def _told(path: Path, numbers: list[str], known: set[str]) -> str:
+    """The number in a name whose exercises the notebook names most often; another lesson's where it names only those.
+
+    A name may hold the number of a team or a date, as in team_07_lesson_04.ipynb.
+    """
     try:
-        text = path.read_text(encoding="utf-8") if len(numbers) > 1 else ""
+        named = Counter(re.findall(r"\b(\d\d)\.[a-z]\w+", path.read_text(encoding="utf-8")))
     except (OSError, ValueError):
-        text = ""
-    return max(numbers, key=lambda number: len(re.findall(rf"\b{number}\.[a-z]\w+", text)))
+        return numbers[0]
+    return max(numbers if any(named[n] for n in numbers) else [*numbers, *sorted(known)], key=lambda n: named[n])
 
 
 def unnamed(folder: Path, known: set[str]) -> list[str]:
