@@ -266,6 +266,17 @@ def test_answers_before_the_slider():
     assert waste(alike, 14.1) / waste(alike) == pytest.approx(4, rel=0.05)
 
 
+def test_answer_about_one_elbow_the_other_way():
+    """Question 12: the three terms of the sum have unequal weights there, not one over the root of three."""
+    text = (TEACHING / "questions.md").read_text(encoding="utf-8")
+    told = np.array([4.0, -2.0, 5.0])
+    for mode, least, said in (((1, 1, 1), None, "4.0 mrad"), ((1, 1, -1), 0, "1.8\n"), ((-1, 1, 1), 1, "6.5 mrad")):
+        robot = rk.load().replace(mode=mode)
+        eta = rk.null_vector(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+        assert f"{abs(eta @ told):.1f}" in said and said in text
+        assert least is None or np.argmin(np.abs(eta)) == least
+
+
 def test_concept_test_has_ten_items_with_one_answer_each():
     text = (TEACHING / "concept_test.md").read_text(encoding="utf-8")
     items = re.findall(r"^\d+\. (.*?)(?=^\d+\. |\Z)", text, re.M | re.S)
