@@ -529,6 +529,18 @@ def test_a_singularity_is_that_of_the_desired_pose_at_which_the_run_was_lost(dur
     assert f"|d_j x d_k| = {abs(x1 * y2 - x2 * y1):.2g} at" in caught.value.reason
 
 
+@pytest.mark.parametrize(("aside", "named"), [(0.0, True), (0.01, False)])
+def test_an_input_singularity_is_named_although_the_run_was_lost_after_it(aside, named):
+    """On the line between two base points the distal links are parallel at its middle alone: |d_j x d_k| = 0 there."""
+    way = BETWEEN.x[0] + [[-0.05, aside], [0.05, aside]]
+    path = rk.polygon(MIXED, way, duration=0.3)
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(MIXED, rk.APD(7.05, 0.225, None), path, [0.02, -0.01, 0.02], encoder=2000)
+    crossed = np.abs(distal_cross_products(MIXED, path.q[: round(caught.value.time / path.dt)])).max(axis=1)
+    assert crossed.min() == pytest.approx(aside, rel=0.1, abs=1e-12) and crossed.max() > crossed[-1] > 0.1
+    assert ("near an input singularity" in caught.value.reason) == named
+
+
 def test_a_model_that_makes_a_loop_unstable_is_named_so_where_the_machines_own_would_be_lost_too():
     """Computed torque with 35 times the inertia has 35 times the gains: K_D dt = 60 * 35 * 1e-3 > 2, unstable."""
     names = ("masses", "inertias", "rotor_inertia")
@@ -556,7 +568,7 @@ def test_a_right_model_and_right_encoders_are_not_blamed():
     assert "controller's model" not in said and "offset =" not in said
 
 
-@pytest.mark.parametrize("offset", [None, OFFSET], ids=["none", "some"])
+@pytest.mark.parametrize("offset", [None, OFFSET, [4e-3, 0.0, 0.0]], ids=["none", "some", "one"])
 def test_offsets_are_to_be_looked_at_where_there_are_any(offset):
     """Gains that throw the machine out within the first sample, so that no loop near the desired state is left."""
     said = lost(law=rk.PD(1e99, 1e99), path=HOLD, **({} if offset is None else {"offset": offset}))
@@ -579,6 +591,22 @@ def test_what_is_seen_of_sensors_is_named_from_a_bound_on(options, words, named)
     """Ten samples of delay, a tenth of a radian: a law of a user, lost for its sign, is not run again."""
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, **({"offset": OFFSET} | options))
     assert (words in said) == named
+
+
+@pytest.mark.parametrize("size", [0.1, 0.2, 0.4])
+def test_what_is_seen_of_a_model_is_named_from_a_twentieth_of_a_link_on(size):
+    """The same machine in any size, and a user's law that is lost for its sign and not run again."""
+    robot = ROBOT.replace(base=size / 0.2 * ROBOT.base, lengths=size, centers=size / 2)
+    for share in (0.03, 0.07):
+        with pytest.raises(rk.SimulationError) as caught:
+            rk.simulate(
+                robot,
+                lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a),
+                rk.hold(robot, [0.0, 0.0], 0.5),
+                OFFSET,
+                model=robot.replace(lengths=(1.0 + share) * robot.lengths),
+            )
+        assert ("controller's model has lengths" in caught.value.reason) == (share > 0.05)
 
 
 def test_a_pull_downwards_that_is_off_is_told_as_a_share_of_its_size():
