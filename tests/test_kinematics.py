@@ -332,6 +332,49 @@ def test_the_pose_is_found_far_from_the_origin(far):
     assert_allclose(run.c, rk.simulate(near, law, rk.circle(near, 0.05 * size, 0.2), offset).c, atol=1e2 * coarse)
 
 
+@pytest.mark.parametrize("size", [1e-10, 1e-6, 1e6])
+def test_configurations_and_poses_are_found_in_any_unit_of_length(size):
+    """Angles know no unit: they are those of the machine in metres, to the tolerance of its longest link."""
+    robot = TESTBED.replace(base=size * TESTBED.base, lengths=size * TESTBED.lengths, centers=size * TESTBED.centers)
+    rng = np.random.default_rng(7)
+    x = random_points(TESTBED, 20, 7, 0.5)
+    rough = rk.inverse_kinematics(TESTBED, x) + rng.uniform(-0.2, 0.2, (20, 6))
+    found = np.array([rk.close_loops(robot, q) for q in rough])
+    assert np.abs(rk.loop_constraints(robot, found)).max() < 1e-13 * 0.2 * size
+    assert_allclose(found, [rk.close_loops(TESTBED, q) for q in rough], rtol=0, atol=1e-12)
+    for q, place in zip(rough, x, strict=True):
+        pose = rk.estimate_pose(robot, q[:3], size * place, iterations=8)
+        assert_allclose(pose, rk.estimate_pose(TESTBED, q[:3], place), rtol=0, atol=1e-12)
+    # A corner, where arm 1 is folded and arms 2 and 3 are stretched, loses a constraint in any unit, other poses none.
+    corner = np.array([0.0, np.pi, -2 * np.pi / 3, np.pi, 0.0, 0.0])
+    assert rk.degree_of_freedom(robot, corner) == 3 and np.all(rk.degree_of_freedom(robot, found) == 2)
+
+
+def test_many_configurations_need_no_more_steps_than_one():
+    rough = rk.inverse_kinematics(TESTBED, random_points(TESTBED, 2000, 8, 0.5))
+    rough += np.random.default_rng(8).uniform(-0.15, 0.15, rough.shape)
+    found = rk.close_loops(TESTBED, rough, iterations=8)
+    assert_allclose(found[::100], [rk.close_loops(TESTBED, q, iterations=8) for q in rough[::100]], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_gap_is_one_in_any_direction_and_unit(sign):
+    """The tip of arm 2 stays behind both others, or runs ahead of them, in x and in y."""
+    for size in (1e-3, 1.0, 1e3):
+        robot = TESTBED.replace(base=size * TESTBED.base, lengths=size * TESTBED.lengths)
+        for gap, closed in ((0.9e-3, True), (1.1e-3, False)):
+            shifted = robot.replace(
+                base=robot.base + sign * gap * size * 0.2 * np.array([[1.0, 1.0], [0, 0], [1.0, 1.0]])
+            )
+            q = rk.inverse_kinematics(robot, [0.02 * size, 0.03 * size])
+            assert_allclose(rk.loop_constraints(shifted, q), sign * gap * size * 0.2, rtol=1e-9)
+            if closed:
+                assert rk.orthogonal_complement(shifted, q).shape == (6, 2)
+            else:
+                with pytest.raises(ValueError, match="leaves the loops open"):
+                    rk.orthogonal_complement(shifted, q)
+
+
 def test_of_many_poses_the_one_whose_loops_stay_open_is_named():
     q = rk.inverse_kinematics(TESTBED, [0.02, 0.03])
     for poses in ([q, q + np.array([0, 0, 0, 2.5, 2.5, -2.5])], [q + np.array([0, 0, 0, 2.5, 2.5, -2.5]), q]):
@@ -345,3 +388,23 @@ def test_an_arm_of_equal_links_reaches_its_own_base_point():
     robot = rk.Manipulator(base=[[-0.25, 0.125], [0.25, 0.0]], lengths=0.5, masses=0.1)
     assert rk.reachable(robot, robot.base).tolist() == [True, True]
     assert rk.reachable(robot.replace(lengths=[[0.5, 0.25], [0.5, 0.5]]), robot.base).tolist() == [False, True]
+
+
+def test_a_point_too_near_to_a_base_point_is_refused_like_one_too_far():
+    robot = rk.Manipulator(base=[[0.0, 0.0], [0.5, 0.0]], lengths=[[0.3, 0.1], [0.3, 0.3]], masses=0.1)
+    for distance, allowed in ((0.19, False), (0.21, True), (0.39, True), (0.41, False)):
+        x = distance * np.array([0.6, 0.8])
+        if allowed:
+            assert_allclose(rk.tips(robot, rk.inverse_kinematics(robot, x)), [x, x], atol=1e-15)
+        else:
+            with pytest.raises(ValueError, match=rf"it is {distance:g} m from base point 1; allowed: 0\.2 to 0\.4 m"):
+                rk.inverse_kinematics(robot, x)
+
+
+def test_tips_of_stretched_and_folded_arms_are_reached_whatever_rounding_did_to_them():
+    """cos(elbow) = +-1 to some 1e-15, which leaves angles of the root of that."""
+    robot = rk.Manipulator(base=[[0.1, -0.2], [0.35, -0.2]], lengths=[[0.3, 0.1], [0.7, 0.7]], masses=0.1)
+    angle = np.linspace(0.1, 6.2, 500)
+    for length in (0.4, 0.2):
+        x = robot.base[0] + length * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        assert_allclose(rk.tips(robot, rk.inverse_kinematics(robot, x)), np.stack([x, x], axis=1), rtol=0, atol=1e-12)

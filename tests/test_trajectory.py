@@ -165,6 +165,9 @@ def test_set_points_stay_as_far_from_the_path_for_another_machine():
         assert_allclose(getattr(moved, name) - getattr(there, name), apart, rtol=0, atol=1e-14 * np.abs(told.qd).max())
         assert_allclose(getattr(moved.for_robot(own), name), getattr(told, name), rtol=1e-14, atol=1e-13)
     assert np.array_equal(moved.q[:, 3:], there.q[:, 3:]) and np.array_equal(moved.qdd, there.qdd)
+    for side in (0.1, -0.1):  # all angles larger than those of the path, or all smaller
+        shifted = path.with_set_points(path.q_a + side, path.qd_a).for_robot(other)
+        assert_allclose(shifted.q_a - there.q_a, side, rtol=0, atol=1e-14)
     with pytest.raises(ValueError, match="robot has 4 arms; allowed: 3, as many as the set-points"):
         told.for_robot(MACHINES["four_arms"])
 
@@ -281,6 +284,8 @@ def test_set_points_on_another_turn_are_refused():
         path.with_set_points((path.q_a + np.pi) % (2 * np.pi) - np.pi)
     with pytest.raises(ValueError, match="in rad"):
         path.with_set_points(np.rad2deg(path.q_a))
+    with pytest.raises(ValueError, match=r"lies 3\.2 rad away from the path"):
+        path.with_set_points(path.q_a - 3.2)
     # It is the path that counts, not the set-points before.
     again = path.with_set_points(path.q_a + 2.0).with_set_points(path.q_a - 2.0)
     assert_allclose(again.q_a, path.q_a - 2.0)
