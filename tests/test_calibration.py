@@ -426,6 +426,11 @@ def test_what_a_refusal_knows_it_knows_as_well_as_least_squares(unknowns, count)
     known = refused.value.known
     error = 1e-6 * np.sqrt(np.diagonal(known @ np.linalg.pinv(J.T @ J, rcond=1e-9) @ known.T))
     said = [float(number) for number in re.findall(r"± (\S+?)(?:;|$)", str(refused.value))]
+    # Of each combination the coefficient largest in size is positive; all that print as something are told.
+    assert np.all(known.max(axis=1) == np.abs(known).max(axis=1)) and known.min() < -0.1
+    told = [term for row in known[:3] for term in map("{:+.3f}".format, row) if abs(float(term)) > 0.0]
+    assert re.findall(r"([+-]\d\.\d{3}) (?:offset|length|base)", str(refused.value)) == told
+    assert "pass noise" not in str(refused.value)
     assert refused.value.rank == 4 and len(said) == 3 and np.ptp(error) > 0.5 * error.max()
     assert_allclose(said, error[:3], rtol=0.06)  # two digits
 

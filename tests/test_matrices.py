@@ -242,3 +242,30 @@ def test_the_closed_form_of_the_null_vector_is_that_of_three_arms():
         robot = rk.load(name)
         with pytest.raises(ValueError, match=r"robot has [24] arms; allowed: 3 \(null_basis takes any number\)"):
             rk.null_vector(robot, rk.inverse_kinematics(robot, [0.01, 0.02]))
+
+
+@pytest.mark.parametrize("m", [4, 5, 6, 7])
+def test_null_bases_face_their_references_in_any_unit(m):
+    """The first vector is the projection of (1, ..., 1), the next ones have a positive share of their own reference."""
+    for seed in range(20):
+        A = np.random.default_rng(seed).normal(size=(m, 2))
+        basis = rk.null_basis(A)
+        even = rk.prestress_projector(A) @ np.ones(m)
+        assert_allclose(basis[:, 0], even / np.linalg.norm(even), rtol=0, atol=1e-12)
+        faced = _references(m)[:, : m - 3].T @ basis[:, : m - 3]
+        assert np.all(np.diagonal(faced) > 0.0) and np.abs(np.triu(faced, 1)).max() < 1e-12
+        assert np.linalg.det(np.hstack([A, basis])) > 0.0
+    many = np.random.default_rng(m).normal(size=(m + 4, m + 3))
+    for unit in (1e-49, 1e49):  # of whose powers the determinant would vanish or overflow
+        assert_allclose(rk.null_basis(unit * many), rk.null_basis(many), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e6])
+def test_null_vectors_know_no_unit_of_length(size):
+    robot = FRICTIONLESS.replace(base=size * FRICTIONLESS.base, lengths=size * FRICTIONLESS.lengths)
+    q = rk.inverse_kinematics(FRICTIONLESS, [0.03, -0.02])
+    assert_allclose(rk.null_vector(robot, q), rk.null_vector(FRICTIONLESS, q), rtol=0, atol=1e-13)
+    # All distal links parallel: the elbows of arms 1 and 2 turned outwards at the middle of their base points.
+    mixed = robot.replace(mode=[1, 1, -1])
+    with pytest.raises(ValueError, match="input singularity"):
+        rk.null_vector(mixed, rk.inverse_kinematics(mixed, mixed.base[:2].mean(axis=0)))
