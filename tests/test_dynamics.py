@@ -307,3 +307,14 @@ def test_one_pose_and_a_trajectory_are_the_same_call():
                 fourth = f(robot, q[0], *rates)
                 mixed = np.broadcast_to(f(robot, q[0], *args[1:]), whole.shape)  # Gbar and G~ depend on the pose alone
                 assert_allclose(mixed[3], fourth, atol=1e-13 * scale, rtol=1e-12)
+
+
+def test_one_pose_serves_many_rates_in_the_motion_equations():
+    """J qdd = -Jdot qd holds for each of the rates, and many poses take one vector of torques."""
+    q, qd, _, _ = random_motion(TESTBED, 1)
+    rates = np.linspace(-2.0, 2.0, 5)[:, None] * qd[0]
+    qdd, reactions = rk.forward_dynamics(TESTBED, q[0], rates, [0.1, -0.2, 0.05])
+    for k in range(5):
+        alone = rk.forward_dynamics(TESTBED, q[0], rates[k], [0.1, -0.2, 0.05])
+        assert_allclose(qdd[k], alone[0], rtol=1e-12, atol=1e-12)
+        assert_allclose(reactions[k], alone[1], rtol=1e-12, atol=1e-12)

@@ -114,6 +114,10 @@ def test_the_filter_of_three_degrees_of_freedom_leaves_nothing():
         (lambda: rk.projector(np.zeros((2, 4))), "lost rank"),
         (lambda: rk.projector_dot(J0, J1[:2]), "J_dot has shape"),
         (lambda: rk.minimal_terms(np.ones((9, 3)), np.ones((9, 2)), *3 * [np.eye(9)]), "F_dot"),
+        (lambda: rk.minimal_terms(np.ones(9), np.ones(9), *2 * [np.eye(9)], np.ones(9)), r"F has shape \(9,\)"),
+        (lambda: rk.complement([1.0, 0.0, 0.0], (0, 1)), r"J has shape \(3,\)"),
+        (lambda: rk.redundant_terms(np.ones(9), np.ones(9), *2 * [np.eye(9)], np.ones(9)), r"N has shape \(9,\)"),
+        (lambda: rk.redundant_terms(np.eye(9), np.ones(9), *2 * [np.eye(9)], np.ones(9)), r"N_dot \(9,\)"),
         (lambda: rk.redundant_terms(np.eye(9), np.eye(9), np.eye(9), np.eye(9), np.ones(8)), "Q has shape"),
         (
             lambda: rk.redundant_terms(*2 * [np.ones((5, 2, 3))], *2 * [np.eye(3)], np.ones(3)),

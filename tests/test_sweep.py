@@ -320,3 +320,22 @@ def test_an_executor_whose_answers_are_no_futures_is_named():
 
     with pytest.raises(ValueError, match=r"executor\.submit\(\.\.\.\) = .*; allowed: a Future of concurrent\.futures"):
         rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=Now())
+
+
+@pytest.mark.parametrize("failed", ["raise", "mask"])
+def test_rows_of_lost_runs_are_masked_whether_the_study_raises_or_not(failed):
+    """Gains of 1e4 lose the second of three runs; where none is lost, a study that masks has masked arrays, too."""
+    robot = rk.load().replace(friction=0.0)
+    path = rk.hold(robot, [0.0, 0.0], 0.1)
+    laws = [rk.PD(7.05, 0.225), rk.PD(1e4, 0.225), rk.PD(7.05, 0.225)]
+    if failed == "raise":
+        with pytest.raises(rk.SimulationError, match="run 1: ") as caught:
+            rk.sweep(robot, laws, path, [4e-3, -2e-3, 5e-3])
+        study = caught.value.sweep
+    else:
+        study = rk.sweep(robot, laws, path, [4e-3, -2e-3, 5e-3], failed="mask")
+    for column in (study.energies, study.torque_norm, study.x_final, study.largest_path_error):
+        masked = np.ma.getmaskarray(column).reshape(3, -1)
+        assert np.array_equal(masked.all(axis=1), [False, True, False]) and not masked[[0, 2]].any()
+    healthy = rk.sweep(robot, laws[::2], path, [4e-3, -2e-3, 5e-3], failed=failed)
+    assert np.ma.isMaskedArray(healthy.energies) == (failed == "mask")
