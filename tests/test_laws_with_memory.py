@@ -569,6 +569,23 @@ def test_a_step_of_a_users_does_not_pass_by_a_formula_of_a_users():
         rk.simulate(ROBOT, Called(lambda t, q_a, qd_a, d: np.zeros(3)), PATH)
 
 
+def test_a_call_that_no_run_asks_for_is_refused():
+    """A law is asked for its step: a class on one that only says what a call gives would run as the law below it."""
+    for base, given in ((rk.Law, ()), (rk.PD, (7.0, 0.2)), (rk.CTC, (400.0, 40.0))):
+
+        class Called(base):
+            def __call__(self, t, q_a, qd_a, desired):
+                return np.zeros(3)
+
+        class Both(Called):
+            def step(self, memory, sample):
+                return self(sample.t, sample.q_a, sample.qd_a, sample.desired), memory
+
+        with pytest.raises(ValueError, match=r"Called\.__call__ is of your own, but a run asks for step"):
+            rk.simulate(ROBOT, Called(*given), PATH)
+        assert not rk.simulate(ROBOT, Both(*given), PATH).c.any()
+
+
 class Slotted(rk.PD):
     __slots__ = ("kick",)
 

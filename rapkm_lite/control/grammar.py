@@ -133,6 +133,9 @@ def begin(law, model: Manipulator, dt: float):
     """
     law = as_law(law)
     check_asked(type(law), next((c for c in type(law).__mro__ if "step" in vars(c)), Law))
+    nearest = next((c for c in type(law).__mro__ if {"step", "torque", "__call__"} & vars(c).keys()), Law)
+    if not {"step", "torque"} & vars(nearest).keys():
+        raise ValueError(f"{nearest.__name__}.__call__ is of your own, but a run asks for step; allowed: a step")
     if type(law).step is Law.step:
         one_of("pose", law.pose, ("measured", "true", None))
     for name, given in _METHODS.items():
