@@ -448,6 +448,18 @@ def test_a_step_must_answer_with_the_torques_and_the_memory():
         rk.AntagonismFilter(lambda t, q_a, qd_a, desired: 0.0 * q_a).torque(ROBOT, *here)
 
 
+def test_a_formula_that_needs_no_pose_is_the_pd_that_it_writes_out():
+    class Spring(rk.Law):
+        pose = None
+
+        def torque(self, model, q, qd, q_a, qd_a, desired):
+            assert q is None and qd is None, "no pose was asked for"
+            return -7.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
+
+    written, known = (rk.simulate(ROBOT, law, PATH, offset=[1e-3, 0.0, -1e-3]) for law in (Spring(), rk.PD(7.0, 0.2)))
+    np.testing.assert_allclose(written.c, known.c, rtol=0, atol=1e-12)
+
+
 class Kicking(rk.PD):
     """A law of the package with more to say: a constant torque, and how often it was asked."""
 

@@ -136,7 +136,7 @@ def begin(law, model: Manipulator, dt: float):
     nearest = next((c for c in type(law).__mro__ if {"step", "torque", "__call__"} & vars(c).keys()), Law)
     if not {"step", "torque"} & vars(nearest).keys():
         raise ValueError(f"{nearest.__name__}.__call__ is of your own, but a run asks for step; allowed: a step")
-    if type(law).step is Law.step:
+    if type(law).step is Law.step and law.pose is not None:
         one_of("pose", law.pose, ("measured", "true", None))
     for name, given in _METHODS.items():
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
