@@ -1027,3 +1027,10 @@ def test_numbers_that_are_no_dict_are_named_in_the_picture(told):
     )
     assert "what draw returns = " in made.problem and "allowed: a dict of name -> text, or None" in made.problem
     assert made.numbers == {} and made.problem in made.sentence
+
+
+@pytest.mark.parametrize("space", [{}, {"__name__": "read_from_a_file_and_never_imported"}])
+def test_a_draw_function_need_not_belong_to_an_imported_module(space):
+    exec("def bare(picture, gain):\n    'A line.'\n    return {'gain': f'{gain:g}'}", space)
+    made = explore.explorer(space["bare"], {"gain": explore.slider("gain in 1", 1.0, 3.0, 1.0, 2.0)}, {"p": {}})
+    assert made.about == "A line." and made.set(gain=3.0).numbers == {"gain": "3"}

@@ -90,7 +90,7 @@ class Explorer:
         # The draw function of a ready-made explorer is local to the function that bears its name.
         told = written(draw)
         self.name = told.__qualname__.split(".")[0]
-        maker = getattr(sys.modules[told.__module__], self.name, told)
+        maker = getattr(sys.modules.get(told.__module__), self.name, told)
         self.about = about or (inspect.getdoc(told) or inspect.getdoc(maker) or "").split("\n")[0]
         self._defaults = self._first = self.values
         self.made, self.problem, self._told, self._held, self._watched, self._slow = "explorer", "", {}, False, False, 0
