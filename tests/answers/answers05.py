@@ -207,6 +207,7 @@ INVERSES = [
     ("wrong", "a cut-off that is too small", lambda A, rows: np.linalg.pinv(A.T, rcond=1e-13), "or one as small"),
     ("wrong", "stacked", stacked, "order"),
     ("wrong", "taken as sorted", sorted_rows, "order"),
+    ("wrong", "always the first two rows", lambda A, rows: explicit(A, (0, 1)), "rows 0 and 1 depend"),
     ("wrong", "transposed", lambda A, rows: explicit(A, rows).T, "transposed"),
     ("wrong", "opposite", lambda A, rows: -explicit(A, rows), "sign"),
     ("wrong", "others off", assembled(lambda L, B, b: (L, 0 * b)), "switched off"),

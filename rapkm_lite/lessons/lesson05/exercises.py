@@ -87,7 +87,10 @@ def _partitions(rng) -> list[tuple]:
             nudged.append(Case(f"{words} with rounding errors of 1e-12", rounded[k], rows))
     robot = load()
     A = redundant_control_matrix(robot, inverse_kinematics(robot, [0.01, 0.02]))
-    return [*cases, *nudged, *(Case("another order of rows", A, np.array(rows)) for rows in ((0, 2), (2, 0), (2, 1)))]
+    other = [Case("another order of rows", A, np.array(rows)) for rows in ((0, 2), (2, 0), (2, 1))]
+    # Half-way between base points 1 and 2 a half-turn takes arm 1 to arm 2: their distal links, and rows, are parallel.
+    A = redundant_control_matrix(robot, inverse_kinematics(robot, robot.base[:2].mean(axis=0)))
+    return [*cases, *nudged, *other, Case("a pose where rows 0 and 1 depend on each other", A, select_independent(A))]
 
 
 def _penrose(X, A_tilde, rows) -> tuple[float, str]:
