@@ -89,6 +89,7 @@ ANSWERS = {
         ("wrong", "mean size", lambda r, q, g: np.abs(q - best(r, q, g)).mean(axis=1), "averaged"),
         ("wrong", "sum", lambda r, q, g: np.abs(q - best(r, q, g)).sum(axis=1), "added"),
         ("wrong", "root mean square", lambda r, q, g: np.sqrt(((q - best(r, q, g)) ** 2).mean(axis=1)), "mean"),
+        ("wrong", "always (1, 1, 1)", lambda r, q, g: 3**0.5 * np.abs((q - best(r, q, g)).mean(axis=1)), "centroid"),
         ("wrong", "all entries", lambda r, q, g: q - best(r, q, g), "size"),
         ("wrong", "no axis", lambda r, q, g: np.full(len(q), np.linalg.norm(q - best(r, q, g))), "rows"),
         ("wrong", "minus", lambda r, q, g: -tasks.contradiction(r, q, g), "sign"),

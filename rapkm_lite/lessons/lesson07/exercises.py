@@ -47,6 +47,9 @@ EXERCISES = {
                     q_a - inverse_kinematics(robot, guess)[:, : robot.n_arms], axis=-1
                 )
             ),
+            "this is the part along (1, 1, 1), the null vector at the centroid; it turns with the pose": (
+                lambda robot, *angles: np.abs(np.sum(tasks.left_over(robot, *angles), axis=-1)) / robot.n_arms**0.5
+            ),
             "this is the part along the null space at the guess, which turns until the pose that fits best": (
                 tasks.seen_from_the_guess
             ),
