@@ -211,6 +211,7 @@ ANSWERS = {
             lambda *c: np.sort(np.sqrt(np.linalg.eigvals(terms(*c)[0] @ terms(*c)[1]).real)) / 2 / np.pi,
             "inverted",
         ),
+        ("wrong", "exchanged", lambda *c: np.sqrt(eigh(*terms(*c), eigvals_only=True)) / 2 / np.pi, "are exchanged"),
         ("wrong", "always the testbed", lambda r, q, K: right(rk.load(), q, K), "unequal arms"),
         ("wrong", "both the same", lambda *case: np.full(2, right(*case).mean()), ""),
         ("wrong", "kHz", scaled(right, 1e-3), "1000"),

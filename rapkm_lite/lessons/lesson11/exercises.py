@@ -113,6 +113,9 @@ EXERCISES = {
             "A is missing: these are the drives' own frequencies, each with the inertia of its arm": (
                 lambda robot, q, K_P: np.sqrt(K_P / np.diag(mass_matrix(robot, q))[: robot.n_arms]) / (2 * np.pi)
             ),
+            "stiffness and inertia are exchanged: the squares of frequencies are eigenvalues of G^-1 A^T K_P A": (
+                lambda robot, q, K_P: 1 / (4 * np.pi**2 * tasks.pd_frequencies(robot, q, K_P)[::-1])
+            ),
             "the inertia is multiplied instead of divided: it should be inverted": (
                 lambda robot, q, K_P: _frequencies(
                     _terms(robot, q)[0] @ _terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1])
