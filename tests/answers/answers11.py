@@ -70,6 +70,16 @@ def by_torques(robot, model, q, qd, xd, xdd, K_P):
     return np.linalg.solve(G, np.einsum("kij,ki->kj", A, short)[..., None])[..., 0] / K_P
 
 
+def velocity_first(robot, model, q, qd, xd, xdd, K_P):
+    """As `loop`, with xd @ C for C @ xd."""
+    e = []
+    for i in range(len(q)):
+        G, C, Q = rk.minimal_dynamics(robot, q[i], qd[i], None)
+        Gh, Ch, Qh = rk.minimal_dynamics(model, q[i], qd[i], None)
+        e.append(np.linalg.solve(Gh, (Gh - G) @ xdd[i] + xd[i] @ (Ch - C) + Qh - Q) / K_P)
+    return e
+
+
 def scaled(task, factor):
     return lambda *case: factor * task(*case)
 
@@ -230,6 +240,7 @@ ANSWERS = {
         ("wrong", "C - C_hat", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, -v, a, K), "masses"),
         ("wrong", "C xd / 2", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v / 2, a, K), "masses"),
         ("wrong", "no acceleration", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v, 0 * a, K), "accel"),
+        ("wrong", "xd @ C", velocity_first, "C is transposed"),
         ("wrong", "at rest", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, 0 * qd, v, a, K), ""),
         ("wrong", "zero", lambda r, m, q, *rest: np.zeros((len(q), 2)), "zero"),
         ("wrong", "transposed", lambda *case: tasks.model_error(*case).T, "transposed"),

@@ -58,6 +58,14 @@ def _without(part: str):
     return made
 
 
+def _transposed(robot, model, q, qd, xd, xdd, K_P):
+    """The error where C is multiplied from the left, xd^T C."""
+    G, C_model, _ = minimal_dynamics(model, q, qd, None)
+    turned = np.einsum("kji,kj->ki", C_model - minimal_dynamics(robot, q, qd, None)[1], xd)
+    rest = tasks.model_error(robot, model, q, qd, 0 * xd, xdd, K_P)
+    return rest + np.linalg.solve(G, turned[..., None])[..., 0] / K_P
+
+
 def _force(robot, model, q, qd, xd, xdd, K_P):
     """The force that the model misses."""
     G = minimal_dynamics(model, q, qd, None)[0]
@@ -149,6 +157,7 @@ EXERCISES = {
             "the gain K_P is missing: these are accelerations": lambda *case: case[-1] * tasks.model_error(*case),
             "the machine's own inertia is inverted; the law multiplies with that of its model": _own_inertia,
             "the velocity terms C xd are missing": _without("C"),
+            "C is transposed: it is C xd, not xd^T C": _transposed,
             "friction and gravity (Q) are missing": _without("Q"),
             "the acceleration is missing: an unknown mass matters where the motion accelerates": _without("G"),
             "these are forces in N, before the inertia is divided out": _force,
