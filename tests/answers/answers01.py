@@ -240,6 +240,14 @@ COMPLEMENTS = [
     ("wrong", "independent on top", lambda *case: np.roll(stacked(*case), 2, axis=0), "the independent joints on top"),
     ("wrong", "sign of the dependent rows", placed(lambda J1, J2: np.linalg.solve(J1, J2)), "sign"),
     ("wrong", "all signs", lambda *case: -complement(*case), "sign"),
+    (
+        "wrong",
+        "minus the identity",
+        lambda robot, q, pair: (
+            np.where(np.isin(np.arange(robot.n_joints), pair)[:, None], -1, 1) * complement(robot, q, pair)
+        ),
+        "the identity in the rows of the independent joints has the opposite sign",
+    ),
     ("wrong", "not inverted", placed(lambda J1, J2: -J1 @ J2), "inverse"),
     ("wrong", "transposed for inverted", placed(lambda J1, J2: -J1.T @ J2), "where it should be inverted"),
     ("wrong", "transposed and inverted", placed(lambda J1, J2: -np.linalg.inv(J1.T) @ J2), "J_1 is transposed;"),

@@ -167,6 +167,12 @@ COMPLEMENTS = {
         lambda robot, q, independent: _stacked(robot, q, independent, top=False)
     ),
     "the sign of the dependent rows is opposite: J_2 has to change sides": _placed(np.linalg.solve),
+    "the identity in the rows of the independent joints has the opposite sign": (
+        lambda robot, q, independent: (
+            _placed(lambda J1, J2: -np.linalg.solve(J1, J2))(robot, q, independent)
+            * np.where(np.isin(np.arange(robot.n_joints), independent), -1.0, 1.0)[:, None]
+        )
+    ),
     "the inverse of J_1 is missing: J_1 is multiplied instead of divided off": _placed(lambda J1, J2: -J1 @ J2),
     "J_1 is transposed where it should be inverted": _placed(lambda J1, J2: -J1.T @ J2),
     "J_1 is transposed": _placed(lambda J1, J2: -np.linalg.solve(J1.T, J2)),
