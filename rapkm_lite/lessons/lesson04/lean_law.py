@@ -80,7 +80,7 @@ LEAN_LAW = Exercise(
         "there is no filter: the drives pay for their quarrel (the antagonism is not removed)": (
             lambda make: isinstance(make(_machine()), PD)
         ),
-        "the weights are forgotten: this filter makes c^2 small, not the heat R_el (c/k_t)^2 (W is missing)": (
+        "the weights are missing or alike: this filter makes c^2 small, not the heat R_el (c/k_t)^2": (
             _filtered(lambda law, W: isinstance(law.law, PD) and (W is None or np.ptp(_ratios(W)) < 1e-9))
         ),
         "the weights are upside down: the hot drive must be spared, its weight is the largest (inverse)": (
