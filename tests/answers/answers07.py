@@ -88,6 +88,7 @@ ANSWERS = {
         ("wrong", "largest entry", lambda r, q, g: np.abs(q - best(r, q, g)).max(axis=1), "largest"),
         ("wrong", "mean size", lambda r, q, g: np.abs(q - best(r, q, g)).mean(axis=1), "averaged"),
         ("wrong", "sum", lambda r, q, g: np.abs(q - best(r, q, g)).sum(axis=1), "added"),
+        ("wrong", "entries added", lambda r, q, g: np.abs((q - best(r, q, g)).sum(axis=1)), "the entries or"),
         ("wrong", "root mean square", lambda r, q, g: np.sqrt(((q - best(r, q, g)) ** 2).mean(axis=1)), "mean"),
         ("wrong", "always (1, 1, 1)", lambda r, q, g: 3**0.5 * np.abs((q - best(r, q, g)).mean(axis=1)), "centroid"),
         ("wrong", "all entries", lambda r, q, g: q - best(r, q, g), "size"),

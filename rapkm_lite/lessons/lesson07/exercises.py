@@ -30,7 +30,7 @@ EXERCISES = {
             "this is the largest entry, not the size (norm) of what is left": (
                 lambda robot, q_a, guess: np.abs(tasks.left_over(robot, q_a, guess)).max(axis=-1)
             ),
-            "the absolute values are added; the size is the root of the sum of squares": (
+            "the entries or their absolute values are added; the size is the root of the sum of squares": (
                 lambda robot, q_a, guess: np.abs(tasks.left_over(robot, q_a, guess)).sum(axis=-1)
             ),
             "the absolute values are averaged; the size is the root of the sum of squares": (
