@@ -29,6 +29,7 @@ FACTORS = {
     4.0: "the answer is 4 times too large: a factor of 4, perhaps a 2 that was squared",
     0.25: "the answer is 4 times too small: a factor of 4 is missing, perhaps a 2 that was squared",
     4 * np.pi**2: "the answer is 4 pi^2 times too large: a factor of (2 pi)^2, turns against radians, Hz against rad/s",
+    0.25 / np.pi**2: "the answer is 4 pi^2 times too small: a factor of (2 pi)^2, turns against radians, Hz or rad/s",
     60.0: "the answer is 60 times too large: units, minutes against seconds",
     1 / 60: "the answer is 60 times too small: units, minutes against seconds",
 }

@@ -185,6 +185,7 @@ GAINS = [
     ("wrong", "passive joints", lambda r, q, w: w**2 / (1 - shares(r, q)).min(), "passive"),
     ("wrong", "negative", lambda r, q, w: -gain(r, q, w), "sign"),
     ("wrong", "in Hz", lambda r, q, w: gain(r, q, 2 * np.pi * w), "factor"),
+    ("wrong", "omega taken for rad/s, divided by 2 pi", lambda r, q, w: gain(r, q, w / (2 * np.pi)), "(2 pi)^2"),
     ("wrong", "twice", lambda r, q, w: 2 * gain(r, q, w), "twice"),
     ("wrong", "root", lambda r, q, w: np.sqrt(gain(r, q, w)), "root"),
     ("wrong", "square", lambda r, q, w: gain(r, q, w) ** 2, "square"),
