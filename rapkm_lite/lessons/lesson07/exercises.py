@@ -33,7 +33,7 @@ EXERCISES = {
             "the entries or their absolute values are added; the size is the root of the sum of squares": (
                 lambda robot, q_a, guess: np.abs(tasks.left_over(robot, q_a, guess)).sum(axis=-1)
             ),
-            "the absolute values are averaged; the size is the root of the sum of squares": (
+            "the entries or their absolute values are averaged; the size is the root of the sum of squares": (
                 lambda robot, q_a, guess: np.abs(tasks.left_over(robot, q_a, guess)).mean(axis=-1)
             ),
             "this is the root mean square; the factor of the number of drives is missing": (
