@@ -100,6 +100,21 @@ def test_switching_goes_by_the_directions_of_distal_links_whatever_the_lengths()
     assert np.array_equal(run.pairs, law.pairs(robot, run.q)) and run.switches > 0
 
 
+@pytest.mark.parametrize("mode", [[1, 1, 1], [-1, -1, -1]])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_of_equally_good_pairs_every_switched_run_takes_the_first(mode, turn):
+    # In the centroid of equal arms all |d_j x d_k| are sqrt(3)/2, and equal offsets keep the threefold symmetry.
+    way = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    robot = rk.load().replace(friction=0.0, mode=mode, base=rk.load().base @ way.T)
+    path, law = rk.hold(robot, [0.0, 0.0], 0.02), rk.SwitchedCTC(400.0, 40.0)
+    assert law.choose(robot, path.q[0]) == (0, 1)
+    for offset in (0.0, 1e-3, 3e-3, -3e-3):
+        in_python = rk.simulate(robot, rk.SwitchedCTC(400.0 * np.eye(2), 40.0), path, offset)
+        for run in (rk.simulate(robot, law, path, offset), in_python):
+            assert np.all(run.pairs == (0, 1))
+            np.testing.assert_allclose(run.c, in_python.c, rtol=0, atol=1e-9)
+
+
 def test_smooth_sign_is_tanh():
     from rapkm_lite.engine.jit import COMPILED
     from rapkm_lite.engine.leaves import smooth_sign

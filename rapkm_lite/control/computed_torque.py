@@ -35,6 +35,9 @@ from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, selec
 from ..mechanics.trajectory import Desired
 from .grammar import UNASKED, LawValue, check_asked, gain, joint_gain, measured, seen
 
+_TIE = 1.0 + 1e-9
+"""Ratio of two measures above which rounding does not decide which pair is better."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class APD(LawValue):
@@ -111,8 +114,8 @@ class CTC(APD):
 class SwitchedCTC(LawValue):
     """CTC (20) that switches its pair of independent base joints (section 4.2); K_P in 1/s^2, K_D in 1/s.
 
-    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1; the pair in use is
-    its memory.
+    It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1; of equal ones, to
+    1e-9, it takes the first of `drive_pairs`.  The pair in use is its memory.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.SwitchedCTC(K_P=400, K_D=40, hysteresis=1.2).choose(robot, q)
@@ -156,8 +159,11 @@ class SwitchedCTC(LawValue):
         pairs, chosen = drive_pairs(model), []
         now = pairs.index((min(current), max(current))) if current else None
         for measure in np.abs(distal_cross_products(model, q)).tolist():
-            if now is None or max(measure) > self.hysteresis * measure[now]:
-                now = measure.index(max(measure))
+            best = 0
+            for k, value in enumerate(measure):
+                best = k if value > _TIE * measure[best] else best
+            if now is None or measure[best] > _TIE * self.hysteresis * measure[now]:
+                now = best
             chosen.append(pairs[now])
         return chosen
 

@@ -10,10 +10,14 @@ from .leaves import solve2
 from .rows import *
 from .tables import *
 
+# Ratio of two measures above which rounding does not decide which pair is better.
+TIE = 1.0 + 1e-9
+
 
 @outlined
 def best_pair(lanes, drives, arms, w):
-    """The pair of drives with the largest |d_j x d_k|, kept while no other is better by the factor HYSTERESIS."""
+    """The pair of drives with the largest |d_j x d_k|, kept while no other is better by the factor HYSTERESIS;
+    of equal ones the first."""
     L, N, W = len(lanes), len(drives), len(arms)
     for i in range(N):
         for j in range(L):
@@ -31,9 +35,9 @@ def best_pair(lanes, drives, arms, w):
                     - w[at(ASK_E, i, j, W, L)] * w[at(ASK_B, k, j, W, L)]
                 )
                 now = measure if used_j == i and used_k == k else now
-                better = measure > best
+                better = measure > TIE * best
                 best_j, best_k, best = i if better else best_j, k if better else best_k, measure if better else best
-        change = now < 0.0 or best > w[of(HYSTERESIS, j, W, L)] * now
+        change = now < 0.0 or best > TIE * w[of(HYSTERESIS, j, W, L)] * now
         w[of(JOINT_J, j, W, L)] = best_j if change else used_j
         w[of(JOINT_K, j, W, L)] = best_k if change else used_k
 
