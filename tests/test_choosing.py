@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from drawn import scaled
+from scipy.optimize import brentq
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.lesson11 import tasks
@@ -83,6 +85,21 @@ def test_feedback_of_a_fixed_pair_grows_as_one_over_the_sine():
         product = [rk.feedback_norm(ROBOT, PATH.q[k], pair) * sine[k] for k in here]
         assert sine[here[2]] / sine[here[0]] > 2.5
         assert max(product) / min(product) < 1.15
+
+
+def test_feedback_of_a_pair_on_its_singular_curve_is_huge_and_finite_in_any_unit_of_length():
+    """Per feedback in redundant coordinates it has no unit; a grid point on the curve is one of many."""
+    ray = np.array([np.cos(5.0), np.sin(5.0)])
+    far = brentq(lambda s: rk.distal_cross_products(ROBOT, rk.inverse_kinematics(ROBOT, s * ray))[0], 0.08, 0.14)
+    q, ratios = rk.inverse_kinematics(ROBOT, [far * ray, 0.5 * far * ray]), []
+    for unit in (1e-2, 1.0, 1e3):
+        robot = scaled(ROBOT, unit)
+        there, inside = rk.feedback_norm(robot, q, (0, 1)) / rk.feedback_norm(robot, q)
+        ratios.append([there, inside])
+        alone = rk.feedback_norm(robot, q[0], (0, 1)) / rk.feedback_norm(robot, q[0])
+        np.testing.assert_allclose(there, alone, rtol=1e-9)
+    assert there > 1e9 and inside < 10.0
+    np.testing.assert_allclose(ratios, [ratios[1]] * 3, rtol=1e-9)
 
 
 def test_slow_error_of_a_wrong_model():

@@ -129,7 +129,10 @@ def test_feedback_norm_is_what_the_definition_says(drawn):
     hypothesis.assume(abs(np.linalg.det(at.A[list(pair)])) > 1e-3)
     chosen = at.using(pair)
     M = rk.weighted_pseudoinverse(chosen.A) @ chosen.minimal[0]
-    assert_allclose(rk.feedback_norm(robot, q, pair), np.linalg.norm(M, 2), rtol=1e-6)
+    size = rk.feedback_norm(robot, q, pair)
+    assert_allclose(size, np.linalg.norm(M, 2), rtol=1e-6)
+    for count in (2, 3):
+        assert_allclose(rk.feedback_norm(robot, np.stack([q] * count), pair), [size] * count, rtol=1e-12)
 
 
 def test_close_loops_is_limited_in_its_steps():
