@@ -478,6 +478,26 @@ def test_interval_of_one_spare_reading_is_that_of_cauchy():
         assert_allclose(found.interval(level), found.estimate + np.array([-half, half]), rtol=0, atol=1e-12)
 
 
+def test_interval_of_two_spare_readings_is_that_of_student():
+    """Student's t with two degrees of freedom has the quantile level sqrt(2 / (1 - level^2))."""
+    found = rk.calibrate(TESTBED, readings(TESTBED, 5) + 1e-5 * np.random.default_rng(1).normal(size=(5, 3)))
+    assert found.freedom == 2 and found.noise == pytest.approx(np.sqrt(5 / 2) * found.residual)
+    sigma = np.sqrt(np.diagonal(found.covariance))
+    for level in (0.5, 0.95):
+        half = level * np.sqrt(2 / (1 - level**2)) * sigma
+        assert_allclose(found.interval(level), found.estimate + np.array([-half, half]), rtol=0, atol=1e-12)
+
+
+def test_interval_of_counts_without_a_spare_reading_is_that_of_their_rounding():
+    """Three poses of three drives leave nothing over; what is known of the noise is the size of a count."""
+    count = 2 * np.pi / 4096
+    x = np.random.default_rng(0).uniform(-0.1, 0.1, (3, 2))
+    found = rk.calibrate(TESTBED, count * np.rint(rk.inverse_kinematics(TESTBED, x)[:, :3] / count))
+    assert found.freedom == 0 and found.noise == pytest.approx(count / np.sqrt(12), rel=1e-9)
+    half = 1.959964 * np.sqrt(np.diagonal(found.covariance))
+    assert_allclose(found.interval(0.95), found.estimate + np.array([-half, half]), rtol=0, atol=1e-8)
+
+
 def test_a_moving_triangle_beats_coarse_counts():
     path = rk.triangle(TESTBED)
     run = rk.simulate(TESTBED, rk.PD(7.05, 0.225), path, OFFSET[:3], encoder=2000)
