@@ -2,6 +2,7 @@
 
 import copy
 import linecache
+import math
 import pickle
 import re
 import subprocess
@@ -588,6 +589,23 @@ def test_a_law_that_fails_at_the_last_sample_fails_in_a_study_too():
         study = rk.sweep(ROBOT, one, PATH, np.tile(OFFSET, (2, 1)), failed="mask")
         assert caught.value.time == pytest.approx(0.3) and study.failed.all()
         assert_allclose(study.failure_time, 0.3)
+
+
+def test_a_law_that_fails_beside_a_lost_machine_is_not_to_blame_either():
+    """As in `test_a_law_is_to_blame_up_to_a_milliard_radians_per_second`: the machine was lost in the hold before."""
+    path = rk.hold(ROBOT, [0.02, 0.05], 3e-12, 1e-12)
+    pose = rk.at(ROBOT, path.q[0], 0 * path.q[0])
+    xd = 1.6e9 / np.abs(pose.F[:3, 0]).max() * np.array([1.0, 0.0])
+    kick = np.linalg.pinv(pose.A.T) @ pose.minimal[0] @ xd / path.dt
+
+    def law(t, q_a, qd_a, d):
+        return kick * math.sqrt(1.0 - 2e12 * t)
+
+    for one in (law, rk.compiled(law)):
+        with pytest.raises(rk.SimulationError, match="the machine left the workspace") as caught:
+            rk.simulate(ROBOT, one, path)
+        assert caught.value.time == 0.0 and len(caught.value.partial) == 1
+        assert isinstance(caught.value.__cause__, ValueError)
 
 
 def test_a_law_of_a_notebook_travels_with_its_code():
