@@ -662,6 +662,15 @@ def test_a_law_that_fails_within_a_library_is_named_by_its_own_line(fails, kind)
     assert "frozen" not in caught.value.reason
 
 
+def test_a_study_is_printed_with_the_totals_of_the_runs_that_were_finished():
+    """Of the energies of all drives, the least and the largest of a run; of lost ones there is none."""
+    path, laws = rk.hold(ROBOT, [0.02, 0.05], 0.1), [rk.PD(7.05, 0.2), rk.PD(7.05, 30.0), rk.PD(14.0, 0.2)]
+    totals = [rk.simulate(ROBOT, law, path, OFFSET).energy.sum() for law in (laws[0], laws[2])]
+    study = rk.sweep(ROBOT, laws, path, OFFSET, failed="mask")
+    assert repr(study) == f"Sweep(3 runs, 1 failed, total energy {min(totals):.3g} to {max(totals):.3g} J)"
+    assert repr(rk.sweep(ROBOT, laws[1], path, OFFSET, failed="mask")) == "Sweep(1 runs, 1 failed)"
+
+
 @pytest.mark.parametrize("law", [rk.PD, rk.APD, rk.CTC, rk.RedundantAPD, rk.RedundantCTC])
 def test_gains_are_positive(law):
     with pytest.raises(ValueError, match="K_P"):
