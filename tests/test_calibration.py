@@ -398,6 +398,17 @@ def test_offsets_far_from_zero_are_found_or_refused(size, least):
     assert found >= least
 
 
+@pytest.mark.parametrize("seed", [2, 8, 16])
+def test_lengths_beside_offsets_far_from_zero_are_found_in_short_steps(seed):
+    """The nominal lengths and the offsets that were put in; steps of full length end in a refusal."""
+    rng = np.random.default_rng(seed)
+    q_a = rk.inverse_kinematics(TESTBED, rng.uniform(-0.09, 0.09, (40, 2)))[:, :3]
+    offset = rng.uniform(-0.8, 0.8, 3)
+    found = rk.calibrate(TESTBED, q_a + offset, "offsets+lengths")
+    assert_allclose(found.offset, offset, rtol=0, atol=1e-9)
+    assert_allclose(found.lengths, TESTBED.lengths, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("level", [-0.5, 0.0, 1.0, 1.5])
 def test_a_level_of_confidence_is_a_share(level):
     """Nothing holds the offsets for certain: the interval of level 1 is endless, beyond there is none."""
