@@ -409,6 +409,17 @@ def test_lengths_beside_offsets_far_from_zero_are_found_in_short_steps(seed):
     assert_allclose(found.lengths, TESTBED.lengths, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", [70, 85, 217])
+def test_a_search_that_leads_to_no_machine_does_not_speak_of_an_argument(seed):
+    """Nobody gave the lengths that a step made negative."""
+    rng = np.random.default_rng(seed)
+    q_a = rk.inverse_kinematics(TESTBED, rng.uniform(-0.09, 0.09, (10, 2)))[:, :3] + rng.uniform(-0.8, 0.8, 3)
+    with pytest.raises(ValueError, match=r"calibrate did not converge: a step led to|log "):
+        rk.calibrate(TESTBED, q_a, "offsets+lengths")
+    with pytest.raises(rk.ConvergenceError, match=r"a machine that is none \(lengths\[0, 0\] = -0.1"):
+        changed(TESTBED, np.concatenate([np.zeros(3), [-0.1], TESTBED.lengths.ravel()[1:]]))
+
+
 @pytest.mark.parametrize("level", [-0.5, 0.0, 1.0, 1.5])
 def test_a_level_of_confidence_is_a_share(level):
     """Nothing holds the offsets for certain: the interval of level 1 is endless, beyond there is none."""

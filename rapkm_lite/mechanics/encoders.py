@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..machine.arguments import matvec, real_array, shaped
+from ..machine.arguments import ConvergenceError, matvec, real_array, shaped
 from ..machine.logs import Log, read_log
 from ..machine.manipulator import Manipulator, crossings
 from . import cores
@@ -66,7 +66,7 @@ def rounding(angles: np.ndarray) -> float:
 
 
 def changed(robot: Manipulator, p: np.ndarray) -> Manipulator:
-    """The machine with the lengths and base points of p."""
+    """The machine with the lengths and base points of p; raises ConvergenceError where it is none."""
     N = robot.n_arms
     if len(p) == N:
         return robot
@@ -76,7 +76,13 @@ def changed(robot: Manipulator, p: np.ndarray) -> Manipulator:
         changes["centers"] = np.minimum(robot.centers, lengths)
     if len(p) > 3 * N:
         changes["base"] = p[3 * N :].reshape(N, 2)
-    return robot.replace(**changes)
+    try:
+        return robot.replace(**changes)
+    except ValueError as error:
+        raise ConvergenceError(
+            f"calibrate did not converge: a step led to a machine that is none ({error}); "
+            "allowed: a log of this machine, whose angles are near a pose"
+        ) from None
 
 
 def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
