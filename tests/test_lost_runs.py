@@ -596,15 +596,15 @@ def test_an_interrupted_sweep_tells_of_one_partial():
 
 
 class Pool(Executor):
-    """Does its jobs at once, but for the one that raises and all after it."""
+    """Does its jobs at once, but for the one that raises and, where they wait, all after it."""
 
-    def __init__(self, broken: int, error: BaseException):
-        self.broken, self.error, self.futures = broken, error, []
+    def __init__(self, broken: int, error: BaseException, wait: bool = True):
+        self.broken, self.error, self.wait, self.futures = broken, error, wait, []
 
     def submit(self, function, *arguments):
         future, n = Future(), len(self.futures)
         self.futures.append(future)
-        if n < self.broken:
+        if n < self.broken or (n > self.broken and not self.wait):
             future.set_result(function(*arguments))
         elif n == self.broken:
             future.set_exception(self.error)
@@ -632,6 +632,20 @@ def test_an_interrupt_before_any_chunk_is_done_has_a_partial_too():
     with pytest.raises(KeyboardInterrupt) as caught:
         rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, KeyboardInterrupt()), chunk=2)
     assert caught.value.partial.failed.all() and caught.value.partial.failure_time.mask.all()
+
+
+def test_chunks_that_finished_after_the_one_that_stopped_a_sweep_are_kept():
+    offsets = np.random.default_rng(2).normal(0.0, 3e-3, (6, 3))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.sweep(ROBOT, PD, PATH, offsets, executor=Pool(0, KeyboardInterrupt(), wait=False), chunk=2)
+    assert caught.value.partial.failed.tolist() == [True] * 2 + [False] * 4
+    assert_array_equal(caught.value.partial.energies[2:], rk.sweep(ROBOT, PD, PATH, offsets[2:]).energies)
+
+
+def test_a_failure_of_the_executor_with_nothing_finished_has_no_partial():
+    with pytest.raises(OSError, match="no processes left") as caught:
+        rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, OSError("no processes left")), chunk=2)
+    assert not hasattr(caught.value, "partial") and not hasattr(caught.value, "__notes__")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")
