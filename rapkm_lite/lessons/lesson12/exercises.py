@@ -75,9 +75,9 @@ EXERCISES = {
         hints=(
             "The offsets cost K_P times their part along the null vector. What in a machine decides the signs of that "
             "vector?",
-            "The working mode: one arm bent the other way turns one sign, not always that of its own drive. Try all "
-            "three: one leaves little of (4, -2, 5), another doubles the cost. Such a mode is singular at the middle "
-            "of one base side (lesson 02).",
+            "The working mode: one arm bent the other way mostly turns one sign, not always that of its own drive. Try "
+            "all three: one leaves little of (4, -2, 5), another doubles the cost. Such a mode is singular at the "
+            "middle of one base side (lesson 02).",
             "mode=[1, 1, -1], base points 0.28 to 0.3 m from the origin, distal links longer than proximal ones: "
             "lengths=[0.18, 0.26].",
         ),
