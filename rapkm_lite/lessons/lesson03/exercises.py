@@ -125,7 +125,7 @@ EXERCISES = {
         unit="rad",
         judge=tasks.betrayal,
         close=0.05,
-        improve="leave some room: the first-order theory is a few per cent off at this size",
+        improve="leave some room: the first-order theory is about half a per cent off at this size",
         points=10.0,
         mistakes={
             "no offsets at all: nothing is seen, and nothing is shifted": lambda f: not np.any(tasks.asked(f)[0]),
