@@ -336,6 +336,14 @@ def test_a_late_drive_follows_its_set_points_so_many_milliseconds_later(robot):
         assert data[:, 1].max() == pytest.approx(values.max()) and data[:, 1].min() == pytest.approx(values.min())
 
 
+def test_the_three_pairs_are_equally_far_from_their_curves():
+    """A third of a turn takes machine, triangle and the curve of each pair to those of the next."""
+    explorer, names = explore.computed_torque(), ("fixed pair (1,2)", "fixed pair (1,3)", "fixed pair (2,3)")
+    for side in (150, 200, 215):
+        runs = [explorer.set(law=name, side=side, **NO_OFFSETS).numbers for name in names]
+        assert len({numbers["distance from its singular curve"] for numbers in runs}) == 1
+
+
 def test_computed_torque_has_both_poles_where_the_slider_says():
     explorer = explore.computed_torque().set(law="redundant coordinates", side=150, rate=30, offset_2=3.0)
     path = rk.triangle(ROBOT, 0.15, centre=[0.0, 0.0])

@@ -58,7 +58,9 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         """How near the path comes to the points on which the pair is singular."""
         if np.ptp(np.sign(act.distal_cross_products(robot, coarse(side).q)[:, pairs.index(fixed[law])])):
             return "crossed"
-        gap = cdist(coarse(side).x, np.concatenate(singular[fixed[law]])).min()
+        # The points of a line are as far apart as those of a grid: twenty on each of its pieces.
+        pieces = [np.linspace(line[:-1], line[1:], 20).reshape(-1, 2) for line in singular[fixed[law]]]
+        gap = cdist(coarse(side).x, np.concatenate(pieces)).min()
         return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
