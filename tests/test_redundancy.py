@@ -83,6 +83,19 @@ def test_on_an_edge_a_drive_that_moves_nothing_keeps_its_prestress():
     assert_allclose(c, [1.0, 1.0, 0.0, 0.3], rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("factor", [1e-8, 1e8, 1e16])
+def test_torques_within_limits_do_not_depend_on_the_units_of_weights_or_drives(factor):
+    """The place of a minimum does not hang on a factor of the cost, nor on the unit in which a drive is told."""
+    rng = np.random.default_rng(4)
+    unit = np.array([1.0, 1e3, 1.0, 1e-3, 1.0, 30.0])
+    for _ in range(30):
+        wrench, limit, W, c0 = demands(SIX, rng)
+        c = rk.allocate_torques(SIX, wrench, limit, W, c0)
+        assert_allclose(rk.allocate_torques(SIX, wrench, limit, factor * W, c0), c, rtol=0, atol=1e-9)
+        told = rk.allocate_torques(SIX / unit[:, None], wrench, unit * limit, W / unit**2, unit * c0)
+        assert_allclose(told / unit, c, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("power", range(13))
 @pytest.mark.parametrize("small", [1.0, 1e-4])
 def test_a_prestress_beyond_all_measure_is_refused_or_makes_no_other_force(power, small):

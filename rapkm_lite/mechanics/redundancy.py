@@ -45,17 +45,19 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
             f"wrench = {wrench.tolist()} needs {peak:.4g} times limit = {limit.tolist()} at least; allowed: a wrench "
             "inside the force polygon of the limits"
         )
-    # c = best + n z with |z|^2 the cost above the best one, and the limits as G z >= h.  On the edge of the force
-    # polygon rounding would leave nothing between them, though drives that hold no part of the edge are free there.
-    n = cores.null_space(A)
-    n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ W @ n)).T
-    wide = limit + (1e-12 * limit.max() if peak > 1.0 - 1e-9 else 0.0)
+    # c / limit = best + n z with |z|^2 the cost above the best one, as a share of the largest weight, and the limits as
+    # G z >= h.  On the edge of the force polygon rounding would leave nothing between them, though drives that hold no
+    # part of the edge are free there.
+    share = limit / limit.max()
+    n, weight, best = cores.null_space(share[:, None] * A), share[:, None] * W * share, best / limit
+    n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ (weight / weight.max()) @ n)).T
+    wide = 1.0 + (1e-12 if peak > 1.0 - 1e-9 else 0.0)
     G, h = np.concatenate([-n, n]), np.concatenate([best - wide, -best - wide])
     size = np.abs(h).max()
     u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
     r, slack = G.T @ u, 1.0 - h @ u / size
     # Where rounding leaves nothing to divide by, torques of least peak.
-    c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
+    c = limit * np.clip(best + n @ r / slack * size if slack > 1e-12 else edge / limit, -1.0, 1.0)
     # Near the edge rounding is magnified, and what was clipped may make another force.
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
     if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
