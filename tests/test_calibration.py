@@ -539,6 +539,9 @@ def test_under_the_filter_torques_are_mute_and_angles_are_not():
     log = log_of(rk.simulate(FRICTIONLESS, law, path, OFFSET[:3]), path, OFFSET[:3])
     assert_allclose(rk.calibrate(FRICTIONLESS, log).offset, OFFSET[:3], rtol=0, atol=1e-7)
     assert "mute" in rk.calibrate(FRICTIONLESS, log, use="torques", K_P=7.05).note
+    # Whatever the unit of torque.
+    tiny = rk.Log("run", log.t, log.q_a, log.q_a_desired, 1e-12 * log.c)
+    assert "mute" in rk.calibrate(FRICTIONLESS, tiny, use="torques", K_P=7.05e-12).note
 
 
 def test_a_filter_is_seen_behind_the_weight_of_a_hanging_machine():

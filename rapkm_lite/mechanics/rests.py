@@ -171,4 +171,4 @@ def _filtered(robot: Manipulator, stand: Rests, K_P: np.ndarray) -> tuple[float,
     n = cores.null_space(at(robot, poses(robot, stand.q_a)).A).mT
     asked, pressed = (np.abs(matvec(n, c)).max() for c in (K_P * (stand.q_a - stand.desired), stand.c))
     noise = np.sqrt(np.mean(stand.c_error**2))
-    return (asked, pressed) if pressed < 0.1 * asked and asked > 5 * max(noise, 1e-12) else None
+    return (asked, pressed) if pressed < 0.1 * asked and asked > 5 * max(noise, 1e-12 * K_P.max()) else None
