@@ -374,6 +374,34 @@ def test_fields_of_a_users_dataclass_may_come_later_or_stand_in_slots():
         assert twin == law and hash(twin) == hash(law) and law.order == 2 and "order=2" in repr(law)
 
 
+def test_a_plain_dataclass_of_a_user_is_a_value_too():
+    """What `dataclass` writes by itself compares arrays with `==`, which has no truth value, and hashes them."""
+
+    @dataclass(frozen=True)
+    class Law(rk.PD):
+        extra: float = 0.0
+
+    @dataclass(frozen=True)
+    class Machine(rk.Manipulator):
+        place: str = ""
+
+    @dataclass(frozen=True)
+    class OwnRule(rk.PD):
+        def __eq__(self, other):
+            return "mine"
+
+    robot = rk.load()
+    for kind, fields, own in (
+        (Law, rk.PD([7.0, 7.0, 7.0], 0.2)._fields(), {"extra": 0.5}),
+        (Machine, robot._fields(), {"place": "hall"}),
+    ):
+        value, twin, other = kind(**fields, **own), kind(**fields, **own), kind(**fields)
+        assert value == twin != other and len({value, twin, other}) == 2
+        assert repr(value) == kind.__base__.__repr__(value)
+    assert rk.simulate(Machine(**robot._fields()), rk.PD(7.0, 0.2), rk.hold(robot, [0.02, 0.05], 0.01)).energy.sum() > 0
+    assert (OwnRule(7.0, 0.2) == 1) == "mine"
+
+
 def test_no_law_of_the_package_takes_an_attribute():
     for law in (rk.APD(7.0, 0.2), rk.CTC(400.0, 40.0), rk.RedundantCTC(400.0, 40.0)):
         with pytest.raises(FrozenInstanceError):

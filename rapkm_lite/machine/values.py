@@ -10,10 +10,10 @@ A value is a frozen dataclass on the base `Value`:
         def __post_init__(self):
             super().__post_init__(K_P=real_array("K_P", self.K_P))
 
-``eq=False, repr=False`` because `Value` brings both.  A class with its own ``__post_init__`` ends it with the one of
-`Value`, which takes fields that were checked and freezes every array among all fields, in tuples and lists too.  What
-is computed on demand and kept (``functools.cached_property``) is no field: it is neither compared, nor pickled, nor
-copied.
+``eq=False, repr=False`` because `Value` brings both (a plain ``@dataclass(frozen=True)`` makes them for nothing).  A
+class with its own ``__post_init__`` ends it with the one of `Value`, which takes fields that were checked and freezes
+every array among all fields, in tuples and lists too.  What is computed on demand and kept
+(``functools.cached_property``) is no field: it is neither compared, nor pickled, nor copied.
 
 `Array` and its like tell editors that a field is given as a number or list, and kept as an array.
 """
@@ -137,6 +137,13 @@ class Value:
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
+    def __init_subclass__(cls, **options):
+        """Keep a user's ``@dataclass(frozen=True)`` from replacing what stands here: its own fails with arrays."""
+        super().__init_subclass__(**options)
+        for name in ("__eq__", "__hash__", "__repr__"):
+            if name not in vars(cls):
+                setattr(cls, name, getattr(cls, name))
+
     def __post_init__(self, **checked):
         self._set(**checked)
         self._check_class()
@@ -156,7 +163,7 @@ class Value:
                 raise ValueError(
                     f"{type(self).__name__}.{field.name} = {short(own)} in the body of the class does not reach the "
                     f"field, which is {_typed(value)}; allowed: to give {field.name} when the value is made, or "
-                    f"`{field.name}: type = ...` in a class under @dataclass(frozen=True, eq=False, repr=False)"
+                    f"`{field.name}: type = ...` in a class under @dataclass(frozen=True)"
                 )
 
     def _checked(self, name: str, value):
