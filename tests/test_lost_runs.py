@@ -561,6 +561,7 @@ def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):
     assert not caught.value.partial.failed.any() and "2 of 2 runs were finished" in caught.value.__notes__[-1]
 
 
+@pytest.mark.skipif(not engine.COMPILED, reason="without Numba nothing is compiled, and nothing repeated")
 def test_an_interrupt_before_a_compiled_run_is_repeated_keeps_it(monkeypatch):
     @rk.compiled
     def gives_up(t, q_a, qd_a, d):
