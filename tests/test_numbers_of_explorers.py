@@ -204,6 +204,17 @@ def test_laws_to_choose_have_both_poles_at_the_frequency_and_know_no_payload(nam
     assert_allclose(said(explorer, "energy"), shares, atol=6e-3)
 
 
+def test_a_payload_comes_on_top_of_the_load_of_a_machine():
+    """A law whose model is the machine, started on its path, makes no error; one of 100 g more is that of a copy."""
+    robot = ROBOT.replace(load=0.2, gravity=[0.0, -9.81])
+    explorer = explore.controller_choice(robot).set(law="computed torque, end-effector", frequency=4.0, **NO_OFFSETS)
+    assert said(explorer, "largest error")[0] <= 0.01
+    path, law = rk.triangle(robot, 0.12, duration=2.5, centre=[0.0, 0.0]), rk.CTC((8 * np.pi) ** 2, 16 * np.pi, None)
+    run = rk.simulate(robot.replace(load=0.3), law, path, model=robot)
+    error = 1e3 * np.linalg.norm(run.x - path.x, axis=1).max()
+    assert said(explorer.set(load=100), "largest error")[0] == pytest.approx(error, abs=6e-3)
+
+
 def test_torques_of_a_machine_of_ones_own():
     explorer = explore.own_machine().set(radius=300, proximal=210, distal=230, load=0.4)
     base = 0.3 * ROBOT.base / np.linalg.norm(ROBOT.base, axis=1, keepdims=True)

@@ -93,7 +93,8 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
         "computed torque, end-effector": lambda k, d: CTC(k, d, None),
         "computed torque, redundant": RedundantCTC,
     }
-    loaded = lru_cache(maxsize=16)(lambda grams: robot.replace(load=1e-3 * grams))
+    # What the laws do not know comes on top of the load that the machine is given with.
+    loaded = lru_cache(maxsize=16)(lambda grams: robot.replace(load=robot.load + 1e-3 * grams))
 
     def draw(picture, law, frequency, load, coarse, **offsets):
         w, offset = 2 * np.pi * frequency, marks.offset_values(offsets, robot.n_arms)
