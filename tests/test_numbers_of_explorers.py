@@ -93,6 +93,13 @@ def test_a_walk_says_where_it_is_and_which_pair_is_worst():
     assert np.ptp(marks(explorer.set(path="circle", size=200), "line", "plane")[0][:, 0]) == pytest.approx(0.2, 1e-3)
 
 
+def test_more_than_three_drives_have_a_null_space_and_no_null_vector():
+    """A null vector n has A^T n = 0; of four drives each has a share, and the squares of the shares add to N - 2."""
+    explorer = explore.actuation(rk.load("four_arms"))
+    assert "null vector" not in explorer.sentence.lower() and "null vector" in explore.actuation().sentence.lower()
+    assert np.sum(said(explorer, "null space") ** 2) == pytest.approx(2.0, abs=0.03)
+
+
 def test_areas_of_the_pairs_forces_add_to_that_of_all_drives():
     """McMullen: the area of a zonotope is the sum over the parallelograms of its pairs."""
     *pairs, whole = map(area, marks(explore.actuation().set(place=30, torque=100), "polygon", "force"))

@@ -116,6 +116,10 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     """
     robot = shared.frictionless(robot)
     pairs = act.drive_pairs(robot)
+    name, shown, about = "Null vector", "component", ""
+    if robot.n_arms != 3:
+        name, shown = "Null space", "share of each drive"
+        about = "A walk along the path: sigma_min of each pair, the null space of A^T, and the forces of the drives."
 
     @lru_cache(maxsize=8)
     def along(path: str, size: int):
@@ -160,7 +164,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
             "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
             "σ_min of the pairs": marks.per_drive(sigma[k], 2) + " rad/m",
             "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
-            "null vector": marks.per_drive(null[k], 2),
+            name[0].lower() + name[1:]: marks.per_drive(null[k], 2),
         }
 
     drives, whole = marks.drive_lines(robot), [("all drives", {"color": AFTER})]
@@ -169,7 +173,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
         "sigma": way | measures | {"ylim": (0, 8 / shared.size(robot))},
-        "null": way | {"title": "Null vector", "ylabel": "component", "ylim": (-1.05, 1.05), "legend": drives},
+        "null": way | {"title": name, "ylabel": shown, "ylim": (-1.05, 1.05), "legend": drives},
         "force": shared.force_panel(2 / shared.size(robot)) | {"title": "Forces", "legend": whole},
     }
     controls = {
@@ -180,7 +184,8 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     }
     layout = [["plane", "sigma"], ["force", "null"]]
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
-    return explorer(draw, controls, panels, layout=layout, widths=[1, 1.35], size=(9.2, 6.6), setup=space, live=True)
+    look = {"layout": layout, "widths": [1, 1.35], "size": (9.2, 6.6)}
+    return explorer(draw, controls, panels, **look, setup=space, live=True, about=about)
 
 
 @shared.ready_made
