@@ -788,6 +788,18 @@ def test_a_machine_whose_first_triangle_is_too_large_is_shown_on_a_smaller_one()
     assert not shown.set(law="redundant coordinates", side=200, rate=20, offset_1=0, offset_2=0).problem
 
 
+@pytest.mark.parametrize("name", ["animation", "controller_choice", "decentralized_run", "imperfections", "landscape"])
+def test_a_machine_that_reaches_half_a_triangle_is_shown(name):
+    """docs/add_a_machine.md: all explorers take it; a path that no slider changes is one that its arms reach."""
+    lengths = [[0.16, 0.16], [0.3, 0.2], [0.2, 0.25], [0.16, 0.2]]
+    shown = getattr(explore, name)(rk.load("four_arms").replace(lengths=lengths))
+    if name == "landscape":
+        assert "outside the workspace" in shown.problem
+        shown.set(side=shown.controls["side"].min, shift=0)
+    assert not shown.problem
+    assert_sound(shown)
+
+
 def test_a_drive_in_the_middle_of_the_others_has_a_place_too():
     square = 0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     assert not explore.own_machine(rk.Manipulator(base=square, lengths=[0.25, 0.3], masses=0.1)).problem

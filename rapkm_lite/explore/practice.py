@@ -40,7 +40,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = shared.central_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
+    path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
     needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
     usual = shared.usual_gains(robot)
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
@@ -83,7 +83,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     '1.19 mm'
     """
     robot = shared.frictionless(robot)
-    path = shared.central_triangle(robot, 120 * shared.size(robot), duration=2.5)
+    path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
     mass = shared.carried(robot)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),

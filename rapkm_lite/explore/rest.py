@@ -162,8 +162,15 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, 1e-3 * side, dt=0.01, centre=marks.middle(robot) + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
+    def trace(side: float, shift: float) -> float:
+        try:
+            return float(np.trace(form(times * side, times * shift)))
+        except ValueError:  # beyond reach
+            return 0.0
+
     times = shared.size(robot)
-    cost = shared.usual_gains(robot)[0] ** 2 * np.trace(form(120 * times, 40 * times))  # J/mrad^2, where controls start
+    # J/mrad^2 where controls start, or on a smaller triangle in the middle.
+    cost = shared.usual_gains(robot)[0] ** 2 * (trace(120, 40) or trace(20, 0) or 1e-3)
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     digits = max(0, 2 - math.ceil(math.log10(2.0 * levels[0])))
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T

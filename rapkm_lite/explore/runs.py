@@ -21,7 +21,7 @@ from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, gain_slider, over_time, ready_made, size, usual_gains
+from .shared import curves, fitting_triangle, frictionless, gain_slider, over_time, ready_made, size, usual_gains
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -38,7 +38,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     damping = usual_gains(robot)[1]
     friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
-    paths, table = {"centred triangle": central_triangle(robot)}, None
+    paths, table = {"centred triangle": fitting_triangle(robot)}, None
     if robot.replace(friction=0.0) == load().replace(friction=0.0):
         paths["reading of Table 1"], table = experiment("table1_reading").trajectory, measured_energies()
 
@@ -92,7 +92,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     """
     robot = frictionless(robot)
     N = robot.n_arms
-    path, times = central_triangle(robot), size(robot)
+    path, times = fitting_triangle(robot), size(robot)
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     said = ", ".join(f"{v:.0f}" for v in 1e3 * some).replace("-", "−")
 
@@ -166,7 +166,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     '0.0 mN m'
     """
     robot = frictionless(robot)
-    # The lower edge of the triangle of `central_triangle`, or as much of it as all arms reach.
+    # The lower edge of the triangle of `fitting_triangle`, or as much of it as all arms reach.
     wide = size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
     line, middle = wide * np.linspace([-0.12, -0.07], [0.12, -0.07], 49), marks.middle(robot)
     parts = (part for part in np.linspace(1.0, 0.1, 19) if reachable(robot, middle + 1.1 * part * line).all())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 
 import numpy as np
@@ -95,10 +96,21 @@ def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step:
     }
 
 
-def central_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
-    """The triangle of `side` in mm, 240 on the testbed and 160 on two of its arms, about the middle of the drives."""
-    side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
+def central_triangle(robot: Manipulator, side: float, **times) -> Trajectory:
+    """The triangle of `side` in mm about the middle of the drives."""
     return triangle(robot, 1e-3 * side, centre=marks.middle(robot), **times)
+
+
+def fitting_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
+    """The central triangle where no slider changes it, 240 mm on the testbed and 160 on two of its arms.
+
+    Where an arm does not reach it, a smaller one.
+    """
+    side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
+    for part in (1.0, 0.8, 0.6, 0.4):
+        with suppress(ValueError):
+            return central_triangle(robot, part * side, **times)
+    return central_triangle(robot, 0.2 * side, **times)
 
 
 def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):
