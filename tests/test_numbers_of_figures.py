@@ -94,9 +94,12 @@ def test_links_that_are_parallel_are_counted_from_one():
     assert labels == ["links 1 and 2 parallel", "links 1 and 3 parallel", "links 2 and 3 parallel"]
 
 
-@pytest.mark.parametrize(("most", "extend"), [(0.5, "max"), (2.0, "neither"), (None, "neither")])
-def test_a_scale_is_pointed_where_values_lie_beyond(most, extend):
-    ax = plotting.plot_map([0.0, 1.0], [0.0, 1.0], np.ma.array([[0.1, 0.2], [0.3, 1.0]]), vmax=most)
+@pytest.mark.parametrize(
+    ("least", "most", "extend"),
+    [(None, 0.5, "max"), (0.0, 2.0, "neither"), (None, None, "neither"), (0.15, 2.0, "min"), (0.15, 0.5, "both")],
+)
+def test_a_scale_is_pointed_where_values_lie_beyond(least, most, extend):
+    ax = plotting.plot_map([0.0, 1.0], [0.0, 1.0], np.ma.array([[0.1, 0.2], [0.3, 1.0]]), vmin=least, vmax=most)
     assert ax.collections[0].colorbar.extend == extend
 
 

@@ -106,7 +106,8 @@ def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, ba
     ax.set(aspect="equal", xlabel="x in m", ylabel="y in m")
     ax.grid(False)
     if bar:
-        extend = "max" if vmax is not None and values.max() > vmax else "neither"
+        beyond = vmin is not None and bool(values.min() < vmin), vmax is not None and bool(values.max() > vmax)
+        extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
         ax.figure.colorbar(mesh, ax=ax, label=label, shrink=0.85, extend=extend)
     return ax
 
