@@ -103,6 +103,12 @@ def test_a_scale_is_pointed_where_values_lie_beyond(least, most, extend):
     assert ax.collections[0].colorbar.extend == extend
 
 
+def test_lines_of_pairs_are_told_apart_with_four_drives():
+    path = rk.triangle(rk.load("four_arms"), 0.1, dt=0.01)
+    lines = plotting.plot_complement_size(path, rk.drive_pairs(path.robot)).lines[:6]
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 6
+
+
 def test_a_working_mode_is_drawn_under_its_name():
     """The sign of a x d of each arm, as drawn, is that of the sine of its elbow angle."""
     for ax in np.ravel(plotting.plot_working_modes(ROBOT, [0.03, 0.02])):

@@ -11,8 +11,8 @@ from matplotlib.ticker import MultipleLocator
 from ...figures._shared import scaled_frame
 from ...figures.film import film
 from ...figures.machine import plot_machine
-from ...figures.maps import mode_name
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_line, arm_text_colour, axes_or_new
+from ...figures.maps import mode_name, pair_line
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_text_colour, axes_or_new
 from ...machine.arguments import positive_number
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
@@ -178,9 +178,8 @@ def plot_complement_size(trajectory, pairs, ax=None):
     ax = axes_or_new(ax)
     for pair in pairs:
         size = np.linalg.norm(orthogonal_complement(trajectory.robot, trajectory.q, pair), ord=2, axis=(-2, -1))
-        out = next((i for i in range(trajectory.robot.n_arms) if i not in pair), pair[0])
         names = f"$q^{{{pair[0] + 1}}}$, $q^{{{pair[1] + 1}}}$ independent"
-        ax.semilogy(trajectory.t, size, label=names, **arm_line(out))
+        ax.semilogy(trajectory.t, size, label=names, **pair_line(trajectory.robot, tuple(sorted(pair))))
     ax.axhline(1.0, color=NEUTRAL, lw=1.0, label="$N_J$: size 1 everywhere")
     ax.set(xlabel="time in s", ylabel="largest singular value of F", xlim=(0, trajectory.t[-1]))
     ax.set_ylim(0.5, 1e7)
