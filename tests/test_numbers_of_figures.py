@@ -109,6 +109,13 @@ def test_lines_of_pairs_are_told_apart_with_four_drives():
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 6
 
 
+def test_the_line_of_all_drives_is_in_the_picture_with_six():
+    angle = np.pi / 3 * np.arange(6)
+    six = rk.Manipulator(base=0.23 * np.stack([np.cos(angle), np.sin(angle)], -1), lengths=[0.22, 0.26], masses=0.1)
+    ax = plotting.plot_pair_measures(rk.triangle(six, 0.1, dt=0.01))
+    assert ax.get_ylim()[0] < ax.lines[-1].get_ydata().max() < ax.get_ylim()[1]
+
+
 def test_a_working_mode_is_drawn_under_its_name():
     """The sign of a x d of each arm, as drawn, is that of the sine of its elbow angle."""
     for ax in np.ravel(plotting.plot_working_modes(ROBOT, [0.03, 0.02])):

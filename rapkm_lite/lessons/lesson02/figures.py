@@ -222,7 +222,8 @@ def plot_pair_measures(trajectory, ax=None):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
     ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]))
-    ax.set_ylim(2e-3 / robot.lengths.max(), 2.0 / robot.lengths.max())  # A goes with one over the lengths
+    long, most = robot.lengths.max(), singular_values(A)[:, 1].max()  # A goes with one over the lengths
+    ax.set_ylim(2e-3 / long, max(2.0 / long, 1.2 * most))
     ax.set_ylabel(r"$\sigma_\mathrm{min}(A)$, $\sigma_\mathrm{min}(A_{jk})$ in rad/m")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(len(ax.lines), 5))
     return ax
