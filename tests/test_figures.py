@@ -406,6 +406,20 @@ def test_a_machine_of_another_size_and_place_is_in_the_same_frame(world, times, 
     assert ax.get_ylim()[0] < ax.lines[-1].get_ydata().min() < ax.lines[-1].get_ydata().max() < ax.get_ylim()[1]
 
 
+@pytest.mark.parametrize("turn", [np.pi / 3, 2.0, -0.4])
+def test_a_machine_that_is_turned_is_in_the_frame(turn):
+    """All that it reaches stays in the pictures that show where its drives are singular."""
+    c, s = np.cos(turn), np.sin(turn)
+    for robot in (rk.load(), rk.load("asymmetric")):
+        turned = robot.replace(base=robot.base @ np.array([[c, s], [-s, c]]))
+        x, y, inside = rk.workspace_grid(turned, 61)
+        there = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+        for ax in (plotting.plot_feedback_map(turned, (0, 1), n=21), *plotting.plot_partition_rules(turned, n=21)):
+            low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
+            assert np.all(low < there.min(axis=0)) and np.all(there.max(axis=0) < high)
+            plt.close("all")
+
+
 def test_accelerations_of_a_hanging_machine_are_those_of_all_torques_and_its_weight():
     robot = rk.load().replace(gravity=[0.0, -9.81], friction=0.0)
     ax = plotting.plot_accelerations(robot, [[0.0, 0.0]], 0.3)[0]

@@ -6,18 +6,36 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..machine.manipulator import load
-from ..mechanics.maps import sampling_box
+from ..machine.manipulator import crossings, load
+
+
+def workspace_box(robot) -> np.ndarray:
+    """The smallest box [[x_min, x_max], [y_min, y_max]] in m, (2, 2), around the points that all arms reach.
+
+    Its sides touch the circles of reach where these are farthest out, or where two of them cross.
+
+    >>> import rapkm_lite as rk
+    >>> workspace_box(rk.load()).round(3).tolist()
+    [[-0.2, 0.2], [-0.169, 0.231]]
+    """
+    inner, outer = np.abs(robot.lengths[:, 0] - robot.lengths[:, 1]), robot.lengths.sum(axis=1)
+    centres, radii = np.concatenate([robot.base, robot.base]), np.concatenate([inner, outer])
+    i, j = np.tril_indices(len(radii), -1)
+    ways = [centres + radii[:, None] * way for way in ([1, 0], [-1, 0], [0, 1], [0, -1])]
+    points = np.concatenate([*ways, crossings(centres[i], centres[j], radii[i], radii[j])])
+    reach, slack = np.linalg.norm(points[:, None] - robot.base, axis=-1), 1e-9 * outer.max()
+    there = points[np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)]
+    return np.stack([there.min(axis=0), there.max(axis=0)], axis=-1)
 
 
 def scaled_frame(robot, left: float, right: float, low: float, high: float) -> dict:
-    """Keywords of ``Axes.set``: limits in m that frame the testbed, for a machine of another place and size.
+    """Keywords of ``Axes.set``: limits in m that frame the testbed's workspace, for that of another machine.
 
     >>> import rapkm_lite as rk; testbed = rk.load()
     >>> scaled_frame(testbed.replace(base=3 * testbed.base, lengths=0.6), -0.21, 0.21, -0.19, 0.25)["xlim"]
     (-0.63, 0.63)
     """
-    testbed, own = (np.reshape(sampling_box(machine), (2, 2)) for machine in (load(), robot))
+    testbed, own = workspace_box(load()), workspace_box(robot)
     times = np.ptp(own, axis=1).max() / np.ptp(testbed, axis=1).max()
     corners = own.mean(axis=1) + times * (np.array([[left, low], [right, high]]) - testbed.mean(axis=1))
     x, y = corners.round(12).T.tolist()
