@@ -103,6 +103,24 @@ def test_a_scale_is_pointed_where_values_lie_beyond(least, most, extend):
     assert ax.collections[0].colorbar.extend == extend
 
 
+@pytest.mark.parametrize("times", [0.1, 10.0])
+def test_scales_of_forces_and_room_for_words_go_with_the_size_of_a_machine(times):
+    """Forces of equal torques go with one over the length."""
+    other = ROBOT.replace(base=times * ROBOT.base, lengths=times * ROBOT.lengths, centers=times * ROBOT.centers)
+
+    def seen(robot, size):
+        def radius(A, torque):
+            return torque * np.linalg.svd(A)[1][-1]
+
+        q = rk.inverse_kinematics(robot, [0.0, 0.0])
+        whole = plotting.plot_guaranteed_force(robot, {"": q}, radius, n=9)[-1].collections[0].get_clim()[1]
+        ends = size * np.array([[-0.05, 0.0], [0.05, 0.0]])
+        return size * whole, np.divide(plotting.plot_five_bar_curves(robot, *ends)[0].get_ylim(), size)
+
+    for own, same in zip(seen(other, times), seen(ROBOT, 1.0), strict=True):
+        assert_allclose(own, same, rtol=1e-6)
+
+
 def test_lines_of_pairs_are_told_apart_with_four_drives():
     path = rk.triangle(rk.load("four_arms"), 0.1, dt=0.01)
     lines = plotting.plot_complement_size(path, rk.drive_pairs(path.robot)).lines[:6]

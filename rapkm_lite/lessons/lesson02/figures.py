@@ -167,7 +167,8 @@ def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: floa
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
     force = on_grid(inside, np.array([float(radius_of(A_k, torque)) for A_k in A]))
-    plot_map(x, y, force, axes[-1], label="guaranteed force in N", vmin=0, vmax=1.2).set_title("whole workspace")
+    most = 2.4 * torque / robot.lengths.max()
+    plot_map(x, y, force, axes[-1], label="guaranteed force in N", vmin=0, vmax=most).set_title("whole workspace")
     return axes
 
 

@@ -42,7 +42,8 @@ def plot_five_bar_curves(robot, start, end, axes=None):
     for point in (line[0], line[-1]):
         axes[0].plot(*(1e3 * point), "o", color=AFTER, ms=6, zorder=4)
     low, high = axes[0].get_ylim()
-    axes[0].set(xlabel="x in mm", ylabel="y in mm", aspect="equal", title="in the plane", ylim=(low, high + 22))
+    axes[0].set(xlabel="x in mm", ylabel="y in mm", aspect="equal", title="in the plane")
+    axes[0].set_ylim(low, high + 110 * robot.lengths.max())  # room for the words above
     axes[0].legend(loc="upper center", ncols=3)
     axes[1].set(xlabel="turn of the first drive of the pair in °", ylabel="turn of the second in °")
     axes[1].set_title("in the joint subspaces")
