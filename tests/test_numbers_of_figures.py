@@ -3,6 +3,8 @@
 What is drawn is compared with what was given, times the factor of the unit, or with a calculation that is not theirs.
 """
 
+import re
+
 import matplotlib
 import numpy as np
 import pytest
@@ -101,6 +103,22 @@ def test_links_that_are_parallel_are_counted_from_one():
 def test_a_scale_is_pointed_where_values_lie_beyond(least, most, extend):
     ax = plotting.plot_map([0.0, 1.0], [0.0, 1.0], np.ma.array([[0.1, 0.2], [0.3, 1.0]]), vmin=least, vmax=most)
     assert ax.collections[0].colorbar.extend == extend
+
+
+@pytest.mark.parametrize("name", ["five_bar", "testbed", "four_arms"])
+def test_two_five_bars_share_drive_2(name):
+    """As the docstrings say: pairs (1,2) and (2,3), once each; two arms have one pair."""
+    robot = rk.load(name)
+    x, count = np.array([0.0, 0.06]), min(robot.n_arms - 1, 2)
+    ends = x - [0.02, 0.0], x + [0.02, 0.0]
+    plots = (
+        plotting.plot_five_bar_curves(robot, *ends)[0],
+        plotting.plot_joint_moves(robot, *ends, [0.1], [0.01], 5e-3)[0],
+    )
+    plots += (plotting.plot_synchronization(robot, x, np.full(robot.n_arms, 1e-3))[0],)
+    for ax in plots:
+        said = [text.get_text() for text in ax.get_legend().get_texts() if "drives" in text.get_text()]
+        assert [re.findall(r"\d", words) for words in said] == [["1", "2"], ["2", "3"]][:count]
 
 
 @pytest.mark.parametrize("times", [0.1, 10.0])

@@ -41,9 +41,8 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
     true = inverse_kinematics(robot, x)[: robot.n_arms]
-    pairs = drive_pairs(robot)
     shown = _pair_poses(robot, true + magnify * offset, x)
-    for pair, face in zip((pairs[0], pairs[-1]), ("white", ALARM), strict=True):
+    for pair, face in zip(((0, 1), (1, 2))[: robot.n_arms - 1], ("white", ALARM), strict=False):
         five_bar = robot.with_arms(pair)
         for i, points in zip(pair, arm_points(five_bar, shown[pair]), strict=True):
             axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
@@ -69,7 +68,8 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     corners = 1e3 * (np.array([*points.values()]) - x)
     words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9.5}
     centred = words | {"ha": "center", "va": "center"}
-    ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
+    if len(corners) == 3:
+        ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
     for (j, k), corner in zip(points, corners, strict=True):
         ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
         side = np.sign(corner[1] - corners[:, 1].mean())  # the name stands outside the triangle
@@ -100,7 +100,7 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
     q = ends[0] + part * (ends[1] - ends[0])
     line = np.add(start, part * np.subtract(stop, start))
     axes[0].plot(*(1e3 * line.T), color="#BBBBBB", lw=5, label="straight line")
-    for pair in (drive_pairs(robot)[0], drive_pairs(robot)[-1]):
+    for pair in ((0, 1), (1, 2))[: robot.n_arms - 1]:
         five_bar, x = robot.with_arms(pair), [line[0]]
         for angles in q[1:, list(pair)]:
             x.append(forward_kinematics(five_bar, estimate_pose(five_bar, angles, x[-1])))

@@ -8,7 +8,6 @@ import numpy as np
 from ...figures._shared import with_looks
 from ...figures.maps import pair_line, pair_name
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
-from ...mechanics.actuation import drive_pairs
 from ...mechanics.closure import estimate_pose
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics
 
@@ -29,7 +28,7 @@ def plot_five_bar_curves(robot, start, end, axes=None):
     straight = needed[0] + part * (needed[-1] - needed[0])
     axes[0].plot(*(1e3 * line.T), color="#BBBBBB", lw=5, label="wanted", zorder=1)
     axes[1].plot([], [], ":", color=NEUTRAL, label="what the edge needs")
-    for pair in (drive_pairs(robot)[0], drive_pairs(robot)[-1]):
+    for pair in ((0, 1), (1, 2))[: robot.n_arms - 1]:
         five_bar, (j, k), style = robot.with_arms(pair), pair, pair_line(robot, pair)
         x = [line[0]]
         for angles in straight[1:, list(pair)]:
