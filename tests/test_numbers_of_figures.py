@@ -3,6 +3,7 @@
 What is drawn is compared with what was given, times the factor of the unit, or with a calculation that is not theirs.
 """
 
+import itertools
 import re
 
 import matplotlib
@@ -137,6 +138,22 @@ def test_scales_of_forces_and_room_for_words_go_with_the_size_of_a_machine(times
 
     for own, same in zip(seen(other, times), seen(ROBOT, 1.0), strict=True):
         assert_allclose(own, same, rtol=1e-6)
+
+
+def test_pictures_of_six_drives_have_room_for_their_names():
+    """15 pairs and 64 modes: names beside an axis stand apart, legends are not much wider than panels."""
+    angle = np.pi / 3 * np.arange(6)
+    six = rk.Manipulator(base=0.23 * np.stack([np.cos(angle), np.sin(angle)], -1), lengths=0.22, masses=0.14)
+    run = rk.simulate(six, rk.SwitchedCTC(400.0, 40.0), rk.circle(six, 0.05, 0.5))
+    names = plotting.plot_pairs(run).get_yticklabels()
+    names[0].figure.draw_without_rendering()
+    boxes = [name.get_window_extent() for name in names]
+    assert all(low.y1 <= high.y0 for low, high in itertools.pairwise(boxes))
+    modes = plotting.plot_working_modes(six, [0.02, 0.01])
+    assert modes.shape == (8, 8) and modes[0, 0].figure.get_size_inches()[0] <= 20.0
+    for ax in (plotting.plot_torques_and_errors(run)[1], plotting.plot_clipping(run, run, 0.1)[0]):
+        ax.figure.draw_without_rendering()
+        assert ax.get_legend().get_window_extent().width < 1.4 * ax.get_window_extent().width
 
 
 def test_lines_of_pairs_are_told_apart_with_four_drives():

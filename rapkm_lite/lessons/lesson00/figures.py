@@ -24,7 +24,9 @@ def plot_working_modes(robot, x, axes=None):
     """
     modes = working_modes(robot)
     if axes is None:
-        axes = plt.subplots(2, len(modes) // 2, figsize=(2.5 * len(modes) // 2, 5.2), sharex=True, sharey=True)[1]
+        rows = max(2, len(modes) // 8)
+        columns = len(modes) // rows
+        axes = plt.subplots(rows, columns, figsize=(2.5 * columns, 2.6 * rows), sharex=True, sharey=True)[1]
     for ax, mode in zip(np.ravel(axes), modes, strict=True):
         plot_machine(robot, inverse_kinematics(robot, x, mode), ax, labels=False)
         ax.set_title(mode_name(mode), loc="center")

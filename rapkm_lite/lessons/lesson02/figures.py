@@ -35,8 +35,8 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
     >>> import rapkm_lite as rk; import numpy as np; x = np.linspace(-0.1, 0.1, 5)
     >>> ax = plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
     """
-    modes = working_modes(robot)
-    axes = plt.subplots(len(modes) // 4, 4, figsize=(10.4, 5.4), sharex=True, sharey=True)[1] if axes is None else axes
+    modes, rows = working_modes(robot), 2**robot.n_arms // 4
+    axes = plt.subplots(rows, 4, figsize=(10.4, 2.7 * rows), sharex=True, sharey=True)[1] if axes is None else axes
     for k, (ax, mode) in enumerate(zip(np.ravel(axes), modes, strict=True)):
         plot_map(x, y, sigma[k], ax, vmin=0.0, vmax=sigma.max(), bar=False)
         plot_pair_curves(robot, ax, mode=mode, on_map=True, linewidth=1.0)
@@ -166,8 +166,7 @@ def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: floa
         draw_own("02.guaranteed_force", lambda f, A=A, circle=circle: f(A, torque) * circle, ax)
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
-    force = on_grid(inside, np.array([float(radius_of(A_k, torque)) for A_k in A]))
-    most = 2.4 * torque / robot.lengths.max()
+    force, most = on_grid(inside, [float(radius_of(A_k, torque)) for A_k in A]), 2.4 * torque / robot.lengths.max()
     plot_map(x, y, force, axes[-1], label="guaranteed force in N", vmin=0, vmax=most).set_title("whole workspace")
     return axes
 
@@ -223,8 +222,7 @@ def plot_pair_measures(trajectory, ax=None):
         ax.semilogy(trajectory.t, sigma, label=f"pair {pair_name(pair)}", **pair_line(robot, pair))
     ax.semilogy(trajectory.t, singular_values(A)[:, 1], color="black", lw=2.2, label="all drives")
     ax.set(xlabel="time in s", xlim=(0, trajectory.t[-1]))
-    long, most = robot.lengths.max(), singular_values(A)[:, 1].max()  # A goes with one over the lengths
-    ax.set_ylim(2e-3 / long, max(2.0 / long, 1.2 * most))
+    ax.set_ylim(2e-3 / robot.lengths.max(), max(2.0 / robot.lengths.max(), 1.2 * singular_values(A)[:, 1].max()))
     ax.set_ylabel(r"$\sigma_\mathrm{min}(A)$, $\sigma_\mathrm{min}(A_{jk})$ in rad/m")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(len(ax.lines), 5))
     return ax

@@ -114,7 +114,7 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
             ax.axvline(t, color=NEUTRAL, lw=1.0, ls=":")
     # One legend for both panels, above the data.
     axes[0].get_legend().remove()
-    axes[1].legend(ncols=run.robot.n_arms, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    axes[1].legend(ncols=min(run.robot.n_arms, 4), loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return axes
 
 
@@ -200,8 +200,8 @@ def plot_pairs(run, ax=None):
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_pairs(rk.simulate(path.robot, rk.SwitchedCTC(400.0, 40.0), path))
     """
-    ax = axes_or_new(ax, figsize=(8.0, 1.6))
     pairs = drive_pairs(run.robot)
+    ax = axes_or_new(ax, figsize=(8.0, max(1.6, 0.8 + 0.2 * len(pairs))))
     for k, pair in enumerate(pairs):
         used = np.where(np.all(run.pairs == pair, axis=-1), float(k), np.nan)
         ax.plot(run.t, used, lw=6, solid_capstyle="butt", color=pair_line(run.robot, pair)["color"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
@@ -29,8 +31,9 @@ def plot_clipping(free, clipped, limit, axes=None):
     for side in (-1e3 * limit, 1e3 * limit):
         axes[0].axhline(side, color=ALARM, ls=":")
     axes[0].set(xlabel="time in s", ylabel="torque in mN m", title="what the drives are asked for")
-    axes[0].margins(y=0.2)
-    axes[0].legend(ncols=free.robot.n_arms, loc="upper center")
+    columns = min(free.robot.n_arms, 4)
+    axes[0].margins(y=0.2 * math.ceil(free.robot.n_arms / columns))  # room for each row of the legend
+    axes[0].legend(ncols=columns, loc="upper center")
     for run, label, colour in ((clipped, "clipped", BEFORE), (free, "without limits", AFTER)):
         error = np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         axes[1].plot(run.t, 1e3 * error, color=colour, label=label)
