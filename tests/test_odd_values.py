@@ -27,8 +27,11 @@ PD = rk.PD(7.05, 0.225)
         np.array([1.0, True, 3.0], object),
         np.array([1.0, b"2", 3.0], object),
         memoryview(b"123"),
+        [1.0, True, 3.0],
+        (1, np.True_, 3.0),
+        [np.array([1.0, 2.0]), np.array([3.0, 4.0]), [True, 5.0]],
     ],
-    ids=["text", "truth", "bytes", "memory"],
+    ids=["text", "truth", "bytes", "memory", "list", "tuple", "nested"],
 )
 def test_what_numpy_would_turn_into_numbers(value):
     with pytest.raises(ValueError, match=r"c = .* is not numeric; allowed: real numbers"):

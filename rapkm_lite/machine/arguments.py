@@ -60,7 +60,8 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
         array = np.asarray(value)
         # NumPy would read "1.0", True and bytes as numbers, and drop the imaginary part of a complex array.
         wrong = value is None or isinstance(value, bytearray | memoryview) or array.dtype.kind not in "iufO"
-        if wrong or (array.dtype.hasobject and any(isinstance(v, str | bytes | bool | np.bool_) for v in array.flat)):
+        items = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else array  # True beside numbers
+        if wrong or (items.dtype.hasobject and any(isinstance(v, str | bytes | bool | np.bool_) for v in items.flat)):
             raise TypeError
         array = array.astype(float, copy=False)
     except OverflowError:
@@ -68,8 +69,7 @@ def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
     except Exception:
         raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers") from None
     if last and array.shape[-len(last) :] != last:
-        want = "(" + ", ".join(["...", *map(str, last)]) + ")"
-        raise ValueError(f"{name} has shape {array.shape}; allowed: {want}")
+        raise ValueError(f"{name} has shape {array.shape}; allowed: ({', '.join(['...', *map(str, last)])})")
     return array
 
 
