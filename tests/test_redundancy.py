@@ -1,5 +1,6 @@
 """Torques within limits against a general solver and by symmetry; stiffness against the energy it comes from."""
 
+import contextlib
 import itertools
 
 import numpy as np
@@ -265,6 +266,32 @@ def test_two_motors_on_each_axis_share_a_force_within_their_limits():
     """A gantry: what one motor cannot, the other one of its axis does."""
     c = rk.allocate_torques([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]], [1.0, 1.0], [0.2, 1.0, 1.0, 1.0])
     assert_allclose(c, [0.2, 0.8, 0.5, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize("far", [1e2, 1e4, 1e6, 1e8, 1e11])
+def test_the_small_one_of_two_motors_gives_all_it_has_or_the_distance_of_the_limits_is_named(far):
+    """Two motors on one axis, nine tenths of both: least squares would halve it, so the small one is at its limit."""
+    assert_allclose(rk.allocate_torques([[1.0], [1.0]], [1.8], [1.0, far]), [0.9, 0.9], atol=1e-14)
+    try:
+        c = rk.allocate_torques([[1.0], [1.0]], [0.9 * (1.0 + far)], [1.0, far])
+    except ValueError as error:
+        assert "limits that differ less" in str(error) and far > 1e7
+    else:
+        assert_allclose(c, [1.0, 0.9 * (1.0 + far) - 1.0], rtol=1e-6)
+
+
+def test_forces_near_the_corners_of_far_limits_are_right_or_refused():
+    """A corner is the force of all limits with the signs of A u, and what lies inside needs no more: A^T c = f."""
+    rng, reached = np.random.default_rng(0), 0
+    for _ in range(200):
+        m = rng.integers(2, 7)
+        A, limit = rng.normal(size=(m, rng.integers(1, m))), 10.0 ** rng.uniform(-5.0, 5.0, m)
+        wrench = (1.0 - 10.0 ** -rng.uniform(6.0, 9.0)) * A.T @ (limit * np.sign(A @ rng.normal(size=A.shape[1])))
+        with contextlib.suppress(ValueError):
+            c, reached = rk.allocate_torques(A, wrench, limit), reached + 1
+            assert np.all(np.abs(c) <= limit)
+            assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-9 * np.abs(A * limit[:, None]).max())
+    assert reached > 150
 
 
 def test_numbers_of_poses_that_do_not_fit_are_named():

@@ -23,8 +23,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
     W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
     Raises ValueError at input singularities, for a wrench beyond the limits, with the factor by which they fall
-    short, for limits of more than 1e12 times one another, and for a prestress so far beyond them that rounding hides
-    the nearest torques.
+    short, for limits of more than 1e12 times one another, and where rounding hides the nearest torques: for a
+    prestress far beyond the limits, or a force that takes most of limits far apart.
 
     >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
     >>> rk.allocate_torques(A, [1.0, 1.0], limit=1.0).round(3), rk.allocate_torques(A, [1.0, 1.0], limit=0.6).round(3)
@@ -62,8 +62,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
     if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
         raise ValueError(
-            f"prestress = {c0.tolist()} is so far beyond limit = {limit.tolist()} that rounding hides the nearest "
-            "torques; allowed: a prestress of the size of the limits"
+            f"prestress = {c0.tolist()} is so far beyond limit = {limit.tolist()}, or these are so far apart, that "
+            "rounding hides the nearest torques; allowed: a prestress of their size, and limits that differ less"
         )
     return np.clip(edge, -limit, limit) if missed else c
 
