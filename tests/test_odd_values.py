@@ -218,6 +218,9 @@ SAMPLE = rk.Sample(rk.Controller(PD, TESTBED), 0.0, HOLD.q_a[0], HOLD.qd_a[0], H
     [
         (lambda: rk.singular_values(1e80 * A), r"A has .*e\+80 as largest entry; allowed: 1e-50 to 1e50 in magnitude"),
         (lambda: rk.null_basis(1e-160 * A), r"A has .*e-160 as largest entry; allowed: 1e-50 to 1e50 in magnitude"),
+        (lambda: rk.singular_values([A, 1e-60 * A]), r"A has .*e-60 as largest entry; allowed: 1e-50 to 1e50 in magn"),
+        (lambda: rk.singular_values([1e60 * A, A]), r"A has .*e\+60 as largest entry; allowed: 1e-50 to 1e50 in magn"),
+        (lambda: rk.Sensors(encoder=np.nextafter(4096, 0)), r"encoder = 4095\.9999999999995; allowed: whole numbers"),
         (lambda: rk.effective_gain(1e-160 * A, 7.0), r"F has .*e-160 as largest entry; allowed: 1e-50 to 1e50"),
         (lambda: rk.select_independent(np.full((3, 6), 1e80)), r"A_tilde has 1e\+80 as largest entry; allowed: "),
         (lambda: rk.steady_state_torque(1e-160 * A, 7.0, [1e-3, 0, 0]), r"A has .*e-160 as largest entry; allowed: "),

@@ -33,10 +33,8 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     Raises ValueError when `value` is not numeric (text, Boolean and complex values are not), holds NaN, infinity or
     numbers from 1e100 on, or has other trailing axes.
     """
-    if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last:
-        array = value
-    else:
-        array = _converted(name, value, last)
+    plain = type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last
+    array = value if plain else _converted(name, value, last)
     # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
     # for a large one it would wake the threads of the linear algebra library.
     if not (np.vdot(array, array) < 1e200 if array.size <= 1000 else -1e100 < array.min() and array.max() < 1e100):
@@ -168,7 +166,8 @@ def whole_number(name: str, value, low: int, high: float = math.inf) -> int:
         return value
     number = float(bounded(name, exact_array(name, value), low, strict=False))
     if not number.is_integer() or number > high:
-        raise ValueError(f"{name} = {number:g}; allowed: whole numbers >= {low}" + f", to {high}" * (high < math.inf))
+        given = f"{number:g}" if number.is_integer() else number  # to the last digit: 4095.9999999999995 is not 4096
+        raise ValueError(f"{name} = {given}; allowed: whole numbers >= {low}" + f", to {high}" * (high < math.inf))
     return int(number)
 
 
