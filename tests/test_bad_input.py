@@ -439,6 +439,8 @@ def test_question_for_a_place_of_rest():
         ("K_P", [1.0, 2.0]),
         ("offset", C),
         ("offset", 0.0),
+        ("K_P", [7.0 * np.eye(3)]),
+        ("K_P", [7.0 * np.eye(3)] * 3),
         ("quantum", 0.0),
         ("quantum", None),
         ("friction", -1.0),

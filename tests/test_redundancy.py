@@ -249,6 +249,11 @@ def test_stiffness_with_weight_is_how_the_force_of_a_hanging_machine_changes(nam
     ("call", "sentence"),
     [
         (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], -1.0), "limit = -1"),
+        (
+            lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], 0.1, W=[np.eye(3)] * 2),
+            r"W has shape \(2, 3, 3\); allowed: ",
+        ),
+        (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], 9.0, W=[np.eye(3)]), r"W has shape \(1, 3, 3\); allowed: "),
         (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], [1.0, 1.0]), "limit has shape"),
         (lambda: rk.allocate_torques(CENTRE, [1.0], 1.0), "wrench has shape"),
         (lambda: rk.allocate_torques([CENTRE], [1.0, 0.0], 1.0), "A has shape"),

@@ -14,6 +14,7 @@ from ..machine.arguments import (
     positive_definite,
     positive_number,
     real_array,
+    shaped,
     tall_matrix,
 )
 from ..machine.manipulator import Manipulator, manipulator
@@ -205,8 +206,8 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     of each drive from torques that carry the weight, prestress included: a place of rest exists, to first order about q
     and with exact rates.  It does for K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is
     another question.
-    K_P : number or (N,), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.  friction : number, N m of
-    each drive.
+    K_P : number, (N,) or (N, N), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.
+    friction : number, N m of each drive.
     Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and
     where friction may carry soft drives too many counts to try (two of a millionth of the third one's gain, say).
 
@@ -218,10 +219,11 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     desired = exact_array("q", q, robot.n_joints)[:N]
     offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
     friction = float(bounded("friction", exact_array("friction", friction), 0.0, strict=False))
+    K = positive_definite("K_P", K_P, N)
+    shaped("K_P", K, K.ndim == 2, f"one number, ({N},) or ({N}, {N}), one pose")
     A, weight = control_matrix(robot, q), required_wrench(robot, q, np.zeros(2 * N), np.zeros(2 * N))
     zero = (desired + offset) / quantum
-    ideal = zero + steady_state_error(A, K_P, offset, weight) / quantum
-    K = positive_definite("K_P", K_P, N)
+    ideal = zero + steady_state_error(A, K, offset, weight) / quantum
     if np.all(np.abs(K).sum(axis=-1) * quantum <= 2 * friction):
         return True
     counts = _readable(A, ideal, _reach(A, K, friction / quantum), zero)

@@ -8,7 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import bounded, check_leading, exact_array, matvec, positive_definite, real_array, tall_matrix
+from ..machine.arguments import (
+    bounded,
+    check_leading,
+    exact_array,
+    matvec,
+    positive_definite,
+    real_array,
+    shaped,
+    tall_matrix,
+)
 from ..machine.manipulator import Manipulator
 from . import cores
 from .actuation import prestress_projector, weighted_pseudoinverse
@@ -21,7 +30,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     The least-distance programme of Lawson and Hanson in the coordinates of the null space, solved by SciPy's
     non-negative least squares, which ends after finitely many steps; where no limit is active it is (11).
     A : (m, delta), of any mechanism.  wrench : (delta,), N or N m.  limit : number or (m,), N m, positive.
-    W : see `weighted_pseudoinverse`.  prestress : c0 (m,), N m, default none.
+    W : symmetric positive definite, one number, (m,) or (m, m); default the identity.  prestress : c0 (m,), N m,
+    default none.
     Raises ValueError at input singularities, for a wrench beyond the limits, with the factor by which they fall
     short, for limits of more than 1e12 times one another, and where rounding hides the nearest torques: for a
     prestress far beyond the limits, or a force that takes most of limits far apart.
@@ -36,6 +46,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     m = len(A)
     c0 = np.zeros(m) if prestress is None else exact_array("prestress", prestress, m)
     W = np.eye(m) if W is None else positive_definite("W", W, m)
+    shaped("W", W, W.ndim == 2, f"one number, ({m},) or ({m}, {m}), one pose")
     best = matvec(weighted_pseudoinverse(A, W), wrench) + matvec(prestress_projector(A, W), c0)
     if np.all(np.abs(best) <= limit):
         return best
