@@ -52,8 +52,9 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
         return best
     edge, peak = _least_peak(A, wrench, limit)
     if peak > 1.0 + 1e-12:
+        factor = f"{peak:.4g}" if peak > 1.001 else f"1 + {peak - 1.0:.2g}"
         raise ValueError(
-            f"wrench = {wrench.tolist()} needs {peak:.4g} times limit = {limit.tolist()} at least; allowed: a wrench "
+            f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} at least; allowed: a wrench "
             "inside the force polygon of the limits"
         )
     # c / limit = best + n z with |z|^2 the cost above the best one, as a share of the largest weight, and the limits as
