@@ -258,6 +258,8 @@ def test_stiffness_with_weight_is_how_the_force_of_a_hanging_machine_changes(nam
         (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], [1.0, 1.0]), "limit has shape"),
         (lambda: rk.allocate_torques(CENTRE, [1.0], 1.0), "wrench has shape"),
         (lambda: rk.allocate_torques([CENTRE], [1.0, 0.0], 1.0), "A has shape"),
+        (lambda: rk.force_polygon(np.eye(3), 1.0), r"A has shape \(3, 3\); allowed: \(m, 2\), one pose"),
+        (lambda: rk.force_polygon([CENTRE], 1.0), r"A has shape \(1, 3, 2\); allowed: \(m, 2\), one pose"),
         (lambda: rk.allocate_torques(np.ones((3, 2)), [1.0, 0.0], 1.0), "lost rank"),
         (lambda: rk.minimax_torques(CENTRE, [np.nan, 0.0]), "wrench"),
         (lambda: rk.endeffector_stiffness(FRICTIONLESS, np.zeros(6), 7.05), "boundary of the workspace"),

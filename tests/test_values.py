@@ -74,6 +74,13 @@ def test_nan_equals_nan_and_no_number_and_a_tuple_no_list():
     assert equal(nan, float("nan")) and not equal(nan, 1.0) and not equal(1.0, nan) and not equal(nan, None)
 
 
+def test_an_array_equals_the_list_of_its_numbers_whichever_comes_first():
+    """Equality is symmetric; a field that keeps an array may have a tuple as default, which is then not printed."""
+    for other in ([1.0, 2.0], (1.0, 2.0)):
+        assert equal(np.array([1.0, 2.0]), other) and equal(other, np.array([1.0, 2.0]))
+        assert not equal(np.array([1.0, 3.0]), other) and not equal(other, np.array([1.0, 3.0]))
+
+
 def test_what_a_mask_hides_does_not_count_and_the_mask_does():
     hidden, shown = np.ma.array([1.0, 0.0], mask=[0, 1]), np.ma.array([1.0, 0.0], mask=[0, 0])
     assert equal(hidden, np.ma.array([1.0, 5.0], mask=[0, 1]))
