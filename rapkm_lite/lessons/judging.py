@@ -224,7 +224,9 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool]) -> None:
     words = named(seen, exercise.secret)
     if not words and loose > 1e-6:
         _known_mistake(exercise, rough)
-    words = words or named(rough, exercise.secret) or ("" if exercise.secret else where(seen, right))
+    # What fits much better goes first: two numbers may be nearly opposite, and their order the mistake.
+    words = words or named(replace(seen, slack=loose / 5), exercise.secret) or named(rough, exercise.secret)
+    words = words or ("" if exercise.secret else where(seen, right))
     if words:
         raise Ended("wrong", "; ".join(filter(None, [words, _off(exercise, seen)])), words)
 

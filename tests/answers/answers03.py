@@ -274,6 +274,8 @@ def offsets_of(name, side):
         ("wrong", "degrees", np.rad2deg(best), "degrees"),
         ("wrong", "zeros", np.zeros(3), "zero"),
         ("wrong", "reversed", best[::-1], "order"),
+        ("wrong", "drives 1 and 2 exchanged", best[[1, 0, 2]], "order"),
+        ("wrong", "drives 2 and 3 exchanged", best[[0, 2, 1]], "order"),
         ("wrong", "one sign", best * [1, -1, 1], "sign"),
         ("wrong", "errors of the first rest", e[0], "errors"),
         ("wrong", "mean error", e.mean(axis=0), "errors"),
