@@ -68,8 +68,8 @@ EXERCISES = {
         "vanishes, as far out as the disc allows",
         points=10.0,
         mistakes={
-            "these are six places evenly on a circle, three of which show what is known already: compare the "
-            "null vectors of three places while you turn them": tasks.is_hexagon,
+            "these are six places evenly on a circle, which in the disc miss the condition however they are turned: "
+            "compare the null vectors of three places while you turn them": tasks.is_hexagon,
             "the places are given in mm; the unit is m": lambda answer: bool(
                 20.0 <= np.abs(tasks.chosen(answer)).max() <= 120.0
             ),
