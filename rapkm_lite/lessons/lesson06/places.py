@@ -115,6 +115,16 @@ def _good_elsewhere(change_places=lambda p: p, change_offsets=lambda dq: dq):
     return made
 
 
+def _in_units(metres: float):
+    """True for places that fit when read in a smaller unit, and where the farthest is beyond 20 mm, told from cm."""
+
+    def made(answer) -> bool:
+        places = [metres * p for p in _places(answer)]
+        return _fits(places) and np.abs(places).max() > 0.02 and not _fits(_places(answer))
+
+    return made
+
+
 def _dearest(answer) -> bool:
     spots, forms = _forms(_machine())
     worst = [np.einsum("i,kij,j->k", dq, forms, dq).max() for dq in 1e-3 * np.array(OFFSETS)]
@@ -128,9 +138,8 @@ def _same(answer) -> bool:
 
 
 MISTAKES = {
-    "the place is 1000 times too far away: units, the centre is wanted in m, not in mm": (
-        lambda answer: _fits([1e-3 * p for p in _places(answer)]) and np.abs(_places(answer)).max() > 1.0
-    ),
+    "the place is 1000 times too far away: units, the centre is wanted in m, not in mm": _in_units(1e-3),
+    "the place is 100 times too far away: units, the centre is wanted in m, not in cm": _in_units(1e-2),
     "the place is the same for all offsets: the factor `offset` is missing in what is made small": _same,
     "this is the dearest place instead of the cheapest: the opposite order, max for min": _dearest,
     "the signs of the offsets are lost": _good_elsewhere(change_offsets=np.abs),
