@@ -366,6 +366,9 @@ PLACES = [
     ("wrong", "corner", lambda robot, offset: grid(robot, offset) + CORNERS[1], "corner"),
     ("wrong", "signs lost", on_grid(0.02, cost=lambda robot, p, offset: predicted(robot, p, np.abs(offset))), ""),
     ("wrong", "offsets backwards", on_grid(cost=lambda robot, p, offset: predicted(robot, p, offset[::-1])), "order"),
+    ("wrong", "drives from 2 on", lambda robot, offset: grid(robot, np.roll(offset, -1)), "another order"),
+    # The cheapest places for (dq_3, dq_1, dq_2) are the dearest ones here: nobody can tell which of the two it was.
+    ("wrong", "drives from 3 on", lambda robot, offset: grid(robot, np.roll(offset, 1)), "offsets of other drives"),
     (
         "wrong",
         "first offset only",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import permutations
 
 import numpy as np
 
@@ -125,6 +126,11 @@ def _in_units(metres: float):
     return made
 
 
+def _another_order(answer) -> bool:
+    orders = list(permutations(range(3)))[1:]
+    return any(_good_elsewhere(change_offsets=lambda dq, k=k: np.take(dq, k))(answer) for k in orders)
+
+
 def _dearest(answer) -> bool:
     spots, forms = _forms(_machine())
     worst = [np.einsum("i,kij,j->k", dq, forms, dq).max() for dq in 1e-3 * np.array(OFFSETS)]
@@ -141,9 +147,9 @@ MISTAKES = {
     "the place is 1000 times too far away: units, the centre is wanted in m, not in mm": _in_units(1e-3),
     "the place is 100 times too far away: units, the centre is wanted in m, not in cm": _in_units(1e-2),
     "the place is the same for all offsets: the factor `offset` is missing in what is made small": _same,
-    "this is the dearest place instead of the cheapest: the opposite order, max for min": _dearest,
+    "this is the dearest place instead of the cheapest: max for min, or the offsets of other drives": _dearest,
     "the signs of the offsets are lost": _good_elsewhere(change_offsets=np.abs),
-    "the offsets are taken in another order": _good_elsewhere(change_offsets=lambda dq: dq[::-1]),
+    "the offsets are taken in another order": _another_order,
     "x and y of the place are exchanged (order)": _good_elsewhere(lambda p: p[::-1]),
     "the place has the opposite sign": _good_elsewhere(lambda p: -p),
     "this is the lower left corner of the triangle; its centre is wanted": _good_elsewhere(
