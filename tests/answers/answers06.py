@@ -110,6 +110,12 @@ FORMS = [
     ),
     (
         "wrong",
+        "last pose, the first one of a closed path",
+        lambda robot, path, K_P: weight(robot) * K_P**2 * path.t[-1] * null(rk.control_matrix(robot, path.q[-1])),
+        "or of the last one",
+    ),
+    (
+        "wrong",
         "mean A",
         lambda robot, path, K_P: (
             weight(robot) * K_P**2 * path.t[-1] * null(rk.control_matrix(robot, path.q[:-1]).mean(axis=0))

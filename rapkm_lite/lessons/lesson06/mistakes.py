@@ -62,7 +62,7 @@ FORMS = {
     "this is the mean over the path; the integral is wanted, a factor of its duration T is missing": _form(
         lambda N, path: N[:-1].mean(axis=0)
     ),
-    "the projector of the first pose is used for the whole path: A changes with the pose": _form(
+    "the projector of the first pose, or of the last one, is used for the whole path: A changes with the pose": _form(
         lambda N, path: N[0] * path.t[-1]
     ),
     "this is the complement: the part of the torques that moves the machine; the fight is the rest, I minus it": _form(
