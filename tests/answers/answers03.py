@@ -198,6 +198,9 @@ UNSEEN = [
     ("wrong", "along eta, large", lambda robot, x: first_null(robot, x, 15e-3), "eta"),
     ("wrong", "millimetres", lambda robot, x: matrix(robot, x) @ [0.0, 2.2], "1000"),
     ("wrong", "milliradian of too little", lambda robot, x: matrix(robot, x) @ [0.0, 2.2e-6], "1000"),
+    # A thousand times as large these would fight, and a thousand times smaller shift next to nothing.
+    ("wrong", "small and all equal", lambda robot, x: np.full(robot.n_arms, 1e-5), "smallest shift"),
+    ("wrong", "degrees of a shift in cm", lambda robot, x: np.rad2deg(matrix(robot, x) @ [0.0, 0.22]), "a run is lost"),
     ("wrong", "1 mm", lambda robot, x: matrix(robot, x) @ [0.0, 1e-3], "shift at rest"),
     ("wrong", "5 mm", lambda robot, x: matrix(robot, x) @ [0.0, 5e-3], "missed"),
     ("wrong", "all equal", lambda robot, x: np.full(robot.n_arms, 5e-3), "torque at rest"),

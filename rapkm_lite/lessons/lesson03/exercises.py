@@ -130,10 +130,8 @@ EXERCISES = {
         mistakes={
             "no offsets at all: nothing is seen, and nothing is shifted": lambda f: not np.any(tasks.asked(f)[0]),
             "these offsets point along eta: this is the part that fights, not the one that shifts": tasks.along_eta,
-            "the offsets are 1000 times too large: units, mrad given for rad or mm for m": (
-                lambda f: np.abs(tasks.asked(f)[0]).max() > 5.0
-            ),
-            "the offsets are 1000 times too small (units)": lambda f: np.abs(tasks.asked(f)[0]).max() < 2e-5,
+            "the offsets are 1000 times too large: units, mrad given for rad or mm for m": tasks.unseen_times(1e-3),
+            "the offsets are 1000 times too small (units)": tasks.unseen_times(1e3),
         },
     ),
 } | READINGS

@@ -129,6 +129,17 @@ def along_eta(offsets) -> bool:
     return bool(np.linalg.norm(chosen - n * (n @ chosen)) < 0.05 * np.linalg.norm(chosen))
 
 
+def unseen_times(factor: float):
+    """True where the offsets of a design, times a factor, would do: of the right size, and but for 5 % without eta."""
+
+    def made(offsets) -> bool:
+        chosen, n = asked(offsets)
+        fits = 5e-3 < factor * np.abs(chosen).max() < 1e-3 * LARGEST
+        return bool(fits and abs(n @ chosen) < 0.05 * np.linalg.norm(chosen))
+
+    return made
+
+
 @functools.cache
 def rests(name: str):
     """Null vectors (k, 3), mean errors and mean torques of the second half of each rest of a log."""
