@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable
 from contextvars import ContextVar
 from pathlib import Path
+from types import FrameType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,8 +117,14 @@ def _unfinished(error: BaseException | None) -> bool:
 
 def _outside(error: BaseException) -> bool:
     """True when code that is neither the package's nor a library's was at work when the error was raised."""
-    files = {frame.f_code.co_filename for frame, _ in traceback.walk_tb(error.__traceback__)}
+    files = {_file(frame) for frame, _ in traceback.walk_tb(error.__traceback__)}
     return any(not file.startswith(tuple(f"{home}{os.sep}" for home in _HOMES)) for file in files)
+
+
+def _file(frame: FrameType) -> str:
+    """Where the code of a frame stands; what a dataclass writes for itself stands in the module of the class."""
+    file = frame.f_code.co_filename
+    return frame.f_globals.get("__file__", file) if file == "<string>" else file
 
 
 def guarded(action: Callable, *arguments) -> Any:

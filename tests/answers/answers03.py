@@ -211,7 +211,7 @@ UNSEEN = [
     ("wrong", "five numbers", lambda robot, x: np.full(5, 1e-3), "shape"),
     ("wrong", "transposed pseudoinverse", lambda robot, x: np.linalg.pinv(matrix(robot, x)).T @ [0, 0.4], "missed"),
     ("wrong", "a value", np.array([4e-3, -2e-3, 5e-3]), "function"),
-    ("wrong", "NaN", lambda robot, x: np.full(robot.n_arms, np.nan), ""),
+    ("wrong", "NaN", lambda robot, x: np.full(robot.n_arms, np.nan), "cannot be tried: offset[0] = nan"),
     (
         "wrong",
         "elbow angles",
