@@ -137,6 +137,7 @@ ANSWERS = {
         ("wrong", "constant prestress", constant(0.095), "of this sign"),
         ("wrong", "a constant one, too small", constant(0.03), "smallest torque"),
         ("wrong", "too little", little(1e-3), "smallest"),
+        ("wrong", "down to zero", little(0.0), "changes its sign) 0 mN m"),
         ("wrong", "too hot", in_the_middle, "heat"),
         ("wrong", "clipped from below", lambda A, f: clipped(A, f, 5e-3), "force"),
         ("wrong", "no force at all", lambda A, f: np.full(3, 5e-3), "force"),

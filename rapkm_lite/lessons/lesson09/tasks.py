@@ -155,7 +155,8 @@ def carried(answer) -> list[Measured]:
     run = simulate(robot, Choosing(lambda A, f: chosen(answer, A, f)), path)
     one_way = np.maximum(run.c.min(axis=0), (-run.c).min(axis=0)).min()
     error = np.linalg.norm(run.x - path.x, axis=-1).max()
-    most, least = (round(1e3 * float(torque), 6) for torque in (np.abs(run.c).max(), one_way))
+    # A torque of zero comes as -0.0, which would read as a change of sign.
+    most, least = (round(1e3 * float(torque), 6) + 0.0 for torque in (np.abs(run.c).max(), one_way))
     changes = "smallest torque (negative: a drive changes its sign)"
     return [
         Measured("largest torque", most, "mN m", 1e3 * LIMIT),
