@@ -282,6 +282,12 @@ def offsets_of(name, side):
         ("wrong", "one sign", best * [1, -1, 1], "sign"),
         ("wrong", "errors of the first rest", e[0], "errors"),
         ("wrong", "mean error", e.mean(axis=0), "errors"),
+        (
+            "wrong",
+            "mean of the minimum norms",
+            np.mean(n * np.sum(n * e, axis=1)[:, None], axis=0),
+            "" if name == "gain" else "smallest offsets",
+        ),
         ("wrong", "gain forgotten", np.linalg.solve(n, -np.sum(n * c, axis=1)), ""),
         ("wrong", "minimum norm of one rest", n[0] * (n[0] @ e[0]), "one place" if name == "gain" else ""),
         ("wrong", "two numbers", best[:2], "shape"),

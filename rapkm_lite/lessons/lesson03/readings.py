@@ -14,9 +14,8 @@ def _log_mistakes(name: str) -> dict:
     read = {
         "these are the measured errors of a rest, or the smallest offsets that explain them, which is nearly the same: "
         "one place tells one number, and by the rest of the offsets the machine has moved": lambda n, e, c: e[0],
-        "these are the measured errors of a rest, averaged over the places: not the offsets": (
-            lambda n, e, c: e.mean(axis=0)
-        ),
+        "these are the measured errors of a rest, or the smallest offsets that explain them, which is nearly the same, "
+        "averaged over the places: not the offsets": lambda n, e, c: e.mean(axis=0),
         "these are rest torques over the gain: only their part along eta comes from the offsets, and one place is not "
         "enough": lambda n, e, c: -c[0] / K_P,
         "this is the minimum norm of the first rest: one place tells one number": lambda n, e, c: n[0] * (n[0] @ e[0]),
