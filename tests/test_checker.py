@@ -1009,3 +1009,10 @@ def test_two_errors_that_are_a_little_different_are_no_constant():
     right = exercises()["11.gain_for_bandwidth"].reference
     said = judged(exercises()["11.gain_for_bandwidth"], lambda *case: float(f"{right(*case):.3g}")).sentence
     assert "off by a constant" not in said, said
+
+
+def test_what_an_answer_of_infinity_makes_of_a_mistake_is_no_warning_to_the_student(recwarn):
+    """The verdict says that the offsets are infinite; the difference of two infinities is nobody's business."""
+    verdict, said = examine("03.unseen_offsets", lambda robot, x: np.full(robot.n_arms, np.inf))
+    assert verdict == "wrong" and "offset[0] = inf" in said
+    assert not [str(one.message) for one in recwarn]
