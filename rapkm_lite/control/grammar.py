@@ -46,9 +46,9 @@ UNASKED = {"torque": "step"}
 class Law:
     """Base of all laws, also of those that users write.
 
-    pose : from where `step` takes the configuration: "measured", the least-squares pose of the measured base angles
-        (`estimate_pose`); "true", the true one, for study; None for a law that needs no pose.  The laws of this package
-        compare driven joints as they are measured, whatever the pose, and elbows and end-effector of the pose.
+    pose : which configuration `torque` gets: "measured", the least-squares pose of the measured base angles
+        (`estimate_pose`), "true", for study, or None; a `step` of your own asks for it, ``sample.pose(self.pose)``.
+        The laws of this package compare driven joints as measured, whatever the pose, elbows and end-effector of it.
 
     A law of your own gives `torque`, or `start` and `step` when it remembers something:
 

@@ -73,7 +73,8 @@ class Sample:
         """Configuration q and rate qd on V, (2N,) each, read-only; found when asked for, and kept.
 
         The base angles of q are on the turn of the measured ones, of the true pose on that of the desired ones.
-        source : "measured", by least squares from the measured base angles; "true", for study; None for (None, None).
+        source : "measured", by least squares from the measured base angles, the default whatever the law's own `pose`;
+        "true", for study; None for (None, None).
         Raises ConvergenceError when the measured angles fit no pose, ValueError where the true motion was not told.
         """
         if source is None:
