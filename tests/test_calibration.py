@@ -963,3 +963,19 @@ def test_a_log_from_a_spreadsheet(tmp_path):
     path = tmp_path / "gain.csv"
     path.write_text(text + "\n\n", encoding="utf-8-sig")
     assert rk.read_log(path) == rk.mystery_run("gain")
+
+
+@pytest.mark.parametrize("low", [0.0, -np.pi])
+def test_encoders_that_count_other_turns_than_the_desired_angles_show_the_same_gains(low):
+    """An angle is the same a whole turn later: read from `low` to a turn above it, while those desired stay.
+
+    2 pi is no number of a computer: sums of a turn and an angle are rounded at 1e-15, as parts of 1e-3 rad 1e-12.
+    """
+    log = rk.mystery_run("offset_a")
+    q_a = low + (log.q_a - low) % (2 * np.pi) + [0.0, 4 * np.pi, 0.0]
+    turned = rk.Log("turned", log.t, q_a, log.q_a_desired, log.c)
+    assert np.abs(turned.error).max() > 6
+    same, found = (rk.calibrate(TESTBED, one, use="torques") for one in (log, turned))
+    assert_allclose(found.K_P, same.K_P, rtol=1e-9)
+    assert_allclose(found.offset, same.offset, rtol=0, atol=1e-11)
+    assert rk.calibrate(TESTBED, turned, K_P=7.05).note == rk.calibrate(TESTBED, log, K_P=7.05).note

@@ -77,12 +77,14 @@ def rests(logs: list[Log]) -> Rests | None:
     """The rests of all logs, stretches of equal desired angles without their first quarter; None without any."""
     found = []
     for log in logs:
+        # Encoders may count other turns than the desired angles do.
+        near = log.q_a - 2 * np.pi * np.rint(log.error / (2 * np.pi))
         moves = np.flatnonzero(np.any(np.diff(log.q_a_desired, axis=0) != 0.0, axis=-1)) + 1
         for start, stop in zip([0, *moves], [*moves, len(log.t)], strict=True):
             still = slice(start + (stop - start) // 4, stop)
             count = stop - still.start
             if count >= SHORTEST:
-                both = np.stack([log.c[still], log.q_a[still]], axis=-1)
+                both = np.stack([log.c[still], near[still]], axis=-1)
                 c, q_a = np.moveaxis(both.mean(axis=0), -1, 0)
                 off = both - both.mean(axis=0)
                 noise = np.einsum("kia,kib->iab", off, off) / (count - 1)
