@@ -156,7 +156,7 @@ def test_of_two_notebooks_with_as_many_points_the_newer_one_counts(names, tmp_pa
         write(tmp_path / "ada" / name, [SETUP])
         os.utime(tmp_path / "ada" / name, (age, age))
     monkeypatch.setattr(
-        grader, "grade_one", lambda one, _: [Grade(one.student, NAMES[0], "ok", 1.0, 1.0, "", "", str(one.path))]
+        grader, "grade_one", lambda one, *_: [Grade(one.student, NAMES[0], "ok", 1.0, 1.0, "", "", str(one.path))]
     )
     assert [Path(one.file).name for one in grade(tmp_path)] == [names[0]]
 
@@ -561,3 +561,19 @@ def test_the_limit_of_a_statement_is_the_one_that_the_help_says(tmp_path, monkey
         main(["grade", "--help"])
     told = re.search(r"limit of a statement or a\s+check \((\d+)\)", capsys.readouterr().out)
     assert told and asked == [(float(told[1]), None), (5.0, 2)]
+
+
+def test_a_grader_that_is_interrupted_ends_what_runs_and_begins_nothing_more(tmp_path, monkeypatch):
+    """Ctrl-C arrives while others wait: of twenty notebooks those that hang for longer than the test are ended."""
+    for number in range(20):
+        write(tmp_path / f"student{number:02}" / "04_x.ipynb", [SETUP, TORQUES + CHECKS[0]] if number == 0 else
+              [SETUP, f"import time\n{ENDLESS}{CHECKS[0]}"])  # fmt: skip
+    begun, start = [], grader.grade_one
+    monkeypatch.setattr(grader, "grade_one", lambda one, *others: begun.append(one) or start(one, *others))
+
+    def interrupt(done, total, one):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        grade(tmp_path, jobs=2, progress=interrupt)
+    assert len(begun) <= 4

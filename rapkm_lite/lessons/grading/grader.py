@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 
 from ..checker import exercises
 from .submission import Submission, found
@@ -46,6 +47,7 @@ def grade(
     seconds : limit of each statement and each check; a whole notebook gets ten times as much.
     jobs : submissions graded at a time; None: as many as there are processors.
     progress : called with (done, all, submission) after each one.
+    Ctrl-C, or an error of `progress`, ends what runs; nothing more is begun.
     Raises ValueError when the folder holds no submissions or `seconds` or `jobs` is not positive.
     """
     if not seconds > 0.0:
@@ -55,15 +57,20 @@ def grade(
         raise ValueError(f"jobs = {jobs!r}; allowed: 1 or more")
     submissions = found(folder, {name[:2] for name in exercises()})
     best: dict[tuple[str, str], tuple] = {}
+    stop = Event()
     with ThreadPoolExecutor(jobs) as pool:
-        running = {pool.submit(grade_one, submission, seconds): submission for submission in submissions}
-        for done, future in enumerate(as_completed(running), 1):
-            one, grades = running[future], future.result()
-            rank = sum(g.points for g in grades), _age(one.path), str(one.path)
-            kept = best.get((one.student, one.lesson))
-            best[one.student, one.lesson] = max(kept, (rank, grades)) if kept else (rank, grades)
-            if progress:
-                progress(done, len(submissions), one)
+        running = {pool.submit(grade_one, submission, seconds, stop): submission for submission in submissions}
+        try:
+            for done, future in enumerate(as_completed(running), 1):
+                one, grades = running[future], future.result()
+                rank = sum(g.points for g in grades), _age(one.path), str(one.path)
+                kept = best.get((one.student, one.lesson))
+                best[one.student, one.lesson] = max(kept, (rank, grades)) if kept else (rank, grades)
+                if progress:
+                    progress(done, len(submissions), one)
+        finally:
+            stop.set()
+            pool.shutdown(cancel_futures=True)
     return sorted((g for _, grades in best.values() for g in grades), key=lambda g: (g.student, g.exercise))
 
 
@@ -75,13 +82,14 @@ def _age(path: Path) -> float:
         return 0.0
 
 
-def grade_one(submission: Submission, seconds: float) -> list[Grade]:
-    """Grades of one notebook, for every exercise of its lesson."""
-    results, hidden = _results(submission, seconds, whole=False)
+def grade_one(submission: Submission, seconds: float, stop: Event | None = None) -> list[Grade]:
+    """Grades of one notebook, for every exercise of its lesson; nothing more is run once `stop` is set."""
+    stop = stop or Event()
+    results, hidden = _results(submission, seconds, stop, whole=False)
     again = [word for word, _, mistake in results.values() if mistake != "cannot be read"]
     if "wrong" in again or (hidden and "todo" in again):
         # Something that an answer uses, or what checks it, may not have been among the statements chosen for it.
-        for name, one in _results(submission, seconds, whole=True)[0].items():
+        for name, one in _results(submission, seconds, stop, whole=True)[0].items():
             results[name] = min(results.get(name, one), one, key=lambda result: _ORDER.index(result[0]))
     grades = []
     for name, exercise in exercises().items():
@@ -93,7 +101,9 @@ def grade_one(submission: Submission, seconds: float) -> list[Grade]:
     return grades
 
 
-def _results(submission: Submission, seconds: float, whole: bool) -> tuple[dict[str, tuple[str, str, str]], bool]:
+def _results(
+    submission: Submission, seconds: float, stop: Event, whole: bool
+) -> tuple[dict[str, tuple[str, str, str]], bool]:
     """Verdict, sentence and mistake by exercise, from as many starts as it takes; True where a check may be hidden."""
     skip: list[str] = []
     hidden = False
@@ -102,7 +112,7 @@ def _results(submission: Submission, seconds: float, whole: bool) -> tuple[dict[
     for _ in range(_STARTS):
         stopped = ""
         with tempfile.TemporaryDirectory() as place:
-            for event in _events(submission, Path(place), seconds, ends, whole, skip):
+            for event in _events(submission, Path(place), seconds, ends, stop, whole, skip):
                 if "result" in event:
                     name, word, sentence, mistake = event["result"]
                     results[name] = word, sentence, mistake
@@ -111,14 +121,14 @@ def _results(submission: Submission, seconds: float, whole: bool) -> tuple[dict[
                 if "trouble" in event:
                     lost = [n for n in exercises() if n.startswith(f"{submission.lesson}.") and n not in results]
                     return results | dict.fromkeys(lost, ("wrong", event["trouble"], "cannot be read")), hidden
-        if not stopped or time.monotonic() > ends:
+        if not stopped or stop.is_set() or time.monotonic() > ends:
             break
         skip.append(stopped)
     return results, hidden
 
 
 def _events(
-    submission: Submission, place: Path, seconds: float, ends: float, whole: bool, skip: list[str]
+    submission: Submission, place: Path, seconds: float, ends: float, stop: Event, whole: bool, skip: list[str]
 ) -> Iterator[dict]:
     """What a worker tells, until it is done, dies, or says nothing for longer than the limit."""
     log = place / "log.jsonl"
@@ -140,7 +150,7 @@ def _events(
                     finished = finished or "done" in event
                     yield event
                 now = time.monotonic()
-                if over or now > ends or now - heard > seconds + 20.0 * (not log.stat().st_size):
+                if over or stop.is_set() or now > ends or now - heard > seconds + 20.0 * (not log.stat().st_size):
                     break
                 time.sleep(0.02)
         if not finished and not log.stat().st_size:
