@@ -39,9 +39,6 @@ def _grade(options) -> None:
     from .lessons.grading.grader import grade
     from .lessons.grading.tables import bar, check_place, write_csv
 
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
-            stream.reconfigure(errors="backslashreplace")
     if options.csv:
         check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
@@ -84,6 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     grades.add_argument("--jobs", type=int, help="submissions at a time (as many as processors)")
     grades.set_defaults(run=_grade)
     options = parser.parse_args(arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
+            stream.reconfigure(errors="backslashreplace")
     try:
         options.run(options)
         print(end="", flush=True)

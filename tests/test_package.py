@@ -103,6 +103,15 @@ def test_a_folder_without_a_name_is_refused_and_one_with_a_space_is_quoted(tmp_p
     assert shlex.quote(str(target / "00_start_here.ipynb")) in command("lessons", str(target)).stdout
 
 
+def test_a_folder_is_named_on_a_screen_that_lacks_its_letters(tmp_path):
+    """As in a pipe in Windows, whose letters are those of one language; the others are shown by their numbers."""
+    own = [sys.executable, "-m", "rapkm_lite", "lessons", str(tmp_path / "übung α")]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(own, capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, "") and r"\xfcbung \u03b1" in done.stdout
+    assert (tmp_path / "übung α" / "00_start_here.ipynb").exists()
+
+
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(ValueError, match="cannot be written"):
