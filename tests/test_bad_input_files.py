@@ -147,6 +147,21 @@ def test_the_first_column_too_many_is_named(tmp_path):
         rk.read_log(file)
 
 
+@pytest.mark.parametrize("missing", range(1, 11))
+def test_the_first_column_that_is_missing_is_named(tmp_path, missing):
+    """Of three drives: two columns of each kind do not make it a log of two drives, nor do three more a fourth."""
+    kinds = [f"q{i} {what} in rad" for what in ("measured", "desired") for i in (1, 2, 3)]
+    header, file = ["t in s", *kinds, *(f"c{i} in N m" for i in (1, 2, 3))], tmp_path / "own.csv"
+    left = header[: missing - 1] + header[missing:]
+    held = repr(header[missing]) if missing < 10 else "nothing"
+    file.write_text(",".join(left), encoding="utf-8")
+    with pytest.raises(ValueError, match=rf"line 1, column {missing} holds {held}; .* header {', '.join(header)}$"):
+        rk.read_log(file)
+    file.write_text(",".join([*header, "a", "b", "c"]), encoding="utf-8")
+    with pytest.raises(ValueError, match=rf"line 1, column 11 holds 'a'; .* header {', '.join(header)}$"):
+        rk.read_log(file)
+
+
 def test_a_log_says_how_long_it_is():
     assert ", 2 records, 9 s, 3 drives)" in repr(rk.Log("late", [1000.0, 1009.0], *np.zeros((3, 2, 3))))
 

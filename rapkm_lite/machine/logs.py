@@ -136,8 +136,10 @@ def _names(path: Path, header: list[str]) -> list[str]:
     """The names of the columns; raises ValueError for others."""
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    wanted = columns(max((len(header) - 1) // 3, 1))
-    for column, (name, want) in enumerate(itertools.zip_longest(map(str.strip, header), wanted), 1):
+    names = [name.strip() for name in header]
+    drives = max(sum(name.endswith(end) for name in names) for end in ("measured in rad", "desired in rad", "in N m"))
+    wanted = columns(drives or max((len(header) - 1) // 3, 1))
+    for column, (name, want) in enumerate(itertools.zip_longest(names, wanted), 1):
         if name != want:
             got = "nothing" if name is None else short(name)
             shown = (
