@@ -39,11 +39,11 @@ def _grade(options) -> None:
     from .lessons.grading.grader import grade
     from .lessons.grading.tables import bar, check_place, write_csv
 
-    if options.csv:
+    if options.csv is not None:
         check_place(Path(options.csv))
     grades = grade(Path(options.submissions), options.seconds, options.jobs, bar)
     try:
-        if options.csv:
+        if options.csv is not None:
             write_csv(Path(options.csv), grades)
     finally:
         _tell_grades(Path(options.submissions), grades)

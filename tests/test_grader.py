@@ -168,6 +168,14 @@ def test_right_and_close_answers_have_all_points_and_others_none(word, share, mo
     assert own.verdict == word and own.points == share * own.of and own.of > 0
 
 
+def test_an_empty_name_of_the_file_is_refused(tmp_path, capsys):
+    """As of a variable of the shell that is not set: else the grades would only be shown."""
+    write(tmp_path / "ada" / "04_x.ipynb", [SETUP])
+    assert main(["grade", str(tmp_path), "--csv", ""]) == 2
+    out, said = capsys.readouterr()
+    assert re.fullmatch(r"csv = .* cannot be written \(.*\); allowed: a file in a folder\n", said) and not out
+
+
 @pytest.mark.parametrize("place", ["nowhere/grades.csv", ".", "x" * 300])
 def test_a_place_for_the_file_is_looked_at_before_grading(place, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("rapkm_lite.lessons.grading.grader.grade", lambda *_: pytest.fail("it graded"))
