@@ -329,6 +329,14 @@ def test_what_a_notebook_runs_is_read(tmp_path, words):
     assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
 
 
+@pytest.mark.parametrize("words", ["script false --no-raise-error", "bash", "python3", "HTML", "!", "javascript"])
+def test_what_a_notebook_gives_to_others_is_not_run(tmp_path, words):
+    """A cell that begins with %%script false is skipped by a notebook, and none of these binds a name in it."""
+    other = f"%%{words}\nfiltered_torques = lambda A, c: c\n{CHECKS[0]}"
+    write(tmp_path / "ada" / "04_antagonism_filter_energy.ipynb", [*checked(RIGHT), other])
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
 @pytest.mark.parametrize(
     "before",
     [

@@ -19,6 +19,7 @@ from ..exercise import Exercise
 
 _EXERCISE = re.compile(r"\d\d\.\w+")
 _NUMBER = re.compile(r"(?<!\d)(\d\d)_")
+_FOREIGN = re.compile(r"\s*%%(!|bash|cmd|html|java|js|latex|markdown|perl|pypy|python|ruby|script|sh|svg|sx|sys)", re.I)
 _BUILT_IN = {*dir(builtins), "display"}
 # A notebook may await outside a function; nothing of this module's own way to be compiled is passed on.
 RULES = {"flags": ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, "dont_inherit": True}
@@ -126,8 +127,8 @@ def sources(path: Path) -> list[str]:
 
 
 def _plain(text: str) -> str:
-    """The source of a cell in plain Python."""
-    text = re.sub(r"\A(\s*)%%.*$", r"\1pass", text, flags=re.M)
+    """The source of a cell in plain Python; nothing of what a notebook gives to a shell, a page or a new Python."""
+    text = "pass" if _FOREIGN.match(text) else re.sub(r"\A(\s*)%%.*$", r"\1pass", text, flags=re.M)
     try:
         ast.parse(text)
     except (SyntaxError, ValueError):
