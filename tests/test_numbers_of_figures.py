@@ -297,6 +297,13 @@ def test_white_lines_of_the_fight_map_are_where_nothing_fights():
     assert len(lines) > 10 and np.median(fight) < 1e-3 and 7.05 * np.linalg.norm(OFFSET) > 0.04
 
 
+@pytest.mark.parametrize("start", [-20.0, 0.0, 1.7e9])
+def test_the_picture_of_a_log_holds_its_records_whenever_its_clock_began(start):
+    log = rk.mystery_run("gain")
+    for axes in plotting.plot_log(rk.Log("own", start + log.t, log.q_a, log.q_a_desired, log.c)):
+        assert_allclose(axes.get_xlim(), (start, start + 9.0), rtol=0, atol=1e-6)
+
+
 def test_a_log_is_drawn_in_milliradians_and_millinewton_metres():
     log = rk.mystery_run("gain")
     angles, torques = plotting.plot_log(log)

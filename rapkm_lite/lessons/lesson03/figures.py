@@ -117,7 +117,7 @@ def plot_log(log, axes=None):
     for i in range(log.c.shape[1]):
         axes[0].plot(log.t, 1e3 * log.error[:, i], label=f"drive {i + 1}", **arm_line(i))
         axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))
-    axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=(0, log.t[-1]))
+    axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=log.t[[0, -1]])
     axes[1].set(xlabel="time in s", ylabel="torque in mN m")
     axes[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     return axes
