@@ -44,7 +44,8 @@ def grade(
     """Grades of all submissions under a folder, sorted by student and exercise.
 
     Of several notebooks of a student for one lesson the one with most points counts, of equal ones the newest.
-    seconds : limit of each statement and each check; a whole notebook gets ten times as much.
+    seconds : limit of each statement and each check; a whole notebook gets ten times as much, and once more
+    that where all of it is run after an answer came out wrong.
     jobs : submissions graded at a time; None: as many as there are processors.
     progress : called with (done, all, submission) after each one.
     Ctrl-C, or an error of `progress`, ends what runs; nothing more is begun.
