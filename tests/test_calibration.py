@@ -979,3 +979,14 @@ def test_encoders_that_count_other_turns_than_the_desired_angles_show_the_same_g
     assert_allclose(found.K_P, same.K_P, rtol=1e-9)
     assert_allclose(found.offset, same.offset, rtol=0, atol=1e-11)
     assert rk.calibrate(TESTBED, turned, K_P=7.05).note == rk.calibrate(TESTBED, log, K_P=7.05).note
+
+
+@pytest.mark.parametrize("place", [0, 5, 39])
+def test_of_many_readings_that_which_fits_no_pose_is_named(place):
+    """A record of zeros, as of a logger that has lost its encoders; a guess 1 m away is out of reach of all arms."""
+    angles, guess = readings(TESTBED), np.zeros((40, 2))
+    angles[place], guess[place] = 0.0, [1.0, 0.0]
+    with pytest.raises(rk.ConvergenceError, match=r"q_a = \[0\.0, 0\.0, 0\.0\]"):
+        rk.estimate_pose(TESTBED, angles, guess)
+    with pytest.raises(ValueError, match=r"q_a = \[0\.0, 0\.0, 0\.0\]"):
+        rk.calibrate(TESTBED, angles)

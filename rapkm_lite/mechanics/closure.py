@@ -144,7 +144,8 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
                 break
             step = np.where(worse[..., None], step / 2 if k < 38 else 0.0, step)
         x, (q, residual, square) = x + step, trial
-    worst = np.unravel_index(np.argmax(np.where(np.isinf(square), np.inf, size[..., 0])), lead)
+    # Before the first step all sizes are infinite.
+    worst = np.unravel_index(np.argmax(np.where(np.isinf(square), np.inf, np.minimum(size[..., 0], 1e300))), lead)
     rim = np.abs(np.sin(q[worst][robot.n_arms :])).min() < 1e-3
     where = "outside" if np.isinf(square[worst]) else "at the rim of" if rim else "inside"
     raise ConvergenceError(
