@@ -593,3 +593,12 @@ def test_a_grader_that_is_interrupted_ends_what_runs_and_begins_nothing_more(tmp
     with pytest.raises(KeyboardInterrupt):
         grade(tmp_path, jobs=2, progress=interrupt)
     assert len(begun) <= 4
+
+
+@pytest.mark.parametrize("folder", ["..", "../../class", "../ada/.."])
+def test_the_folder_that_one_stands_in_is_graded_too(folder, tmp_path, monkeypatch):
+    """However a teacher in a student's folder names the folder of all."""
+    for student in ("ada", "ben"):
+        write(tmp_path / "class" / student / "04_x.ipynb", [SETUP])
+    monkeypatch.chdir(tmp_path / "class" / "ada")
+    assert [one.student for one in found(Path(folder), {"04"})] == ["ada", "ben"]

@@ -107,7 +107,7 @@ def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
     places = []
     for place, folders, files in os.walk(folder, followlinks=True):
         # A link to a folder that it lies in has no end.
-        around = {os.path.realpath(one) for one in (place, *Path(place).parents)}
+        around = {os.path.realpath(one) for one in (place, *Path(os.path.abspath(place)).parents)}
         folders[:] = [one for one in folders if one[0] != "." and os.path.realpath(Path(place, one)) not in around]
         places += [Path(place, one) for one in files if one[0] != "." and one.lower().endswith(".ipynb")]
     return [(path, path.relative_to(folder).parts) for path in sorted(places)]
