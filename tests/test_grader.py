@@ -4,6 +4,8 @@ import csv
 import json
 import os
 import re
+import subprocess
+import sys
 import time
 import tracemalloc
 from pathlib import Path
@@ -602,3 +604,22 @@ def test_the_folder_that_one_stands_in_is_graded_too(folder, tmp_path, monkeypat
         write(tmp_path / "class" / student / "04_x.ipynb", [SETUP])
     monkeypatch.chdir(tmp_path / "class" / "ada")
     assert [one.student for one in found(Path(folder), {"04"})] == ["ada", "ben"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a process does not learn there that the one that started it is gone")
+def test_nothing_hangs_on_when_the_grader_was_killed(tmp_path):
+    """As by a window that is closed: an answer that never comes to an end says so while it runs, and falls silent."""
+    beat = tmp_path / "beat"
+    loop = f"    while True:\n        open({str(beat)!r}, 'w').close()\n        time.sleep(0.05)\n"
+    body = f"import time\ndef told():\n{loop}filtered_torques = told()\n{CHECKS[0]}"
+    write(tmp_path / "all" / "ada" / "04_x.ipynb", [SETUP, body])
+    own = [sys.executable, "-m", "rapkm_lite", "grade", str(tmp_path / "all"), "--seconds", "60"]
+    with subprocess.Popen(own, cwd=Path(__file__).parents[1], stderr=subprocess.DEVNULL) as process:
+        ends = time.monotonic() + 30.0
+        while not beat.exists() and time.monotonic() < ends:
+            time.sleep(0.05)
+        process.kill()
+    assert beat.exists()
+    while time.time() - beat.stat().st_mtime < 2.0 and time.monotonic() < ends:
+        time.sleep(0.1)
+    assert time.time() - beat.stat().st_mtime >= 2.0
