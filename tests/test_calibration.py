@@ -603,6 +603,18 @@ def test_torques_are_mute_that_contradict_a_tenth_as_much_as_angles_far_above_th
     assert sum("mute" in note for note in notes) == mute
 
 
+def test_torques_are_mute_also_where_at_one_of_the_rests_nothing_should_press():
+    """There the errors are those of a moved end-effector, e = A x, and n^T A = 0; at the other rest they are n."""
+    q, K_P, notes = rk.inverse_kinematics(FRICTIONLESS, [[0.03, 0.02], [-0.04, 0.05]]), np.full(3, 7.05), []
+    A = rk.at(FRICTIONLESS, q).A
+    n = np.linalg.svd(A)[0][:, :, -1]
+    e = np.array([1e-3 * n[0], A[1] @ [1e-5, 2e-5]])
+    c = -K_P * e * [[0.0], [1.0]]  # what a filter leaves of them
+    noise = noise_of(np.full((2, 3), 1e-6), 10)
+    angles_of_torques(FRICTIONLESS, Rests(q[:, :3], q[:, :3] + e, c, noise, np.full(2, 10)), None, K_P, notes)
+    assert sum("mute" in note for note in notes) == 1
+
+
 def test_a_dead_drive_shows_no_gain_with_which_its_torques_could_be_read():
     log = log_behind_friction([0.0])
     dead = rk.Log("dead", log.t, log.q_a, log.q_a_desired, log.c * [1.0, 0.0, 1.0])
@@ -841,6 +853,20 @@ def test_drives_that_creep_between_counts_are_not_said_to_have_another_gain(coun
 def test_a_drive_without_an_error_shows_no_gain():
     e, one = np.array([[1e-3, 0.0], [2e-3, 0.0]]), np.ones((2, 2))
     assert fitted_gain(Rests(0 * e, e, one, noise_of(one, 10), np.full(2, 10))) is None
+
+
+def test_no_line_goes_through_the_torques_of_a_drive_that_stands_exactly_where_it_should():
+    """All its errors are zero, beside a column of ones that are not; the other drives keep their lines."""
+    q_a = np.round(readings(FRICTIONLESS, 6) * 2**30) / 2**30  # means without rounding
+    error = np.random.default_rng(1).normal(0, 2e-3, q_a.shape) * [1.0, 0.0, 1.0]
+    rows = (np.repeat(column, 20, axis=0) for column in (q_a, q_a - error, -7.05 * error))
+    log = rk.Log("still", 1e-2 * np.arange(120), *rows)
+    stand = rests([log])
+    assert stand is not None
+    assert [stand.fit(i, np.ones(6)) is None for i in range(3)] == [False, True, False]
+    # Its torques say that its encoder reads what it should: the angles, a hair of 2^-31 rad apart, tell the same.
+    found = rk.calibrate(FRICTIONLESS, log, use="torques", K_P=7.05)
+    assert_allclose(found.offset, OFFSET[:3], rtol=0, atol=1e-8)
 
 
 def test_rests_are_stretches_of_equal_desired_angles_without_their_first_quarter():
