@@ -971,6 +971,18 @@ def test_a_small_singular_value_counts_down_to_ten_times_the_noise():
         rk.calibrate(TESTBED, angles, noise=1.0)
 
 
+@pytest.mark.parametrize("seed", [9, 20, 50])
+def test_coarse_readings_far_from_nominal_are_refused_and_no_other_minimum_is_taken(seed):
+    """The smallest singular value of the null vectors at the places, relative to the largest, is below ten times
+    their noise of 0.03 rad; where the search goes on in short steps it would end 0.07 to 0.7 rad from the truth."""
+    rng = np.random.default_rng(seed)
+    q = rk.inverse_kinematics(TESTBED, rng.uniform(-0.05, 0.05, (8, 2)))
+    n = np.array([rk.null_vector(TESTBED, one) for one in q])
+    assert np.linalg.cond(n) > 1 / (10 * 0.03)
+    with pytest.raises(rk.CalibrationError, match="of 3 unknowns"):
+        rk.calibrate(TESTBED, q[:, :3] + rng.uniform(-0.2, 0.2, 3) + rng.normal(0, 0.03, (8, 3)))
+
+
 def test_torques_under_a_filter_show_no_gain():
     robot, logs = MACHINES["testbed"].replace(friction=4.2e-3), []
     law = rk.AntagonismFilter(rk.PD(7.05, 0.225))
