@@ -664,6 +664,8 @@ def test_small_torques_say_what_large_ones_say():
     assert_allclose(same.offset, found.offset, rtol=0, atol=1e-12)
     assert_allclose(same.K_P, 1e-12 * found.K_P, rtol=1e-12)
     assert same.note.count("both sides") == 3
+    fitted = rk.calibrate(FRICTIONLESS, tiny, use="torques")  # by the gain that the rests show
+    assert_allclose(fitted.offset, rk.calibrate(FRICTIONLESS, log, use="torques").offset, rtol=0, atol=1e-12)
 
 
 def test_healthy_torques_are_not_accused_of_friction():
@@ -851,8 +853,9 @@ def test_drives_that_creep_between_counts_are_not_said_to_have_another_gain(coun
 
 
 def test_a_drive_without_an_error_shows_no_gain():
-    e, one = np.array([[1e-3, 0.0], [2e-3, 0.0]]), np.ones((2, 2))
-    assert fitted_gain(Rests(0 * e, e, one, noise_of(one, 10), np.full(2, 10))) is None
+    for rest in (0.0, 1e-7):  # exactly, or but for what is left of a motion
+        e, one = np.array([[1e-3, rest], [2e-3, -rest]]), np.ones((2, 2))
+        assert fitted_gain(Rests(0 * e, e, one, noise_of(one, 10), np.full(2, 10))) is None
 
 
 def test_no_line_goes_through_the_torques_of_a_drive_that_stands_exactly_where_it_should():
