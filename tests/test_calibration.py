@@ -698,6 +698,43 @@ def test_calibrated_offsets_save_what_the_filter_saves():
     assert_allclose(after, rk.simulate(TESTBED, law, path).energy.sum(), rtol=1e-4)
 
 
+def test_equal_readings_count_once():
+    """A rest repeats one rounding however long it lasts: nothing is learnt from it a second time."""
+    q_a = np.round(readings(TESTBED, 12), 3)
+    once, often = rk.calibrate(TESTBED, q_a), rk.calibrate(TESTBED, np.repeat(q_a, np.arange(1, 13), axis=0))
+    assert often.freedom == once.freedom == 12 - 3
+    for name in ("offset", "covariance", "noise", "residual"):
+        assert_allclose(getattr(often, name), getattr(once, name), rtol=1e-9)
+
+
+def test_the_residual_is_that_of_each_closure_also_where_a_pose_has_two():
+    """Least squares leaves what no pose can show, the part along the null space of A^T: N - 2 numbers a pose."""
+    robot = MACHINES["four_arms"]
+    q_a = readings(robot, 30) + np.random.default_rng(2).normal(0, 1e-4, (30, 4))
+    found = rk.calibrate(robot, q_a)
+    x = random_points(robot, 30, seed=3, bend=0.3)
+    left = q_a - found.offset - rk.estimate_pose(robot, q_a - found.offset, x)[:, :4]
+    assert_allclose(found.residual, np.sqrt(np.sum(left**2) / (30 * 2)), rtol=1e-6)
+    assert found.freedom == 30 * 2 - 4
+
+
+@pytest.mark.parametrize("sigma", [1e-3, 2e-2])
+def test_noise_of_torques_adds_to_that_of_counts_by_squares(sigma):
+    """Three places for three offsets leave nothing over to show it: what is known of a reading then is the rounding
+    of its count and the standard error of the torques over K_P, independent of each other."""
+    count, K_P, records = 2e-3, 7.05, 20
+    x = 0.09 * np.array([[-0.9, -0.5], [0.9, -0.5], [0.0, 1.0]])
+    q_a = count * np.rint((rk.inverse_kinematics(FRICTIONLESS, x)[:, :3] + OFFSET[:3]) / count)
+    error = 2e-3 * np.random.default_rng(5).normal(size=(3, 3))
+    rows = [np.repeat(column, records, axis=0) for column in (q_a, q_a - error, -K_P * error)]
+    rows[2] += sigma * np.random.default_rng(6).normal(size=rows[2].shape)
+    log = rk.Log("three", 1e-2 * np.arange(3 * records), *rows)
+    parts = [rows[2][k * records + records // 4 : (k + 1) * records] for k in range(3)]
+    spread = np.sqrt(np.mean([part.var(axis=0, ddof=1) / len(part) for part in parts])) / K_P
+    found = rk.calibrate(FRICTIONLESS, log, use="torques", K_P=K_P)
+    assert_allclose(found.noise, np.hypot(count / np.sqrt(12), spread), rtol=1e-6)
+
+
 def test_several_logs_and_paths():
     log, path = rk.mystery_run("offset_a"), rk.data_path("mystery_runs/offset_a.csv")
     assert_allclose(rk.calibrate(TESTBED, path).offset, rk.calibrate(TESTBED, [log, log]).offset, rtol=0, atol=1e-12)
@@ -999,10 +1036,12 @@ def test_torques_under_a_filter_show_no_gain():
 
 
 def test_a_log_from_a_spreadsheet(tmp_path):
-    """A mark of the encoding in front, empty lines behind."""
+    """A mark of the encoding in front, empty lines behind; blanks after the commas."""
     text = rk.data_path("mystery_runs/gain.csv").read_text(encoding="utf-8")
     path = tmp_path / "gain.csv"
     path.write_text(text + "\n\n", encoding="utf-8-sig")
+    assert rk.read_log(path) == rk.mystery_run("gain")
+    path.write_text(text.replace(",", ", "), encoding="utf-8")
     assert rk.read_log(path) == rk.mystery_run("gain")
 
 
