@@ -961,6 +961,7 @@ def test_cautions_from_their_bounds_on():
     """Three times the noise, a quarter of the longest link, a condition of fifty; half the width of two places."""
     far = 0.3 * TESTBED.lengths.max() * np.array([[1.0, 0.0], [-1.0, 0.0]])
     assert cautions(far + 0.5, TESTBED, 49.0, 0.0, 0.0, None) == []  # wherever the places are
+    assert cautions(far, TESTBED, 49.0, 3e-5, 0.0, None) == []  # no steps, and no noise that anybody told
     assert len(cautions(far / 1.3 + 0.5, TESTBED, 49.0, 0.0, 0.0, None)) == 1
     assert cautions(far, TESTBED, 49.0, 2.9e-5, 1e-5, None) == cautions(far, TESTBED, 49.0, 2.9e-5, 0.0, 1e-5) == []
     for given, words in (
@@ -987,6 +988,12 @@ def test_readings_that_are_counts_are_known_by_their_steps():
         # No two of few readings need lie one count apart.
         far = np.array([[0, 20], [15, 50], [36, 44], [70, -30]])  # smallest step 6, greatest common divisor 1
         assert_allclose(rounding(count * far), count / np.sqrt(12), rtol=1e-9)
+        # One count, computed in two ways, differs by rounding.
+        twice = np.concatenate([count * whole, count * whole + 1e-13])
+        assert_allclose(rounding(twice), count / np.sqrt(12), rtol=1e-6)
+    # A file of six digits moves each end of a step by up to half a millionth: a 150th of a count of 40000 a turn.
+    fine = 2 * np.pi / 40000 * np.arange(1, 21)[:, None]
+    assert_allclose(rounding(np.round(fine, 6)), 2 * np.pi / 40000 / np.sqrt(12), rtol=1 / 150)
 
 
 @pytest.mark.parametrize("name", NAMES)
