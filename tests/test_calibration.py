@@ -858,6 +858,20 @@ def test_a_gain_of_rests_is_the_slope_of_the_line_through_them(apart):
     assert_allclose(one.error, sigma[0] / np.sqrt(10) / np.abs(e[0]), rtol=1e-12)
 
 
+def test_noise_of_angles_blurs_a_gain_unless_the_torques_follow_it():
+    """Of one rest at error e: with readings of noise s beside torques that do not know of it, K_P is known to
+    K_P s / (e sqrt(records)); torques -K_P e of the same readings lie on the line, whatever the noise."""
+    K_P, e, s, records = 7.0, 2e-3, 3e-4, 25
+    stand = np.array([[0.0]]), np.array([[e]]), np.array([[-K_P * e]])
+    for noise, error in (
+        ([[0.0, 0.0], [0.0, s**2]], K_P * s / e / 5),
+        (s**2 * np.array([[K_P**2, -K_P], [-K_P, 1]]), 0),
+    ):
+        gain = fitted_gain(Rests(*stand, np.array([[noise]]), np.array([records])))
+        assert gain is not None
+        assert_allclose(gain.error, error, rtol=1e-9, atol=1e-6)
+
+
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 def test_few_rests_that_scatter_show_no_other_gain(count):
     """Friction of up to a millinewton metre at each rest is seldom called another gain, which is never far off."""
