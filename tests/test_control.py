@@ -206,6 +206,17 @@ def test_pairs_along_a_path_are_those_chosen_one_by_one_given_the_last_in_either
     assert kept > 10
 
 
+def test_rounding_takes_no_pair_from_an_equal_one():
+    """In the centre of a machine of threefold symmetry all pairs are equal; how it is turned decides the rounding."""
+    law, pairs = rk.SwitchedCTC(400, 40, hysteresis=1.0), [(0, 1), (0, 2), (1, 2)]
+    for angle in np.linspace(0.1, 3.0, 30):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        robot = FRICTIONLESS.replace(base=FRICTIONLESS.base @ turn)
+        q = rk.inverse_kinematics(robot, [0.0, 0.0])
+        assert [law.choose(robot, q, pair) for pair in pairs] == pairs
+        assert law.choose(robot, q) == (0, 1)
+
+
 @pytest.mark.parametrize("hysteresis", [1.0, 1.3, 2.0])
 def test_switching_waits_for_the_factor_of_its_hysteresis(hysteresis):
     path = rk.triangle(FRICTIONLESS)
