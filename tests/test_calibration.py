@@ -907,6 +907,11 @@ def test_a_drive_without_an_error_shows_no_gain():
     for rest in (0.0, 1e-7):  # exactly, or but for what is left of a motion
         e, one = np.array([[1e-3, rest], [2e-3, -rest]]), np.ones((2, 2))
         assert fitted_gain(Rests(0 * e, e, one, noise_of(one, 10), np.full(2, 10))) is None
+    # Small errors of exact torques show it as well as large ones.
+    small = np.array([[1e-3, 2e-6], [2e-3, -3e-6]])
+    gain = fitted_gain(Rests(0 * small, small, -7.0 * small, noise_of(1e-12 * np.ones((2, 2)), 10), np.full(2, 10)))
+    assert gain is not None
+    assert_allclose(gain.K_P, 7.0, rtol=1e-9)
 
 
 def test_no_line_goes_through_the_torques_of_a_drive_that_stands_exactly_where_it_should():
