@@ -858,6 +858,19 @@ def test_a_gain_of_rests_is_the_slope_of_the_line_through_them(apart):
     assert_allclose(one.error, sigma[0] / np.sqrt(10) / np.abs(e[0]), rtol=1e-12)
 
 
+@pytest.mark.parametrize("errors", [4.0, 7.0])
+def test_torques_aside_by_five_errors_are_no_part_of_the_gain(errors):
+    """The intercept of a line through rests of equal noise s has the error s sqrt(((X^T X)^-1)_22); a smaller one is
+    put into the gain, by least squares through the origin."""
+    e, s = np.array([1e-3, 2e-3, 3e-3, 4e-3]), 1e-5
+    X = np.stack([-e, np.ones(4)], axis=-1)
+    aside = errors * s * np.sqrt(np.linalg.inv(X.T @ X)[1, 1])
+    c = (-10.0 * e + aside)[:, None]
+    gain = fitted_gain(Rests(np.zeros((4, 1)), e[:, None], c, noise_of(np.full((4, 1), s), 10), np.full(4, 10)))
+    assert gain is not None
+    assert_allclose(gain.K_P[0], 10.0 if errors > 5 else -e @ c[:, 0] / (e @ e), rtol=1e-9)
+
+
 def test_noise_of_angles_blurs_a_gain_unless_the_torques_follow_it():
     """Of one rest at error e: with readings of noise s beside torques that do not know of it, K_P is known to
     K_P s / (e sqrt(records)); torques -K_P e of the same readings lie on the line, whatever the noise."""
