@@ -208,6 +208,8 @@ def test_common_sign_of_made_up_prestress_and_of_rows_in_a_half_space(m, delta):
     n = rng.uniform(0.01, 1.0, m)
     A = rng.normal(size=(m, delta))
     assert rk.common_sign(A - np.outer(n, n @ A) / (n @ n))
+    n[0] = 1e-4  # a small share is one, too
+    assert rk.common_sign(A - np.outer(n, n @ A) / (n @ n))
     A[:, 0] = np.abs(A[:, 0])
     assert not rk.common_sign(A)
     # On the edge of it: no drive but those that see none of the first column could press.
