@@ -260,6 +260,15 @@ def test_curves_carry_the_numbers_of_the_run_in_the_unit_of_the_axis(runs):
     assert large.get_ylabel() == "torque in N m" and large.lines[0].get_ydata()[0] == plain.c[0, 0]
 
 
+# As the sentence says that refuses other values of `ax`.
+def test_new_axes_where_none_are_given():
+    path = rk.circle(rk.load(), 0.05, 0.2)
+    run = rk.simulate(path.robot, rk.PD(7.05, 0.225), path)
+    lines = plotting.lines_per_drive(run, run.c, None, "torque in N m", "PD").get_lines()
+    assert [np.array_equal(line.get_ydata(), c) for line, c in zip(lines, run.c.T, strict=True)] == [True] * 3
+    assert plotting.plane_axes(path.robot, None).get_xlim() == plotting.plane_limits(path.robot)["xlim"]
+
+
 def test_curves_stay_inside_shared_axes(runs):
     _, axes = plt.subplots(1, 2, sharey=True)
     plotting.plot_torques(runs["filter"], axes[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ..machine.arguments import bounded, exact_array
 from ..mechanics.kinematics import arm_vectors
@@ -91,12 +92,13 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
     return {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal"} | frame
 
 
-def plane_axes(robot, ax):
+def plane_axes(robot, ax: Axes | None):
     """The axes with the frame of `plane_limits`.
 
     >>> import rapkm_lite as rk; from matplotlib.figure import Figure
     >>> plane_axes(rk.load(), Figure().add_subplot()).get_xlabel()
     'x in m'
     """
+    ax = axes_or_new(ax)
     ax.set(**plane_limits(robot))
     return ax

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from matplotlib.axes import Axes
+
 from .style import arm_line, axes_or_new
 
 
@@ -26,7 +28,7 @@ def plot_errors(run, ax=None, title: str = ""):
     return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
 
 
-def lines_per_drive(run, values, ax, ylabel: str, title: str):
+def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str):
     """One line per drive; the margin keeps the legend off the curves, also on shared axes.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
