@@ -177,6 +177,17 @@ def test_given_axes_are_used_and_returned(name, world):
         plt.close("all")
 
 
+def test_forces_in_newtons_share_no_axes_with_the_workspace():
+    robot = rk.load()
+    poses = {"middle": rk.inverse_kinematics(robot, [0.0, 0.0])}
+    _, axes = plt.subplots(1, 1, squeeze=False)
+    try:
+        with pytest.raises(ValueError, match="plot_guaranteed_force cannot draw"):
+            plotting.plot_guaranteed_force(robot, poses, lambda A, c: 0.5, axes[0], n=9)
+    finally:
+        plt.close("all")
+
+
 def test_arms_are_told_without_colour():
     # In greyscale by their dashes; colours are held apart in test_colours.
     dashes = [plotting.arm_line(i)["linestyle"] for i in range(4)]

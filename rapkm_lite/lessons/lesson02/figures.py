@@ -158,7 +158,7 @@ def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: floa
     if axes is None:
         count = len(poses) + 1
         axes = plt.subplots(1, count, figsize=(3.8 * count, 3.3), width_ratios=[1.0] * len(poses) + [1.3])[1]
-    for ax, (title, q) in zip(axes, poses.items(), strict=False):
+    for ax, (title, q) in zip(axes[:-1], poses.items(), strict=True):
         radius = float(radius_of(control_matrix(robot, q), torque))
         plot_available_forces(robot, q, ax, torque=torque, guaranteed=radius).set_title(title)
         around, A = np.linspace(0.0, 2 * np.pi, 181), control_matrix(robot, q)
