@@ -188,6 +188,18 @@ def test_forces_in_newtons_share_no_axes_with_the_workspace():
         plt.close("all")
 
 
+@pytest.mark.parametrize("name", [n for n in FIGURES if "axes" in inspect.signature(getattr(plotting, n)).parameters])
+def test_axes_of_its_own_are_what_a_picture_takes(name, world):
+    try:
+        made = drawn(name, world)
+        assert drawn(name, world, axes=made) is made
+        if np.size(made) == 2:
+            with pytest.raises(ValueError, match=r"axes = .*; allowed: .*axes as it makes and returns them itself"):
+                drawn(name, world, axes=np.ravel(made)[:1])
+    finally:
+        plt.close("all")
+
+
 def test_arms_are_told_without_colour():
     # In greyscale by their dashes; colours are held apart in test_colours.
     dashes = [plotting.arm_line(i)["linestyle"] for i in range(4)]

@@ -67,9 +67,10 @@ def _guard(picture: Callable) -> Callable:
             if "allowed" in str(error) or "needed" in str(error):
                 raise
             words = ", ".join(f"{p.name} = {_size(given[p.name])}" for p in plain)
-            raise ValueError(
-                f"{picture.__name__} cannot draw {words} ({error}); allowed: values and shapes as its docstring says"
-            ) from error
+            allowed = "values and shapes as its docstring says"
+            if given.get("axes") is not None:
+                allowed += ", and axes as it makes and returns them itself without any given"
+            raise ValueError(f"{picture.__name__} cannot draw {words} ({error}); allowed: {allowed}") from error
 
     return checked
 
