@@ -135,6 +135,7 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     or, for whole numbers, which have 64 bits there, with 0.
     Random numbers of `numpy.random` would differ from run to run: noise belongs in an array, an entry per sample.
     It is compiled once in every session, in the first run, which takes some seconds: worth it for many runs.
+    A function made anew, such as a closure per gain, is compiled anew, and some megabytes stay with the session.
     Without Numba, and inside laws that run in Python, the function is called as it is; where it gave no finite torques,
     the run is repeated that way up to there, to find out what it raised.
     Raises ValueError for other values of `at` and `memory`, and when a run finds that the function does not compile.
