@@ -1,5 +1,6 @@
 """Control laws: what (12), (16)-(20), (28)-(35) promise, by algebra, linearization, independent integration."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -124,6 +125,19 @@ def follows_exactly(law, robot):
     desired = rk.Desired(robot.n_arms, x, xd, xdd, q, qd, qdd)
     again, _ = rk.forward_dynamics(robot, q, qd, torque(law, robot, q, qd, desired))
     assert (norm(again - qdd) / norm(qdd)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_measured_rates_make_the_feedback_alone(name):
+    """(19), (20), (28), (32): velocity terms take rates on V; what other rates of the drives add goes with K_D."""
+    (q, qd, desired), law, wrong = state_and_target(ROBOT, 20), LAWS[name], np.array([3.0, -2.0, 4.0])
+    added = []
+    for times in (1.0, 2.0):
+        one = dataclasses.replace(law, K_D=times * law.K_D)
+        off, right = (one.torque(ROBOT, q, qd, q[:, :3], qd[:, :3] + rates, desired) for rates in (wrong, 0.0))
+        added.append(off - right)
+    assert_allclose(added[1], 2.0 * added[0], rtol=0, atol=1e-10 * np.abs(right).max())
+    assert np.any(added[0]) == (name not in ("APD in x", "CTC in x", "CTC, elbows"))
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), None])
