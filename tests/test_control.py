@@ -255,6 +255,16 @@ def test_switched_torques_along_a_path_are_those_of_the_pair_in_use():
     assert_allclose(torque(law, FRICTIONLESS, q[0], path.qd[0], path[0]), c[0], atol=1e-14)
 
 
+def test_a_switched_torque_at_one_pose_is_that_of_its_best_pair():
+    path, law, used = rk.triangle(FRICTIONLESS, dt=5e-3), rk.SwitchedCTC(400, 40), set()
+    for k in range(0, len(path), 50):
+        q, measure = path.q[k] + 1e-4, np.abs(rk.distal_cross_products(FRICTIONLESS, path.q[k] + 1e-4))
+        used.add(pair := rk.drive_pairs(FRICTIONLESS)[measure.argmax()])
+        own = torque(rk.CTC(400, 40, pair), FRICTIONLESS, q, path.qd[k], path[k])
+        assert_allclose(torque(law, FRICTIONLESS, q, path.qd[k], path[k]), own, rtol=0, atol=1e-14)
+    assert len(used) == 3
+
+
 def test_fixed_pair_feedback_grows_at_its_singularity_and_the_redundant_one_does_not():
     # Fact 7: A (A^T A)^-1 Gbar grows like 1 / |d_2 x d_3| for the pair (2, 3); feed-forward torques agree to rounding.
     angle = np.linspace(0, 2 * np.pi, 4000)
