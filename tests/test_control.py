@@ -61,6 +61,16 @@ def test_force_filter_removes_antagonism_and_nothing_else():
     assert np.all((filtered**2).sum(-1) <= (raw**2).sum(-1) + 1e-15)
 
 
+@pytest.mark.parametrize("W", [[1.0, 4.0, 0.3], np.diag([1.0, 2.0, 3.0]) + 0.5])
+def test_a_weighted_filter_leaves_the_torques_of_least_weight_with_the_same_force(W):
+    """Lagrange: W c lies in the range of A where c^T W c is least among the torques with one A^T c."""
+    q, c = state_and_target(ROBOT)[0], np.array([0.3, -0.2, 0.5])
+    A, least = rk.control_matrix(ROBOT, q), rk.AntagonismFilter(rk.PD(7.0, 0.2), W=W).matrix(ROBOT, q) @ c
+    assert_allclose(mv(T(A), least - c), 0.0, atol=1e-12 * np.abs(A).max())
+    weighted = least @ (np.diag(W) if np.ndim(W) == 1 else W)
+    assert_allclose(np.vecdot(weighted, rk.null_basis(A)[..., 0]), 0.0, atol=1e-12)
+
+
 def test_command_filter_equals_the_force_filter_only_for_equal_gains():
     q, qd, desired = state_and_target(TESTBED)
     A, offset = rk.control_matrix(TESTBED, q), np.array([0.004, -0.002, 0.005])

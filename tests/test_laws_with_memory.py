@@ -134,6 +134,14 @@ def test_pid_with_anti_windup():
     )
 
 
+@pytest.mark.parametrize("times", [1.0, np.eye(3)], ids=["compiled", "in Python"])
+def test_an_integral_grows_with_the_sampling_time_of_its_path(times):
+    gains, path = {"K_P": 7.05, "K_I": 90.0, "K_D": 0.2}, rk.circle(ROBOT, radius=0.05, duration=0.3, dt=2e-3)
+    run = rk.simulate(ROBOT, rk.PID(**{name: K * times for name, K in gains.items()}), path, OFFSET)
+    c = pid_by_hand(run.q_a + OFFSET, run.qd_a, path, **gains, limit=np.inf)
+    assert_allclose(run.c, c, rtol=0, atol=1e-10)
+
+
 @pytest.mark.parametrize("which", [(0, 1, 2), (1,)], ids=["all", "integral"])
 def test_gains_of_pid_as_matrices_are_the_same_gains(which):
     """At its limit a drive keeps its own integral, and its own only."""
@@ -409,6 +417,7 @@ def test_runs_and_sweeps_are_values():
     [
         (lambda: rk.PID(7.0, -1.0, 0.2), "K_I = -1; allowed: >= 0"),
         (lambda: rk.PID(7.0, 1.0, 0.2, limit=-0.1), r"limit = -0\.1; allowed: >= 0"),
+        (lambda: rk.PID(7.0, 1.0, 0.2, limit=[]), r"limit has shape \(0,\); allowed: one number or one per drive"),
         (lambda: rk.PID(7.0, 1.0, 0.2, limit="x"), "limit = .* is not numeric"),
         (lambda: rk.PID(7.0, 1.0, 0.2, limit="inf"), "limit = 'inf' is not numeric"),
         (lambda: rk.TorqueLimit(["inf", "0.3", "inf"]), r"limit = \['inf', .* is not numeric"),
