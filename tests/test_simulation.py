@@ -126,20 +126,21 @@ def test_a_run_of_few_holds_has_their_mean(samples):
     np.testing.assert_allclose(root_mean_square_torque(run), np.sqrt(square), rtol=1e-12)
 
 
-def test_quantized_angles_and_filtered_rates():
+@pytest.mark.parametrize("dt", [1e-3, 2.5e-3])
+def test_quantized_angles_and_filtered_rates(dt):
     seen = []
 
     def law(t, q_a, qd_a, desired):
         seen.append((q_a.copy(), qd_a.copy()))
         return -7.05 * (q_a - desired.q_a) - 0.225 * (qd_a - desired.qd_a)
 
-    path = rk.circle(ROBOT, radius=0.05, duration=0.5)
+    path = rk.circle(ROBOT, radius=0.05, duration=0.5, dt=dt)
     sensors = {"encoder": 2000, "velocity_filter": 3e-3}
     run = rk.simulate(ROBOT, law, path, OFFSET, **sensors)
     q = np.round((run.q_a + OFFSET) * 2000 / (2 * np.pi)) * 2 * np.pi / 2000
     rate = np.zeros_like(q)
     for k in range(1, len(q)):
-        rate[k] = rate[k - 1] + 1e-3 / (3e-3 + 1e-3) * ((q[k] - q[k - 1]) / 1e-3 - rate[k - 1])
+        rate[k] = rate[k - 1] + dt / (3e-3 + dt) * ((q[k] - q[k - 1]) / dt - rate[k - 1])
     np.testing.assert_allclose(np.array([s[0] for s in seen]), q, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.array([s[1] for s in seen]), rate, rtol=0, atol=1e-9)
     np.testing.assert_allclose(run.c, rk.simulate(ROBOT, PD, path, OFFSET, **sensors).c, rtol=0, atol=1e-9)
