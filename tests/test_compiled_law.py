@@ -211,6 +211,12 @@ def test_what_a_compiled_pose_has_not_is_told_with_what_it_has():
             rk.simulate(ROBOT, law, PATH)
 
 
+def test_a_law_is_told_the_time_of_its_path():
+    path = rk.hold(ROBOT, [0.0, 0.0], 0.02, dt=2e-3)
+    law = rk.compiled(lambda t, q_a, qd_a, d: 1e-3 * t * np.ones(3))
+    assert_allclose(rk.simulate(ROBOT, law, path).c, np.outer(1e-3 * path.t, np.ones(3)), rtol=1e-14)
+
+
 def test_inside_a_filter_and_in_a_study():
     filtered = rk.AntagonismFilter(pid)
     run = rk.simulate(ROBOT, filtered, PATH, OFFSET)
