@@ -255,3 +255,11 @@ def test_coordinates_may_be_given_at_once():
     assert_allclose(pose.A[[0, 2]], np.eye(2), atol=1e-14)
     with pytest.raises(ValueError, match="independent"):
         At(TESTBED, q, None, (0, 9))
+
+
+def test_of_many_poses_the_stretched_arm_is_named():
+    robot = rk.load()
+    q = np.tile(rk.inverse_kinematics(robot, [0.02, 0.05]), (4, 1))
+    q[1, 5] = 0.0
+    with pytest.raises(ValueError, match=r"^q puts arm 3 on the boundary of the workspace"):
+        _ = rk.at(robot, q).F
