@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,15 @@ class Sample:
     array([-0.007, -0.007, -0.007])
     """
 
-    __slots__ = ("_found", "_keeper", "_truth", "desired", "dt", "model", "q_a", "qd_a", "t")
+    t: float
+    dt: float
+    model: Manipulator
+    q_a: np.ndarray
+    qd_a: np.ndarray
+    desired: Desired
+    _keeper: Controller
+    _truth: Any
+    _found: dict
 
     def __init__(self, keeper: Controller, t: float, q_a, qd_a, desired: Desired, truth=None):
         of_kind("keeper", keeper, Controller, "the Controller that makes the samples")
@@ -56,10 +65,10 @@ class Sample:
         return sample
 
     def _fill(self, keeper: Controller, t, q_a, qd_a, desired, truth):
-        # As `__slots__` lists them.
-        values = {}, keeper, truth, desired, keeper.dt, keeper.model, q_a, qd_a, t
-        for put, value in zip(_SLOTS, values, strict=True):
-            put(self, value)
+        self.__dict__.update(
+            t=t, dt=keeper.dt, model=keeper.model, q_a=q_a, qd_a=qd_a, desired=desired,
+            _keeper=keeper, _truth=truth, _found={},
+        )  # fmt: skip
 
     def __setattr__(self, name, value):
         raise AttributeError(f"{name} of a Sample cannot be set, others read it, too; allowed: a name of your own")
@@ -112,9 +121,6 @@ class Sample:
         here = at(model, inverse_kinematics(model, found))
         A = here.A
         return here, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
-
-
-_SLOTS = [getattr(Sample, name).__set__ for name in Sample.__slots__]
 
 
 class Controller:

@@ -36,8 +36,9 @@ class quantity(Generic[Kept]):
             raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
         value: Any = self.function(pose)
         pose.__dict__[self.name] = value
-        for array in value if type(value) is tuple else (value,):
-            array.setflags(write=False)
+        if not self.name.startswith("_"):  # the others are shown to nobody
+            for array in value if type(value) is tuple else (value,):
+                array.setflags(write=False)
         return value
 
 
@@ -127,8 +128,7 @@ class At(Value):
     @rate
     def xd(self) -> np.ndarray:
         """End-effector velocity (..., 2), m/s: that of the tip of arm 2."""
-        elbow = self.robot.n_arms + 1
-        columns, qd = self.tip_columns, self.qd[..., None, :]
+        elbow, columns, qd = self.robot.n_arms + 1, self.tip_columns, self.qd[..., None, :]
         return columns[..., 1] * qd[..., 1] + columns[..., elbow] * qd[..., elbow]
 
     @quantity

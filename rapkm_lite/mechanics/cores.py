@@ -71,7 +71,8 @@ def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.
 
 def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
     """v, after a check that the tips meet, |h| <= 1e-3 times the longest link."""
-    gap, limit = np.abs(linear(v, tree.gaps) + tree.gap).max(initial=0.0), 1e-3 * tree.longest
+    h, limit = linear(v, tree.gaps) + tree.gap, 1e-3 * tree.longest
+    gap = max(map(abs, h.tolist())) if h.ndim == 1 else np.abs(h).max(initial=0.0)
     if gap > limit:
         words = f"allowed: {limit:.3g} m (1e-3 of the longest link) where rates or torques are asked for"
         raise ValueError(f"q leaves the loops open by {gap:.3g} m; {words}; close_loops(robot, q) closes them")

@@ -56,6 +56,7 @@ class Desired(Value):
 
 
 _MOTION = ("x", "xd", "xdd", "q", "qd", "qdd")
+_ROW = (*_MOTION, "q_a", "qd_a", "qdd_a")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,9 +94,11 @@ class Trajectory(Desired):
         rows = chosen(len(self), k)
         if isinstance(rows, int | np.integer):  # also of an array without axes
             # Made for who asks: an array that is read-only can still be given another shape in place.
-            k, sample = range(len(self))[rows], object.__new__(Desired)
-            row = {name: getattr(self, name)[k] for name in (*_MOTION, "q_a", "qd_a", "qdd_a")}
-            sample.__dict__.update(row, n_arms=self.n_arms)
+            sample = object.__new__(Desired)
+            known = sample.__dict__
+            known["n_arms"] = self.n_arms
+            for name in _ROW:
+                known[name] = getattr(self, name)[rows]
             return sample
         return Desired(self.n_arms, *(getattr(self, name)[rows] for name in _MOTION))
 
