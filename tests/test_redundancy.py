@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, MACHINES, random_points
-from scipy.optimize import minimize
+from scipy.optimize import linprog, minimize
 
 import rapkm_lite as rk
 
@@ -300,6 +300,37 @@ def test_forces_near_the_corners_of_far_limits_are_right_or_refused():
             assert np.all(np.abs(c) <= limit)
             assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-9 * np.abs(A * limit[:, None]).max())
     assert reached > 150
+
+
+def test_no_torques_within_limits_are_nearer_to_the_prestress():
+    """Of a convex set c is nearest to c0 where no other y has (c - c0)^T y less; a linear programme seeks that y.
+
+    With SciPy 1.15, whose non-negative least squares stop too soon, many were refused and a few wrong.
+    """
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        m = rng.integers(2, 9)
+        A, limit = rng.normal(size=(m, rng.integers(1, m))), 10.0 ** rng.uniform(-1.0, 1.0, m)
+        wrench = (1.0 - 10.0 ** -rng.uniform(0.3, 3.0)) * A.T @ (limit * np.sign(A @ rng.normal(size=A.shape[1])))
+        c0 = 3.0 * limit * rng.normal(size=m)
+        c = rk.allocate_torques(A, wrench, limit, prestress=c0)
+        assert np.all(np.abs(c) <= limit)
+        assert_allclose(A.T @ c, wrench, rtol=0, atol=1e-11 * limit.max())
+        best = linprog(c - c0, A_eq=A.T, b_eq=wrench, bounds=np.stack([-limit, limit], axis=-1))
+        assert (c - c0) @ c - best.fun <= 1e-6 * np.abs(c - c0) @ limit
+
+
+def test_least_squares_that_find_no_end_cost_a_sentence_or_a_rounding(monkeypatch):
+    """SciPy 1.14 has an error of its own near corners of the force polygon, where no torques are left to choose."""
+
+    def endless(*_):
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr("scipy.optimize.nnls", endless)
+    A = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    assert_allclose(rk.allocate_torques(A, (1.0 - 1e-8) * A.T @ np.ones(3), 1.0), np.ones(3), atol=1e-7)
+    with pytest.raises(ValueError, match=r"rounding hides the nearest torques; allowed: .*limits that differ less"):
+        rk.allocate_torques(A, [1.0, 1.0], 0.6)
 
 
 def test_numbers_of_poses_that_do_not_fit_are_named():

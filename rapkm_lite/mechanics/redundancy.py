@@ -66,8 +66,11 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     wide = 1.0 + (1e-12 if peak > 1.0 - 1e-9 else 0.0)
     G, h = np.concatenate([-n, n]), np.concatenate([best - wide, -best - wide])
     size = np.abs(h).max()
-    u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
-    r, slack = G.T @ u, 1.0 - h @ u / size
+    try:
+        u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
+        r, slack = G.T @ u, 1.0 - h @ u / size
+    except (RuntimeError, np.linalg.LinAlgError):  # SciPy 1.14 may go round in circles
+        slack = 0.0
     # Where rounding leaves nothing to divide by, torques of least peak.
     c = limit * np.clip(best + n @ r / slack * size if slack > 1e-12 else edge / limit, -1.0, 1.0)
     # Near the edge rounding is magnified, and what was clipped may make another force.
