@@ -17,8 +17,9 @@ import rapkm_lite
 from rapkm_lite.__main__ import main
 from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.grading import grader
+from rapkm_lite.lessons.grading.cells import sources
 from rapkm_lite.lessons.grading.grader import Grade, grade, grade_one
-from rapkm_lite.lessons.grading.submission import Submission, called, found, hides_check, needed, sources, statements
+from rapkm_lite.lessons.grading.submission import Submission, called, found, hides_check, needed, statements
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
 from rapkm_lite.lessons.grading.worker import Bench, nowhere
 
@@ -339,6 +340,52 @@ def test_what_a_notebook_gives_to_others_is_not_run(tmp_path, words):
     assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
 
 
+HELPERS = {
+    "a module": ["%%writefile helper.py\none = 1.0\n", "from helper import one\n"],
+    "a module in two parts": [
+        "%%file helper.py\nhalf = 0.5\n",
+        "%%writefile -a 'helper.py'\none = 2 * half\n",
+        "from helper import *\n",
+    ],
+    "a table": ["%%writefile gains.csv\n1.0, 2.0\n", "one = np.loadtxt('gains.csv', delimiter=',')[0]\n"],
+}
+
+
+@pytest.mark.parametrize("cells", HELPERS.values(), ids=HELPERS)
+def test_a_cell_that_is_written_to_a_file_is_found_there(tmp_path, cells):
+    assert graded_alone(tmp_path, *cells) == "ok"
+
+
+def test_what_goes_to_a_file_is_not_run(tmp_path):
+    """As in a notebook, where such a cell binds no name."""
+    assert graded_alone(tmp_path, "%%writefile helper.py\none = 1.0\n") == "wrong"
+
+
+@pytest.mark.parametrize("first", ["import no_such_package\n" + SETUP, "import no_such_package\nimport numpy as np"])
+def test_a_missing_package_is_named_where_its_cell_binds_what_an_answer_needs(tmp_path, first):
+    second = "import rapkm_lite as rk\nfrom rapkm_lite.checks import check"
+    write(tmp_path / "ada" / "04_x.ipynb", [first, second, TORQUES + CHECKS[0]])
+    said = {one.exercise: one for one in grade(tmp_path)}[NAMES[0]]
+    assert "name 'np' is not defined; earlier, cell 1:" in said.sentence
+    assert "No module named 'no_such_package'" in said.sentence and said.mistake == "an earlier cell stops"
+
+
+def test_an_earlier_cell_that_does_not_bind_the_missing_name_is_not_blamed(tmp_path):
+    write(tmp_path / "ada" / "04_x.ipynb", [SETUP, "1 / 0", TORQUES.replace("A.T @ c", "A.T @ d") + CHECKS[0]])
+    said = {one.exercise: one for one in grade(tmp_path)}[NAMES[0]]
+    assert "'d' is not defined" in said.sentence and "earlier" not in said.sentence
+
+
+def test_notebooks_of_format_3_are_read(tmp_path):
+    """nbformat 3: sheets of cells, and the code of a cell is its input."""
+    cells = [{"cell_type": "code", "input": text, "language": "python", "outputs": []} for text in checked(RIGHT)]
+    cells.insert(1, {"cell_type": "heading", "level": 1, "source": ["Filter"]})
+    sheets = {"metadata": {}, "nbformat": 3, "nbformat_minor": 0, "worksheets": [{"cells": cells}]}
+    (tmp_path / "ada").mkdir()
+    (tmp_path / "ada" / "04_x.ipynb").write_text(json.dumps(sheets))
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
 @pytest.mark.parametrize(
     "before",
     [
@@ -537,10 +584,10 @@ def test_the_worker_imports_the_package_that_grades_and_is_not_strict(monkeypatc
     assert own["PYTHONPATH"].split(os.pathsep) == [str(Path(rapkm_lite.__file__).parents[1]), "elsewhere"]
 
 
-def graded_alone(folder, before):
+def graded_alone(folder, *before):
     """The verdict on a right answer that needs `one`, which the statements before it make."""
     body = TORQUES.replace("return A", "return one * A")
-    write(folder / "04_x.ipynb", [SETUP, before, body + CHECKS[0]])
+    write(folder / "04_x.ipynb", [SETUP, *before, body + CHECKS[0]])
     return {g.exercise: g.verdict for g in grade_one(Submission("ada", folder / "04_x.ipynb", "04"), 15.0)}[NAMES[0]]
 
 

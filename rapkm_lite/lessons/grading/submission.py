@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import ast
 import builtins
-import json
 import os
 import re
 import symtable
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +17,6 @@ from ..exercise import Exercise
 
 _EXERCISE = re.compile(r"\d\d\.\w+")
 _NUMBER = re.compile(r"(?<!\d)(\d\d)_")
-_FOREIGN = re.compile(r"\s*%%(!|bash|cmd|html|java|js|latex|markdown|perl|pypy|python|ruby|script|sh|svg|sx|sys)", re.I)
 _BUILT_IN = {*dir(builtins), "display"}
 # A notebook may await outside a function; nothing of this module's own way to be compiled is passed on.
 RULES = {"flags": ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, "dont_inherit": True}
@@ -111,33 +108,6 @@ def _notebooks(folder: Path) -> list[tuple[Path, tuple[str, ...]]]:
         folders[:] = [one for one in folders if one[0] != "." and os.path.realpath(Path(place, one)) not in around]
         places += [Path(place, one) for one in files if one[0] != "." and one.lower().endswith(".ipynb")]
     return [(path, path.relative_to(folder).parts) for path in sorted(places)]
-
-
-def sources(path: Path) -> list[str]:
-    """Source of every cell, empty for those without code; what is for the notebook itself (%, !, ?) as plain calls.
-
-    Raises ValueError when the file is no notebook.
-    """
-    try:
-        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-        texts = ["".join(cell["source"]) if cell["cell_type"] == "code" else "" for cell in cells]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path.name} is no notebook that can be read ({type(error).__name__})") from None
-    return [_plain(text) for text in texts]
-
-
-def _plain(text: str) -> str:
-    """The source of a cell in plain Python; nothing of what a notebook gives to a shell, a page or a new Python."""
-    text = "pass" if _FOREIGN.match(text) else re.sub(r"\A(\s*)%%.*$", r"\1pass", text, flags=re.M)
-    try:
-        ast.parse(text)
-    except (SyntaxError, ValueError):
-        text = re.sub(r"^(\s*)%time\s+(?=\S)", r"\1", text, flags=re.M)
-        with suppress(ImportError, SyntaxError):
-            from IPython.core.inputtransformer2 import TransformerManager
-
-            return TransformerManager().transform_cell(text)
-    return text
 
 
 def statements(texts: list[str]) -> tuple[list[Statement], dict[int, str]]:

@@ -12,11 +12,14 @@ from __future__ import annotations
 import argparse
 import ast
 import asyncio
+import importlib
 import inspect
 import io
 import json
 import linecache
 import os
+import re
+import shlex
 import sys
 import time
 from collections.abc import Iterator
@@ -28,7 +31,8 @@ from typing import Any
 
 from rapkm_lite.lessons import checker
 from rapkm_lite.lessons.answers import Answer, Ended, Result, guarded
-from rapkm_lite.lessons.grading.submission import RULES, Statement, called, hides_check, needed, sources, statements
+from rapkm_lite.lessons.grading.cells import sources
+from rapkm_lite.lessons.grading.submission import RULES, Statement, called, hides_check, needed, statements
 
 
 class Bench:
@@ -102,8 +106,17 @@ class Bench:
                 # What a check said of an answer that is none says more than "not yet".
                 if found.word != "todo" or name not in self.results:
                     self.results[name] = found
-            self.tell(result=[name, *self.results[name]])
+            self.tell(result=[name, *self.caused(self.results[name], texts)])
         self.tell(done=True)
+
+    def caused(self, result: Result, texts: list[str]) -> Result:
+        """A name that is not defined, with what stopped the cell that was to define it."""
+        if missing := re.search(r"NameError: name '(\w+)'", result.sentence):
+            for cell, sentence in sorted(self.failed.items()):
+                if sentence not in result.sentence and re.search(rf"\b{missing[1]}\b", texts[cell]):
+                    words = f"{result.sentence}; earlier, cell {cell + 1}: {sentence}"
+                    return result._replace(sentence=words, mistake="an earlier cell stops")
+        return result
 
     def without_check(self, name: str, texts: list[str]) -> Result:
         """The verdict on what bears the answer's name: the last where the exercise is named, else the best anywhere."""
@@ -129,7 +142,14 @@ def awaited(code: CodeType, space: dict[str, Any]) -> None:
 
 
 class NoNotebook:
-    """Stands in for the notebook itself: commands for it (%, !, ?) do nothing."""
+    """Stands in for the notebook itself: commands for it (%, !, ?) do nothing, but that a cell is written to a file."""
+
+    def run_cell_magic(self, magic: str, line: str, cell: str) -> None:
+        if magic == "writefile":
+            *options, name = shlex.split(line)
+            with open(name, "a" if "-a" in options or "--append" in options else "w", encoding="utf-8") as file:
+                file.write(cell)
+            importlib.invalidate_caches()
 
     def __getattr__(self, name):
         return lambda *arguments, **named: None
