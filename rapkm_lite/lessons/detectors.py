@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .algebra import argument_factor, combination, constant_factor, from_argument, function_of, mixture, shifted
-from .seen import Seen, alike, largest, ratio_of
+from .seen import Seen, alike, largest, ratio_of, rounding
 
 # Factor -> what it tells.
 FACTORS = {
@@ -20,6 +20,8 @@ FACTORS = {
     0.01: "the answer is 100 times too small: units (centi, percent)",
     180 / np.pi: "the answer is 180/pi times too large: units, degrees instead of radians",
     np.pi / 180: "the answer is 180/pi times too small: units, radians taken for degrees",
+    (180 / np.pi) ** 2: "the answer is (180/pi)^2 times too large: units, degrees instead of radians, squared",
+    (np.pi / 180) ** 2: "the answer is (180/pi)^2 times too small: units, radians taken for degrees, squared",
     2.0: "the answer is twice the right one: a factor of 2 too many",
     0.5: "the answer is half the right one: a factor of 2 is missing",
     2 * np.pi: "the answer is 2 pi times too large: a factor of 2 pi, turns against radians",
@@ -54,9 +56,11 @@ def sign(seen: Seen) -> str:
         return "the answer has the opposite sign"
     if seen.same([np.abs(w) for w in seen.want]):
         return "the answer has lost its signs: it is the absolute value"
-    if all(alike(w, g, seen.slack) or alike(-w, g, seen.slack) for g, w, _ in seen):
+    least = rounding(seen.want)
+    if all(alike(w, g, seen.slack, least) or alike(-w, g, seen.slack, least) for g, w, _ in seen):
         return "the size is right, but in some cases the sign is opposite"
-    return _some_signs(seen) if all(alike(np.abs(w), np.abs(g), seen.slack) for g, w, _ in seen) else ""
+    sizes = ([np.abs(v) for v in side] for side in (seen.want, seen.got))
+    return _some_signs(seen) if seen.agree(*sizes) else ""
 
 
 def _some_signs(seen: Seen) -> str:
@@ -92,9 +96,9 @@ def transposed(seen: Seen) -> str:
     return ""
 
 
-def _reordered(got: np.ndarray, want: np.ndarray, slack: float) -> bool:
+def _reordered(got: np.ndarray, want: np.ndarray, slack: float, least: float) -> bool:
     """True when the rows of one are the rows of the other in some order."""
-    left, limit = list(range(len(want))), slack * max(largest(want), 1e-300)
+    left, limit = list(range(len(want))), max(slack * max(largest(want), 1e-300), least)
     for row in got:
         match = next((i for i in left if largest(want[i] - row) <= limit), None)
         if match is None:
@@ -107,12 +111,13 @@ def order(seen: Seen) -> str:
     """Rows, columns or entries exchanged."""
     if not all(w.ndim in (1, 2) and w.size > 1 for w in seen.want):
         return ""
+    close = seen.slack, rounding(seen.want)
     for s, words in ((1, ""), (-1, ", and the sign is opposite")):
-        if all(_reordered(s * g, w, seen.slack) for g, w, _ in seen):
+        if all(_reordered(s * g, w, *close) for g, w, _ in seen):
             return ("the rows stand" if seen.want[0].ndim == 2 else "the entries stand") + " in another order" + words
-        if seen.want[0].ndim == 2 and all(_reordered(s * g.T, w.T, seen.slack) for g, w, _ in seen):
+        if seen.want[0].ndim == 2 and all(_reordered(s * g.T, w.T, *close) for g, w, _ in seen):
             return "the columns stand in another order" + words
-    if all(_reordered(g.ravel(), w.ravel(), seen.slack) for g, w, _ in seen):
+    if all(_reordered(g.ravel(), w.ravel(), *close) for g, w, _ in seen):
         return "the numbers are right, but they stand in another order (rows and columns)"
     return ""
 

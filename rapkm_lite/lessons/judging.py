@@ -13,7 +13,7 @@ from ..machine.manipulator import Manipulator
 from .answers import NOTHING, REFERENCE, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import named, where
 from .exercise import Case, Exercise, Measured
-from .seen import Seen, alike, largest, ratio_of
+from .seen import Seen, largest, ratio_of
 
 _OWN = " (is it the robot of the arguments, and does robot.n_arms or robot.n_joints stand where it counts?)"
 
@@ -199,14 +199,14 @@ def _sign(mistake: Callable, seen: Seen) -> int:
             made = [np.asarray(mistake(*map(copied, case)), dtype=float) for case in seen.cases]
     except Exception:
         return 0
-    if all(m.shape == w.shape and alike(m, w, seen.slack) for m, w in zip(made, seen.want, strict=True)):
+    if seen.agree(made, seen.want):
         return 0
     return next((sign for sign in (1, -1) if seen.same([sign * m for m in made])), 0)
 
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:
     """End the examination where the answer is that of a mistake the exercise knows by name."""
-    if all(alike(w, g, seen.slack) for g, w, _ in seen):
+    if seen.same(seen.want):
         return
     signs = {words: sign for words, mistake in exercise.mistakes.items() if (sign := _sign(mistake, seen))}
     if signs:
