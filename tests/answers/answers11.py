@@ -238,7 +238,12 @@ ANSWERS = {
         ("wrong", "in mm", scaled(tasks.model_error, 1e3), "1000"),
         ("wrong", "exchanged", lambda r, m, *rest: tasks.model_error(m, r, *rest), "exchanged"),
         ("wrong", "no velocity", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, 0 * v, a, K), "velocity"),
-        ("wrong", "C - C_hat", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, -v, a, K), "masses"),
+        (
+            "wrong",
+            "C - C_hat",
+            lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, -v, a, K),
+            "sign of the velocity",
+        ),
         ("wrong", "C xd / 2", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v / 2, a, K), "masses"),
         ("wrong", "no acceleration", lambda r, m, q, qd, v, a, K: tasks.model_error(r, m, q, qd, v, 0 * a, K), "accel"),
         ("wrong", "xd @ C", velocity_first, "C is transposed"),

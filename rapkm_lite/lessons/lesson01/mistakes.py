@@ -220,6 +220,9 @@ ACCELERATIONS = {
     "Q is missing: the friction of the drives": _projected(Q=0.0),
     "C and Q are missing": _projected(C=0.0, Q=0.0),
     "the drive torques c are missing": (lambda robot, q, qd, c, independent: forward_dynamics(robot, q, qd, 0 * c)[0]),
+    "the sign of the drive torques c is opposite: they stand on the right of (2)": (
+        lambda robot, q, qd, c, independent: forward_dynamics(robot, q, qd, -c)[0]
+    ),
     "everything that depends on the velocity is missing": _projected(C=0.0, Q=0.0, GFdot=0.0, back=0.0),
     "A is that of the end-effector: `independent` was not passed to it": _of_the_end_effector(False),
     "all matrices are those of the end-effector: `independent` was not passed to them": _of_the_end_effector(True),

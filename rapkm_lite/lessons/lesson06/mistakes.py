@@ -131,7 +131,8 @@ MEANS = {
     "this is the cost in the cheapest direction, the smallest eigenvalue; the mean takes all of them": _eigenvalues(
         lambda e, sigma: sigma**2 * e[0]
     ),
-    "this is the mean of the principal costs; their sum is wanted (the number of drives is missing)": _eigenvalues(
+    "this is the mean of the principal costs; their sum is wanted: the number of drives is missing, or the offsets "
+    "were drawn evenly from -sigma to sigma, whose mean square is a third of sigma²": _eigenvalues(
         lambda e, sigma: sigma**2 * e.mean()
     ),
     "this is the product of the principal costs (the determinant); their sum is wanted": (

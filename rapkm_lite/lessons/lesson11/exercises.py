@@ -44,16 +44,12 @@ def _own_inertia(robot, model, q, qd, xd, xdd, K_P):
     return np.linalg.solve(G, _force(robot, model, q, qd, xd, xdd, K_P)[..., None])[..., 0] / K_P
 
 
-def _without(part: str):
-    """The error where the acceleration, the velocity or the other forces are left out of what the model misses."""
+def _with(G=1.0, C=1.0, Q=1.0):
+    """The error where the acceleration, the velocity or the other forces that the model misses have these factors."""
 
     def made(robot, model, q, qd, xd, xdd, K_P):
-        xdd = 0 * xdd if part == "G" else xdd
-        xd = 0 * xd if part == "C" else xd
-        whole = tasks.model_error(robot, model, q, qd, xd, xdd, K_P)
-        if part == "Q":
-            whole = whole - tasks.model_error(robot, model, q, qd, 0 * xd, 0 * xdd, K_P)
-        return whole
+        still = tasks.model_error(robot, model, q, qd, 0 * xd, 0 * xdd, K_P)
+        return tasks.model_error(robot, model, q, qd, C * xd, G * xdd, K_P) + (Q - 1) * still
 
     return made
 
@@ -156,10 +152,16 @@ EXERCISES = {
             ),
             "the gain K_P is missing: these are accelerations": lambda *case: case[-1] * tasks.model_error(*case),
             "the machine's own inertia is inverted; the law multiplies with that of its model": _own_inertia,
-            "the velocity terms C xd are missing": _without("C"),
+            "the velocity terms C xd are missing": _with(C=0.0),
             "C is transposed: it is C xd, not xd^T C": _transposed,
-            "friction and gravity (Q) are missing": _without("Q"),
-            "the acceleration is missing: an unknown mass matters where the motion accelerates": _without("G"),
+            "friction and gravity (Q) are missing": _with(Q=0.0),
+            "the acceleration is missing: an unknown mass matters where the motion accelerates": _with(G=0.0),
+            "the sign of the velocity terms is opposite: (C_hat - C) xd": _with(C=-1.0),
+            "the sign of friction and gravity is opposite: Q_hat - Q": _with(Q=-1.0),
+            "the sign of the acceleration terms is opposite: (G_hat - G) xdd": _with(G=-1.0),
+            "the signs of velocity terms, friction and gravity are opposite: (C_hat - C) xd + Q_hat - Q": (
+                _with(C=-1.0, Q=-1.0)
+            ),
             "these are forces in N, before the inertia is divided out": _force,
             "the inertia is not divided out: these are forces over K_P": lambda *case: _force(*case) / case[-1],
         },

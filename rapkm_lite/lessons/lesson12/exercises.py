@@ -87,6 +87,7 @@ EXERCISES = {
         improve="move the base points a little",
         points=10.0,
         mistakes={
+            "the lengths are in mm; the unit is m": lambda answer: bool(tasks.equipped(answer).lengths.min() > 10.0),
             "all elbows are bent to one side, so the signs of the null vector are those of the testbed: 4 - 2 + 5": (
                 tasks.costly_and_bent_alike
             ),
