@@ -195,10 +195,10 @@ EXERCISES = {
             "the second of the two that bend alike (order of the arms)": (
                 lambda mode: load().base[[tasks.odd(mode), tasks.equal(mode)[1]]].mean(axis=0)
             ),
-            "this is the midpoint of another side of the base triangle: the arms are counted on by one (order)": (
+            "the points are turned by 120 degrees: the arms are counted on by one (order), or it is another frame": (
                 lambda mode: tasks.input_singularity(np.roll(mode, 1))
             ),
-            "this is the midpoint of another side of the base triangle: the arms are counted back by one (order)": (
+            "the points are turned by -120 degrees: the arms are counted back by one (order), or it is another frame": (
                 lambda mode: tasks.input_singularity(np.roll(mode, -1))
             ),
             "this is the sum of the two base points, not the point midway (a factor of 2)": (

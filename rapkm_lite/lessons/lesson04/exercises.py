@@ -252,7 +252,7 @@ EXERCISES = {
             "the saving is a share without unit; the difference in J is wanted": (
                 _energy_with(lambda whole, kept, removed: 1 - kept / whole)
             ),
-            "this is the mean power saved, in W; the energy is that times the duration of the log": (
+            "this is the mean power saved, in W; the energy is that times the duration len(c) dt of the log": (
                 lambda robot, A, c, dt: saved_energy(robot, A, c, dt) / (len(c) * dt)
             ),
             "the motors are forgotten: a torque squared is no power, the factor R_el/k_t^2 is missing": (
