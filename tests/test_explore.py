@@ -1046,3 +1046,48 @@ def test_a_draw_function_need_not_belong_to_an_imported_module(space):
     exec("def bare(picture, gain):\n    'A line.'\n    return {'gain': f'{gain:g}'}", space)
     made = explore.explorer(space["bare"], {"gain": explore.slider("gain in 1", 1.0, 3.0, 1.0, 2.0)}, {"p": {}})
     assert made.about == "A line." and made.set(gain=3.0).numbers == {"gain": "3"}
+
+
+def many_arms(N, times=1.0):
+    """N arms of the testbed around a circle as wide as its own, lengths and masses so many times as large."""
+    turn = np.pi * 7 / 6 + 2 * np.pi * np.arange(N) / N
+    base = 0.4 / np.sqrt(3) * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    return rk.Manipulator(base=times * base, lengths=0.2 * times, masses=0.134 * times)
+
+
+def laid_out(explorer):
+    """The stored picture with its texts in place."""
+    shown = figure(explorer.picture)
+    with matplotlib.rc_context(matplotlib.rc_params_from_file(plotting.STYLE, use_default_template=False)):
+        shown.draw_without_rendering()
+    return shown
+
+
+@pytest.mark.parametrize("N", [4, 6])
+def test_every_curve_is_named_and_no_legend_covers_a_title(N):
+    for name, panel in (("actuation", "sigma"), ("computed_torque", "plane"), ("prestress", "without")):
+        explorer = getattr(explore, name)(many_arms(N))
+        named = next(m.words for m in explorer.picture.fixed if m.kind == "legend" and m.panel == panel)
+        assert len(named) == (N if name == "prestress" else N * (N - 1) // 2)
+        if name == "actuation":
+            curves = [m.style for m in explorer.picture.marks if (m.kind, m.panel) == ("line", panel)]
+            looks = [
+                {(s["color"], s["linestyle"]) for s in these if "linestyle" in s}
+                for these in (curves, dict(named).values())
+            ]
+            assert looks[0] == looks[1] and len(looks[0]) == len(named)
+        for ax in laid_out(explorer).axes:
+            title = next(t for t in ax.findobj(Text) if t.get_text() == ax.get_title("left")).get_window_extent()
+            if ax.get_legend() is not None and title.width:
+                said = [t.get_window_extent() for t in ax.get_legend().get_texts() + ax.get_legend().get_lines()]
+                assert not any(title.overlaps(box) for box in said), (name, ax.get_title("left"))
+
+
+@pytest.mark.parametrize("name, robot", [("machine", rk.load("five_bar")), ("landscape", many_arms(4))])
+def test_titles_and_labels_are_whole(name, robot):
+    shown = laid_out(getattr(explore, name)(robot))
+    for ax in shown.axes:
+        words = [ax.get_title("left"), ax.get_xlabel(), ax.get_ylabel()]
+        for text in (t for t in ax.findobj(Text) if t.get_text().strip() and t.get_text() in words):
+            box = text.get_window_extent()
+            assert 0 <= box.x0 and box.x1 <= shown.bbox.x1 and 0 <= box.y0 and box.y1 <= shown.bbox.y1, text

@@ -226,8 +226,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
         "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
         "side": shared.length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
     }
-    # Six drives have a legend that leaves no room for the title beside it.
-    return explorer(draw, controls, panels, size=(9.4 if robot.n_arms < 5 else 11.4, 3.3), live=True)
+    return explorer(draw, controls, panels, live=True)
 
 
 def sign_changes(c: np.ndarray) -> np.ndarray:

@@ -51,9 +51,8 @@ def drive_lines(robot) -> list:
 
 
 def pair_lines(robot) -> list:
-    """Entries of a legend: the first pairs' lines."""
-    pairs = drive_pairs(robot)[:4]
-    return [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(pairs)]
+    """Entries of a legend: the pairs' lines."""
+    return [("pair " * (i == 0) + pair_name(p), pair_line(robot, p)) for i, p in enumerate(drive_pairs(robot))]
 
 
 def drive_legend(picture, panel: str, robot) -> None:
@@ -66,7 +65,7 @@ def drive_legend(picture, panel: str, robot) -> None:
 
 
 def pair_legend(picture, panel: str, robot) -> None:
-    """A legend of the first pairs' lines.
+    """A legend of the pairs' lines.
 
     >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}}); import rapkm_lite as rk
     >>> pair_legend(picture, "a", rk.load())

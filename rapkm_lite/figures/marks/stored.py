@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import math
 import re
 import textwrap
 
@@ -58,6 +59,9 @@ def figure(picture: Picture, problem: str = "") -> Figure:
                 ax.spines[:].set_visible(False)
         for mark in [*picture.fixed, *picture.marks]:
             _PAINT[mark.kind](axes[mark.panel], mark)
+        if any(mark.kind == "scale" for mark in picture.fixed):
+            # A colour bar takes room from axes of equal scales, whose title is then above the place it had.
+            made.get_layout_engine().execute(made)
         if problem:
             box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
             words = textwrap.fill(problem, int(10 * picture.size[0]))
@@ -127,10 +131,19 @@ def _image(ax, mark: Mark) -> None:
 
 
 def _legend(ax, mark: Mark) -> None:
-    handles = [Line2D([], [], **style) for _, style in mark.words]
-    words = [mathtext(words) for words, _ in mark.words]
-    spacing = {"handlelength": 1.7, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
-    ax.legend(handles, words, ncols=len(words), loc="lower right", bbox_to_anchor=(1, 1), **spacing)
+    entries = [(Line2D([], [], **style), mathtext(words)) for words, style in mark.words]
+    look = {"handlelength": 1.7, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
+    look |= {"loc": "lower right", "bbox_to_anchor": (1, 1)}
+    count = len(entries)
+    wide = ax.legend(*zip(*entries, strict=True), ncols=count, **look).get_window_extent().width
+    # Beside the title; the panel is not laid out yet and becomes a little wider.
+    room = ax.bbox.width - ax.set_title(ax.get_title("left")).get_window_extent().width
+    if wide > room:
+        rows = math.ceil(count / max(int(count * room / wide), 1))
+        columns = math.ceil(count / rows)
+        # Matplotlib fills columns, but it is rows that are read, here as on the canvas.
+        entries = [entries[k] for first in range(columns) for k in range(first, count, columns)]
+        ax.legend(*zip(*entries, strict=True), ncols=columns, **look)
 
 
 def _scale(ax, mark: Mark) -> None:
