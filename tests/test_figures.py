@@ -3,6 +3,7 @@
 import doctest
 import functools
 import inspect
+import itertools
 
 import matplotlib
 
@@ -193,7 +194,7 @@ def test_axes_of_its_own_are_what_a_picture_takes(name, world):
     try:
         made = drawn(name, world)
         assert drawn(name, world, axes=made) is made
-        if np.size(made) == 2:
+        if np.size(made) > 1:
             with pytest.raises(ValueError, match=r"axes = .*; allowed: .*axes as it makes and returns them itself"):
                 drawn(name, world, axes=np.ravel(made)[:1])
     finally:
@@ -495,3 +496,33 @@ def test_a_linkage_of_other_lengths_and_unlike_drives_are_refused():
         plotting.plot_torque_plane({"PD": run})
     with pytest.raises(ValueError, match=r"arms = 5; allowed: .*to 2"):
         plotting.plot_machine(robot, rk.inverse_kinematics(robot, [0.0, 0.0]), arms=(5,))
+
+
+def test_a_frame_with_the_drives_holds_them_all_and_is_that_of_the_testbed():
+    testbed = rk.load()
+    small = testbed.replace(lengths=0.15, centers=None)
+    try:
+        for robot in (testbed, small):
+            ax = plotting.plot_placement(robot, [[0.0, 0.0], [0.02, 0.0]], [1.0, 2.0])
+            (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+            assert np.all(robot.base > [left, low]) and np.all(robot.base < [right, high])
+            if robot is testbed:
+                assert (left, right, low, high) == (-0.27, 0.27, -0.2, 0.29)
+    finally:
+        plt.close("all")
+
+
+def test_names_of_six_arms_keep_apart():
+    base = rk.load().base
+    six = rk.Manipulator(np.concatenate([base, -base]), 0.2, masses=0.1)
+    try:
+        ax = plotting.plot_topology(six)
+        ax.figure.draw_without_rendering()
+        words = [(t.get_text(), t.get_window_extent()) for t in ax.texts if t.get_text()]
+        assert len(words) == 1 + 2 * 6 + 2 * 6 + 5
+        for (one, a), (other, b) in itertools.combinations(words, 2):
+            assert not a.overlaps(b), (one, other)
+        right = {f"$q^{{{i + 1}}}$ driven": ax.transData.transform((i + 1, 0))[0] for i in range(5)}
+        assert all(box.x1 < right[word] for word, box in words if word in right)
+    finally:
+        plt.close("all")

@@ -28,8 +28,10 @@ def workspace_box(robot) -> np.ndarray:
     return np.stack([there.min(axis=0), there.max(axis=0)], axis=-1)
 
 
-def scaled_frame(robot, left: float, right: float, low: float, high: float) -> dict:
+def scaled_frame(robot, left: float, right: float, low: float, high: float, drives: bool = False) -> dict:
     """Keywords of ``Axes.set``: limits in m that frame the testbed's workspace, for that of another machine.
+
+    drives : as much more as it takes to hold the base points, which may be far outside a small workspace.
 
     >>> import rapkm_lite as rk; testbed = rk.load()
     >>> scaled_frame(testbed.replace(base=3 * testbed.base, lengths=0.6), -0.21, 0.21, -0.19, 0.25)["xlim"]
@@ -38,6 +40,10 @@ def scaled_frame(robot, left: float, right: float, low: float, high: float) -> d
     testbed, own = workspace_box(load()), workspace_box(robot)
     times = np.ptp(own, axis=1).max() / np.ptp(testbed, axis=1).max()
     corners = own.mean(axis=1) + times * (np.array([[left, low], [right, high]]) - testbed.mean(axis=1))
+    if drives:
+        room = 0.25 * robot.lengths.max()
+        corners[0] = np.minimum(corners[0], robot.base.min(axis=0) - room)
+        corners[1] = np.maximum(corners[1], robot.base.max(axis=0) + room)
     x, y = corners.round(12).T.tolist()
     return {"xlim": tuple(x), "ylim": tuple(y)}
 

@@ -73,8 +73,8 @@ def plot_topology(robot, ax=None):
     >>> import rapkm_lite as rk
     >>> ax = plot_topology(rk.load())
     """
-    ax = axes_or_new(ax, figsize=(4.2, 4.2))
     N = robot.n_arms
+    ax = axes_or_new(ax, figsize=(max(4.2, 1.4 * N), 4.2))
     ax.plot([-0.25, N - 0.75], [0, 0], color="#DDDDDD", lw=20, solid_capstyle="round")
     ax.text((N - 1) / 2, 0, "ground", ha="center", va="center", zorder=6)
     for i in range(N):
@@ -85,10 +85,12 @@ def plot_topology(robot, ax=None):
         for y, link in ((1, i + 1), (2, N + i + 1)):
             ax.text(i, y, f"link {link}", ha="center", va="center", zorder=5, bbox=box)
         if i != 1:
-            bow = {"connectionstyle": f"arc3,rad={-0.5 * np.sign(i - 1)}"}
+            # The farther the arms are apart, the higher is the bow, and the flatter.
+            steep = abs(i - 1) ** -0.5
+            bow = {"connectionstyle": f"arc3,rad={-0.5 * steep * np.sign(i - 1)}"}
             line = {"arrowstyle": "-", "color": ALARM, "ls": "--", "lw": 2} | bow
             ax.annotate("", (i, 2.1), (1, 2.1), zorder=1, arrowprops=line)
-            ax.text((1 + i) / 2, 2.55, "cut", color=ALARM, ha="center", va="center")
+            ax.text((1 + i) / 2, 2.3 + 0.25 / steep, "cut", color=ALARM, ha="center", va="center")
     ax.set(xlim=(-0.5, N - 0.3), ylim=(-0.4, 2.8))
     ax.set_axis_off()
     return ax
@@ -232,7 +234,7 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
         for ax, (name, q) in zip(axes, poses.items(), strict=False):
             plot_cut_tree(robot, q[k], ax).legend().remove()
             ax.text(0.016, 0.953, f"{name}, {t[k]:.1f} s", fontweight="bold", transform=ax.transAxes)
-            ax.set(**scaled_frame(robot, -0.27, 0.36, -0.32, 0.32))
+            ax.set(**scaled_frame(robot, -0.27, 0.36, -0.32, 0.32, drives=True))
             ax.set_axis_off()
         for (name, gap), (colour, dash) in zip(gaps.items(), ((ALARM, "-"), (AFTER, "--")), strict=True):
             axes[-1].plot(t[: k + 1], 1e3 * np.asarray(gap[: k + 1]), color=colour, ls=dash, label=name)

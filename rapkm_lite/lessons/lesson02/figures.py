@@ -73,7 +73,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     for other, at in zip(drive_pairs(robot), curve_crossings(trajectory), strict=True):
         look = {"mfc": "white", "mec": pair_line(robot, other)["color"], "mew": 1.8, "ms": 7, "ls": "", "zorder": 5}
         axes[1].plot(*trajectory.x[at].T, "o", **look)
-    axes[0].set(**scaled_frame(robot, -0.32, 0.32, -0.25, 0.36))
+    axes[0].set(**scaled_frame(robot, -0.32, 0.32, -0.25, 0.36, drives=True))
     axes[0].set_title(f"five-bar of the pair {pair_name(pair)}")
     axes[1].set_title("all pairs and the path")
     axes[1].set(**scaled_frame(robot, -0.24, 0.24, -0.2, 0.26))
@@ -92,7 +92,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
     share = on_grid(inside, np.abs(np.linalg.svd(np.swapaxes(A, -1, -2))[2][:, 2]))
-    for i, ax in enumerate(axes):
+    for i, ax in zip(range(3), axes, strict=True):
         plot_map(x, y, share[..., i], ax, vmin=0.0, vmax=1.0, bar=False)
         pair = drive_pairs(robot)[2 - i]
         plot_pair_curves(robot, ax, pairs=[pair], on_map=True)

@@ -63,7 +63,7 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
         blind = 0.65 * robot.lengths.max() * np.array([-d[1], d[0]]) / np.hypot(*d)
         for tip in (x + blind, x - blind):
             ax.annotate("", tip, x, arrowprops={"arrowstyle": "->", "color": ALARM, "lw": 1.8}, zorder=7)
-        ax.set(**scaled_frame(robot, -0.33, 0.33, -0.29, 0.36))
+        ax.set(**scaled_frame(robot, -0.33, 0.33, -0.29, 0.36, drives=True))
         ax.set_title(f"pair {pair_name(pair)}, {trajectory.t[k]:.2f} s")
         ax.label_outer()
     return axes
@@ -167,7 +167,7 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     axes[1].plot(*run.x[k], "s", color=ALARM, ms=8, zorder=6, label="end-effector")
     axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="wanted")
     axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
-    axes[0].set(**scaled_frame(robot, -0.31, 0.31, -0.31, 0.31), title=f"{run.t[k]:.2f} s")
+    axes[0].set(**scaled_frame(robot, -0.31, 0.31, -0.31, 0.31, drives=True), title=f"{run.t[k]:.2f} s")
     axes[1].set(**_box(robot, zoom, 0.088, 0.13, -0.09, -0.054), title="enlarged")
     axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
     return axes

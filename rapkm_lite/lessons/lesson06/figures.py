@@ -65,7 +65,7 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     if path is not None:
         ax.plot(*path.x.T, color=ALARM, lw=2.0, zorder=4)
     ax.grid(False)
-    ax.set(**scaled_frame(robot, -0.27, 0.27, -0.2, 0.29))
+    ax.set(**scaled_frame(robot, -0.27, 0.27, -0.2, 0.29, drives=True))
     return ax
 
 
