@@ -41,7 +41,9 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     """
     robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
-    needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max()
+    needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max(axis=1)
+    # Beside a place that two arms cannot cross no limit is wide enough.
+    needed = min(needed.max(), 10 * np.median(needed))
     usual = shared.usual_gains(robot)
     strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
 
