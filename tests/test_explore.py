@@ -1091,3 +1091,33 @@ def test_titles_and_labels_are_whole(name, robot):
         for text in (t for t in ax.findobj(Text) if t.get_text().strip() and t.get_text() in words):
             box = text.get_window_extent()
             assert 0 <= box.x0 and box.x1 <= shown.bbox.x1 and 0 <= box.y0 and box.y1 <= shown.bbox.y1, text
+
+
+def test_a_middle_out_of_reach_gives_way_to_a_place_with_room():
+    robot = rk.Manipulator([[-0.3, 0.0], [0.3, 0.0], [0.0, 0.05]], [[0.3, 0.3], [0.3, 0.3], [0.15, 0.35]], masses=0.1)
+    assert not rk.reachable(robot, robot.base.mean(axis=0))
+    for name in ("machine", "steady_state", "three_opinions", "allocation", "animation", "imperfections"):
+        assert not getattr(explore, name)(robot).problem, name
+    # A hand that pulls beyond all arms comes back to what they reach.
+    assert not explore.machine(robot).set(x=explore.machine(robot).controls["x"].max).problem
+
+
+def test_a_torque_limit_stays_one_where_the_path_is_singular():
+    """With no place of the path singular the torques stay below ten times their median."""
+    five = rk.load("five_bar")
+    robot = five.replace(base=0.5 * five.base, lengths=[[0.25, 0.2]] * 2, centers=None)
+    limit = explore.imperfections(robot).controls["limit"]
+    assert limit.max <= 4000 and explore.imperfections(five).controls["limit"].max == 400
+
+
+@pytest.mark.parametrize("times", [1e-2, 1e2])
+def test_texts_of_a_small_and_a_large_machine_keep_apart(times):
+    """Ticks below the machine, numbers on bars, titles of small panels: as long as their numbers need."""
+    for name in ("machine", "animation", "landscape", "three_opinions"):
+        for ax in (shown := laid_out(getattr(explore, name)(many_arms(3, times)))).axes:
+            low, high = ax.get_xlim()
+            ticks = [t.label1 for t in ax.xaxis.get_major_ticks() if low <= t.get_loc() <= high]
+            numbers = [t for t in ax.texts if t.get_text().strip() and t.get_bbox_patch() is None and name != "machine"]
+            for texts in (ticks, numbers if ax is not shown.axes[0] else []):
+                boxes = [t.get_window_extent().padded(-1) for t in texts]
+                assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2)), (name, texts)

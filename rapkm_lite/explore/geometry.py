@@ -43,6 +43,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     robot = shared.frictionless(robot)
     # A goes with one over the lengths.
     times = shared.size(robot)
+    digits = shared.decimals(times)
     palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
     pairs = act.drive_pairs(robot)[:3]
     modes = {mode_name(m): m for m in working_modes(robot)}
@@ -78,7 +79,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
         numbers = {
             "end-effector": f"({1e3 * point[0]:z.0f}, {1e3 * point[1]:z.0f}) mm",
             "degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
-            "σ_min of all drives": f"{act.singular_values(A)[1]:.2f} rad/m",
+            "σ_min of all drives": f"{act.singular_values(A)[1]:.{digits}f} rad/m",
         }
         chains = arm_points(robot, q)
         from_parallel = np.degrees(np.arcsin(np.minimum(np.abs(act.distal_cross_products(robot, q)), 1.0)))
@@ -88,10 +89,10 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             for i in pair if weak else ():
                 picture.line(name, *chains[i, 1:].T, color=ALARM, linewidth=11, alpha=0.35, zorder=2.5)
             marks.draw_machine(picture, name, robot, q, arms=pair, names=False)
-            words = f"{pair_name(pair)}: {value:.2f} rad/m" + f",\n{angle:.0f}° from parallel" * bool(weak)
+            words = f"{pair_name(pair)}: {value:.{digits}f} rad/m" + f",\n{angle:.0f}° from parallel" * bool(weak)
             look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
             picture.title(name, words, fontsize=10, **look)
-            numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.2f} rad/m"
+            numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.{digits}f} rad/m"
         return numbers
 
     plane = plane_limits(robot, 0.05)
@@ -115,7 +116,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     '4.62 rad/m'
     """
     robot = shared.frictionless(robot)
-    pairs = act.drive_pairs(robot)
+    pairs, digits = act.drive_pairs(robot), shared.decimals(shared.size(robot))
     name, shown, about = "Null vector", "component", ""
     if robot.n_arms != 3:
         name, shown = "Null space", "share of each drive"
@@ -161,9 +162,9 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
             "point": f"({1e3 * t.x[k, 0]:z.0f}, {1e3 * t.x[k, 1]:z.0f}) mm",
-            "σ_min of all drives": f"{act.singular_values(A[k])[1]:.2f} rad/m",
-            "σ_min of the pairs": marks.per_drive(sigma[k], 2) + " rad/m",
-            "worst on this path": f"{sigma[worst]:.3f} rad/m, pair {pair_name(pairs[worst[1]])}",
+            "σ_min of all drives": f"{act.singular_values(A[k])[1]:.{digits}f} rad/m",
+            "σ_min of the pairs": marks.per_drive(sigma[k], digits) + " rad/m",
+            "worst on this path": f"{sigma[worst]:.{digits + 1}f} rad/m, pair {pair_name(pairs[worst[1]])}",
             name[0].lower() + name[1:]: marks.per_drive(null[k], 2),
         }
 

@@ -173,6 +173,10 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     cost = shared.usual_gains(robot)[0] ** 2 * (trace(120, 40) or trace(20, 0) or 1e-3)
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     digits = max(0, 2 - math.ceil(math.log10(2.0 * levels[0])))
+
+    def energy(value: float, more: int = 0) -> str:
+        return f"{value:.{digits + more}f}" if digits < 5 and levels[0] < 1e5 else f"{value:.2g}"
+
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
@@ -207,7 +211,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         shares = costs * (directions.T @ dq) ** 2
         for k, share in enumerate(shares):
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
-            picture.text("shares", k + 1, share, f"{share:.{digits}f}", ha="center", va="bottom", fontsize=9)
+            picture.text("shares", k + 1, share, energy(share), ha="center", va="bottom", fontsize=9)
         picture.fit("shares", 1.2 * shares, symmetric=False, least=levels[0])
         step = min(0.22, 0.88 / robot.n_arms)
         directions *= np.where(directions.sum(axis=0) < 0, -1, 1)
@@ -218,9 +222,9 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")
         return {
-            "antagonistic energy": f"{dq @ S @ dq:.{digits}f} J",
-            "trace of S": f"{np.trace(S):.{digits + 1}f} J/mrad²",
-            "principal costs": " / ".join(f"{c:.{digits + 1}f}" for c in np.maximum(costs, 0)) + " J/mrad²",
+            "antagonistic energy": energy(dq @ S @ dq) + " J",
+            "trace of S": energy(np.trace(S), 1) + " J/mrad²",
+            "principal costs": " / ".join(energy(c, 1) for c in np.maximum(costs, 0)) + " J/mrad²",
         }
 
     arms = [(words, {"color": look["color"], "linewidth": 7}) for words, look in marks.drive_lines(robot)]

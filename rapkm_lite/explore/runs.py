@@ -21,7 +21,17 @@ from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import SimulationError, simulate
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import curves, fitting_triangle, frictionless, gain_slider, over_time, ready_made, size, usual_gains
+from .shared import (
+    curves,
+    fitting_triangle,
+    frictionless,
+    gain_slider,
+    over_time,
+    ready_made,
+    rounded,
+    size,
+    usual_gains,
+)
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
@@ -107,8 +117,8 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     unit, largest = 0.25 / times, 0.0
     with suppress(SimulationError):
         largest = np.linalg.norm(recorded("off", True)[1], axis=-1).max()
-    while largest > 4 * unit:
-        unit *= 2
+    if largest > 4 * unit:
+        unit = 2 * rounded(largest / 4)
     scale, wide = 0.1 * times / unit, 0.009 * times
 
     def draw(picture, time, filter, offsets):
@@ -124,7 +134,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
                 style = arm_line(i) if panel == "torque" else {"color": AFTER}
                 picture.trace(panel, run.t, column, **style)
                 picture.line(panel, run.t[k], column[k], marker="o", markersize=6, color=style["color"], zorder=5)
-            picture.fit(panel, values, symmetric=panel == "torque", least=0.5)
+            picture.fit(panel, values, symmetric=panel == "torque", least=0.5 if panel == "torque" else 0.5 * times)
             picture.line(panel, run.t[[k, k]], picture.ylim(panel), color=NEUTRAL, linewidth=0.9, zorder=1)
             picture.handle(panel, run.t[k], None, time=(1e3, 0))
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
@@ -191,7 +201,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         pressing = 1e3 * null
         for values, (_, look) in zip(off.T, axes, strict=True):
             picture.trace("way", way[:there], values, **look)
-        picture.fit("way", off, least=1.0)
+        picture.fit("way", off, least=size(robot))
         curves(picture, "torque", done.t, pressing, 5.0)
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
         return {

@@ -42,13 +42,22 @@ def frictionless(robot: Manipulator | None) -> Manipulator:
 def size(robot: Manipulator) -> float:
     """Width of the workspace relative to the testbed's, rounded to 1, 2 or 5 times a power of ten."""
     left, right, low, high = sampling_box(robot)
-    return _rounded(max(min(right - left, high - low), 1e-6) / 0.4)
+    return rounded(max(min(right - left, high - low), 1e-6) / 0.4)
 
 
-def _rounded(ratio: float) -> float:
+def rounded(ratio: float) -> float:
     """1, 2 or 5 times a power of ten, that is at most 1.25 times the ratio."""
     power = 10 ** math.floor(math.log10(1.25 * ratio))
     return next(n for n in (5, 2, 1) if n * power <= 1.25 * ratio) * power
+
+
+def decimals(times: float) -> int:
+    """Decimals of a singular value in rad/m, two on the testbed, on a machine so many times as large.
+
+    >>> [decimals(times) for times in (0.01, 0.5, 1, 2, 100)]
+    [0, 2, 2, 2, 4]
+    """
+    return max(0, 2 + round(math.log10(times)))
 
 
 def carried(robot: Manipulator) -> float:
@@ -70,7 +79,7 @@ def carried(robot: Manipulator) -> float:
 
 def usual_gains(robot: Manipulator) -> tuple[float, float]:
     """K_P in N m/rad and K_D in N m s/rad that make a machine about as fast as the testbed's make the testbed."""
-    heavier = _rounded(carried(robot) / carried(load()))
+    heavier = rounded(carried(robot) / carried(load()))
     return heavier * 7.05, heavier * 0.225
 
 
@@ -104,12 +113,13 @@ def central_triangle(robot: Manipulator, side: float, **times) -> Trajectory:
 def fitting_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
     """The central triangle where no slider changes it, 240 mm on the testbed and 160 on two of its arms.
 
-    Where an arm does not reach it, a smaller one.
+    Where an arm does not reach it, a smaller one, or one at the place with the most room.
     """
     side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
-    for part in (1.0, 0.8, 0.6, 0.4):
-        with suppress(ValueError):
-            return central_triangle(robot, part * side, **times)
+    for place in (marks.middle, marks.roomiest):
+        for part in (1.0, 0.8, 0.6, 0.4, 0.2):
+            with suppress(ValueError):
+                return triangle(robot, 1e-3 * part * side, centre=place(robot), **times)
     return central_triangle(robot, 0.2 * side, **times)
 
 
@@ -169,9 +179,9 @@ def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN 
 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of a run from the wanted place (k,) in mm, and torques (k, N) in mN m; least: limits of both panels."""
+    """Distance of a run from the wanted place (k,) in mm, and torques (k, N) in mN m; least: limits on the testbed."""
     off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
-    picture.fit("error", off, symmetric=False, least=least[0])
+    picture.fit("error", off, symmetric=False, least=least[0] * size(run.robot))
     curves(picture, "torque", run.t, torque, least[1])
     return off, torque

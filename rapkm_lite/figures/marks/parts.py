@@ -113,10 +113,10 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
 def _bar_words(value: float, form: str) -> str:
     """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart.
 
-    >>> _bar_words(-11750.04, ".1f")
-    '−11750'
+    >>> _bar_words(-11750.04, ".1f"), _bar_words(23517667.0, ".1f")
+    ('−11750', '2.35e+07')
     """
-    form = form if abs(value) < 1000 else ".0f"
+    form = form if abs(value) < 1000 else ".0f" if abs(value) < 1e6 else ".3g"
     return re.sub("^−(?=[0.]+$)", "", format(np.round(value, 9), form).replace("-", "−"))
 
 

@@ -17,14 +17,18 @@ def workspace_outline(robot) -> np.ndarray:
     left, right, low, high = sampling_box(robot)
     wide, tall = 0.01 * (right - left), 0.01 * (high - low)
     x, y = np.linspace(left - wide, right + wide, 161), np.linspace(low - tall, high + tall, 161)
-    reach = np.linalg.norm(np.stack(np.meshgrid(x, y), axis=-1)[..., None, :] - robot.base, axis=-1)
+    rings = contour_generator(x, y, _room(robot, np.stack(np.meshgrid(x, y), axis=-1))).lines(0.0)
+    parts = [part for ring in rings for part in (np.asarray(ring), np.full((1, 2), np.nan))]
+    return np.concatenate([*parts, np.empty((0, 2))])[:-1]
+
+
+def _room(robot: Manipulator, points) -> np.ndarray:
+    """How far points (..., 2) are from where an arm is stretched or folded, (...,) in m; negative outside."""
+    reach = np.linalg.norm(points[..., None, :] - robot.base, axis=-1)
     l1, l2 = robot.lengths.T
     inner = np.abs(l1 - l2)
     # Arms of equal links reach their own base, a single point that would only dent the outline.
-    room = np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
-    rings = contour_generator(x, y, room).lines(0.0)
-    parts = [part for ring in rings for part in (np.asarray(ring), np.full((1, 2), np.nan))]
-    return np.concatenate([*parts, np.empty((0, 2))])[:-1]
+    return np.minimum(l1 + l2 - reach, np.where(inner > 1e-9, reach - inner, np.inf)).min(axis=-1)
 
 
 def middle(robot: Manipulator) -> np.ndarray:
@@ -40,11 +44,21 @@ def middle(robot: Manipulator) -> np.ndarray:
     return centre + np.array([-along[1], along[0]]) / np.sqrt(12)
 
 
+def roomiest(robot: Manipulator) -> np.ndarray:
+    """The place (2,) in m of a grid from which all arms can go on farthest; ValueError where there is none."""
+    points = grid_points(robot, 41)[3]
+    return points[np.argmax(_room(robot, points))]
+
+
 def clamped(robot: Manipulator, point) -> np.ndarray:
-    """The point (2,) in m, or the last one that all arms reach on the way to it from the middle of the drives."""
+    """The point (2,) in m, or the last one that all arms reach on the way to it.
+
+    The way begins in the middle of the drives, or, where that is out of reach, in `roomiest`.
+    """
     if reachable(robot, point):
         return np.asarray(point)
     start = robot.base.mean(axis=0)
+    start = start if reachable(robot, start) else roomiest(robot)
     low, high = 0.0, 1.0
     for _ in range(40):
         half = (low + high) / 2

@@ -54,6 +54,9 @@ def figure(picture: Picture, problem: str = "") -> Figure:
             frame = picture.frames[name]
             ax.set(**settings | {"xlim": frame[:2], "ylim": frame[2:]})
             ax.set_autoscale_on(False)
+            digits = max(map(len, ax.xaxis.get_major_formatter().format_ticks(ax.get_xticks())), default=0)
+            if digits > 5 and "xticks" not in settings:
+                ax.locator_params(axis="x", nbins=4)  # Matplotlib has room for three digits in mind
             # As on the canvas, without ticks there are no axes.
             if len(ax.get_xticks()) == 0:
                 ax.spines[:].set_visible(False)
