@@ -54,7 +54,7 @@ def figure(picture: Picture, problem: str = "") -> Figure:
             frame = picture.frames[name]
             ax.set(**settings | {"xlim": frame[:2], "ylim": frame[2:]})
             ax.set_autoscale_on(False)
-            digits = max(map(len, ax.xaxis.get_major_formatter().format_ticks(ax.get_xticks())), default=0)
+            digits = max(map(len, ax.xaxis.get_major_formatter().format_ticks(list(ax.get_xticks()))), default=0)
             if digits > 5 and "xticks" not in settings:
                 ax.locator_params(axis="x", nbins=4)  # Matplotlib has room for three digits in mind
             # As on the canvas, without ticks there are no axes.
@@ -62,9 +62,9 @@ def figure(picture: Picture, problem: str = "") -> Figure:
                 ax.spines[:].set_visible(False)
         for mark in [*picture.fixed, *picture.marks]:
             _PAINT[mark.kind](axes[mark.panel], mark)
-        if any(mark.kind == "scale" for mark in picture.fixed):
+        if any(mark.kind == "scale" for mark in picture.fixed) and (engine := made.get_layout_engine()):
             # A colour bar takes room from axes of equal scales, whose title is then above the place it had.
-            made.get_layout_engine().execute(made)
+            engine.execute(made)
         if problem:
             box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
             words = textwrap.fill(problem, int(10 * picture.size[0]))
