@@ -603,6 +603,21 @@ def test_antagonistic_energy_is_quadratic_in_the_offsets():
     assert tangent @ form @ tangent < 1e-12 * np.linalg.norm(form) * (tangent @ tangent)
 
 
+def test_antagonism_of_unlike_motors_costs_the_heat_of_each_by_its_own_resistance():
+    """Their definitions at 200 Hz: R (c / k_t)^2 dt of the torques at rest, and of n n^T c in a run, motor by motor."""
+    robot = FRICTIONLESS.replace(resistance=[0.05, 0.6, 3.0], torque_constant=[0.02, 0.03, 0.04])
+    path, offset = rk.circle(robot, 0.06, 1.0, 5e-3), np.array([0.004, -0.002, 0.005])
+    motors = (0.05, 0.02), (0.6, 0.03), (3.0, 0.04)
+    heat = lambda c: sum(R * np.sum((c[:-1, i] / k_t) ** 2) * 5e-3 for i, (R, k_t) in enumerate(motors))  # noqa: E731
+    S = rk.antagonism_form(robot, path, [5.0, 6.0, 7.0])
+    at_rest = rk.steady_state_torque(rk.control_matrix(robot, path.q), [5.0, 6.0, 7.0], offset)
+    assert_allclose(offset @ S @ offset, heat(at_rest), rtol=1e-12)
+    assert_allclose(S, S.T, rtol=1e-12)
+    run = rk.simulate(robot, rk.PD(7.05, 0.225), path, offset)
+    n = rk.null_vector(robot, run.q)
+    assert_allclose(rk.antagonistic_energy(run), heat(n * np.vecdot(n, run.c)[:, None]), rtol=1e-12)
+
+
 def test_table_1_measured_and_simulated():
     table = rk.table1()
     assert_allclose(table.measured, [[1.3347, 1.5414, 1.6844], [0.4574, 0.7010, 1.0801]])

@@ -159,6 +159,7 @@ def test_thin_matrices_are_left_to_factorizations_whatever_their_size():
     thin = np.array([[1.0, 0.0], [1.0, 1e-7], [1.0, 0.0]])
     for size in (1e-4, 1.0, 1e4):
         assert many_inverses(size * thin[None]) is None
+        assert many_inverses(size * np.stack([np.eye(3, 2), thin])) is None  # one of many is enough
         assert many_inverses(size * np.eye(3, 2)[None]) is not None
 
 
@@ -184,6 +185,15 @@ def test_each_matrix_of_a_stack_has_its_own_rows():
         rk.explicit_pseudoinverse(A, np.array([[[0, 3], [3, 3]]]))
     with pytest.raises(ValueError, match=r"rows holds \[0, 4\]; allowed: different indices from 0 to 3"):
         rk.explicit_pseudoinverse(A[0], np.array([[0, 4], [0, 1]]))
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_one_singular_choice_among_many_is_refused_with_its_measure(at):
+    """J = (1, x): q1' = -x q2' serves for any x, q2' = -q1' / x for x = 1 and not for x = 1e-13."""
+    J = np.array([[[1.0, 1e-13]], [[1.0, 1.0]]])[[at, 1 - at]]
+    with pytest.raises(ValueError, match=r"independent = \(0,\) is singular here: its .* is 1e-13, needed: >= 1e-12"):
+        rk.complement(J, (0,))
+    assert_allclose(rk.complement(J, (1,)), [[[-x], [1.0]] for x in J[:, 0, 1]], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("m", [3, 4, 5, 6, 7])
