@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from samples import FRICTIONLESS, MACHINES, TESTBED, norm, random_motion, random_points
+from samples import FRICTIONLESS, MACHINES, TESTBED, machines, norm, random_motion, random_points
 from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
@@ -386,6 +386,17 @@ def test_third_term_of_the_lyapunov_function(gains):
     assert_allclose(V[1] - V[0], 1.5 * np.einsum("ki,kij,kj->k", e, G, ed), rtol=1e-12)
     with pytest.raises(ValueError, match="eps = -1; allowed: >= 0"):
         rk.lyapunov_function(ROBOT, q, e, ed, 40.0, eps=-1.0)
+
+
+@machines
+def test_lyapunov_function_of_any_number_of_arms_is_an_energy(robot):
+    """For tangent rates the kinetic one, and that of a spring at every drive, or at every joint."""
+    q, qd, _, _ = random_motion(robot, 5, bend=0.2)
+    N, e = robot.n_arms, 0.01 * np.cos(np.arange(10 * robot.n_arms)).reshape(5, -1)
+    kinetic, springs = rk.kinetic_energy(robot, q, qd), np.linspace(20.0, 50.0, N)
+    driven = (springs * e[:, :N] ** 2).sum(axis=-1) / 2
+    assert_allclose(rk.lyapunov_function(robot, q, e, qd, springs), kinetic + driven, rtol=1e-9)
+    assert_allclose(rk.lyapunov_function(robot, q, e, qd, 40.0), kinetic + 20.0 * (e**2).sum(axis=-1), rtol=1e-9)
 
 
 def test_gains_29_on_the_driven_joints():
