@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED
 from rapkm_lite.mechanics.actuation import distal_cross_products, drive_pairs
-from rapkm_lite.simulation.explain import _difference
+from rapkm_lite.simulation.explain import _difference, _seen
 from rapkm_lite.simulation.growth import growth, magnified, swung
 from rapkm_lite.simulation.setup import prepare
 
@@ -591,6 +591,26 @@ def test_what_is_seen_of_sensors_is_named_from_a_bound_on(options, words, named)
     """Ten samples of delay, a tenth of a radian: a law of a user, lost for its sign, is not run again."""
     said = lost(law=lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a), path=HOLD, **({"offset": OFFSET} | options))
     assert (words in said) == named
+
+
+@pytest.mark.parametrize("dt", [2e-4, 4e-3])
+def test_what_is_said_of_samples_is_said_of_those_of_the_path(dt):
+    """Ten samples of delay; K_D dt = 4 in xdd = -(K_P dx + K_D v), whose hold is dx + dt v + dt^2/2 xdd, v + dt xdd."""
+    path = rk.hold(ROBOT, [0.0, 0.0], 0.4, dt)
+    wrong = lambda t, q_a, qd_a, d: 60.0 * (q_a - d.q_a)  # noqa: E731
+    for samples in (7, 15):
+        said = lost(law=wrong, path=path, offset=OFFSET, velocity_filter=samples * dt)
+        assert ("delays the rates by many samples" in said) == (samples > 10)
+    K_P, K_D = 0.5 / dt**2, 4.0 / dt
+    step = [[1.0 - dt**2 / 2 * K_P, dt - dt**2 / 2 * K_D], [-dt * K_P, 1.0 - dt * K_D]]
+    factor = np.abs(np.linalg.eigvals(step)).max()
+    words = f"the sampled loop magnifies an error {factor:.3g}-fold per sample of {dt:g} s"
+    assert words in lost(law=rk.CTC(K_P, K_D, None), path=path, offset=OFFSET)
+    # Torques that were quiet for thirty samples, and swung from the one on at which a drive died.
+    c, dead = np.ones((42, 3)), rk.DeadDrive(0, 30 * dt)
+    c[30:] *= (-2.0) ** np.arange(12)[:, None]
+    found = list(_seen(prepare(ROBOT, path, rk.Sensors(), faults=[dead]), [dead], c))
+    assert found[0].startswith(f"{dead!r} acts from") and "unstable gain" in found[1]
 
 
 @pytest.mark.parametrize("size", [0.1, 0.2, 0.4])

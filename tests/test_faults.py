@@ -443,6 +443,10 @@ def test_the_same_in_a_data_file(tmp_path):
     )
     assert given.run() == run and not run.c[100:, 1].any()
     assert rk.experiment(file) == given == pickle.loads(pickle.dumps(given))
+    # At 1 kHz, where nothing else is asked for.
+    assert (given.trajectory.dt, len(given.trajectory)) == (1e-3, 301)
+    file.write_text(TOML.replace("[path]", "dt = 5e-3\n[path]"))
+    assert (rk.experiment(file).trajectory.dt, len(rk.experiment(file).trajectory)) == (5e-3, 61)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
