@@ -152,6 +152,14 @@ def late(path, samples=20):
     return path.with_set_points(np.concatenate([path.q_a[:1].repeat(samples, 0), path.q_a[:-samples]]))
 
 
+@pytest.mark.parametrize("dt", [2e-4, 5e-3])
+def test_rates_of_set_points_are_their_differences_over_the_sampling_time(dt):
+    """Drives that move as fast as in q_a = q_a(0) + w t, at any sampling time."""
+    path, w = rk.hold(TESTBED, [0.02, 0.03], 100 * dt, dt), np.array([0.3, -0.2, 0.1])
+    moved = path.with_set_points(path.q_a + w * path.t[:, None])
+    assert_allclose(moved.qd_a, np.broadcast_to(w, (101, 3)), rtol=0, atol=1e-10)
+
+
 def test_set_points_stay_as_far_from_the_path_for_another_machine():
     """q - q(x) is kept, q(x) the closed angles: there and back are the set-points, which are those of no x."""
     own, other = MACHINES["asymmetric"], TESTBED
