@@ -215,10 +215,11 @@ def test_rates_of_another_motion_are_refused(factor):
         rk.follow(TESTBED, path.t, path.x, factor * path.xd, path.xdd)
 
 
+@pytest.mark.parametrize("way", [0.0, 0.3, np.pi / 4, 2.0])
 @pytest.mark.parametrize(("factor", "taken"), [(0.895, False), (0.905, True), (1.105, True), (1.115, False)])
-def test_rates_may_err_by_a_tenth_of_the_larger_one_of_the_steps_made_and_meant(factor, taken):
-    """Steps of 1 that are said to be f: |1 - f| <= max(1, f) / 10 is 9/10 <= f <= 10/9."""
-    t, v = np.linspace(0.0, 1.0, 101), np.array([0.06, 0.0])
+def test_rates_may_err_by_a_tenth_of_the_larger_one_of_the_steps_made_and_meant(factor, taken, way):
+    """Steps of 1 that are said to be f: |1 - f| <= max(1, f) / 10 is 9/10 <= f <= 10/9, whatever their direction."""
+    t, v = np.linspace(0.0, 1.0, 101), 0.06 * np.array([np.cos(way), np.sin(way)])
     given = TESTBED, t, t[:, None] * v, np.tile(factor * v, (101, 1)), np.zeros((101, 2))
     if taken:
         assert_allclose(rk.follow(*given).xd[50], factor * v, rtol=1e-12)
