@@ -288,6 +288,21 @@ def test_the_small_one_of_two_motors_gives_all_it_has_or_the_distance_of_the_lim
         assert_allclose(c, [1.0, 0.9 * (1.0 + far) - 1.0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("far", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
+def test_a_limit_far_above_the_others_is_as_good_as_none(far):
+    """By hand: of two drives that act alike together with a third, the torques along (1, 1, -1), whatever is far."""
+    A = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    for limit, wrench, c0, want in (
+        ([1.0 / far, 1.0, 1.0], [0.5, 0.5], [0.0, 0.0, 0.0], [1.0 / far, 1.0 / far, 0.5 - 1.0 / far]),
+        ([1.0, 1.0, far], [2.0, 1.0], [2.0, 2.0, -2.0], [1.0, 0.0, 1.0]),
+        ([1.0, 1.0, far], [0.5, 0.5], [2.0, 2.0, -2.0], [1.0, 1.0, -0.5]),
+        ([far, 1.0, far], [0.0, 1.2], [2.0, 2.0, -2.0], [-0.2, 1.0, 0.2]),
+    ):
+        c = rk.allocate_torques(A, wrench, limit, prestress=c0)
+        assert_allclose(c, want, rtol=0, atol=2e-12)
+        assert_allclose(A.T @ c, wrench, rtol=0, atol=2e-12)
+
+
 def test_forces_near_the_corners_of_far_limits_are_right_or_refused():
     """A corner is the force of all limits with the signs of A u, and what lies inside needs no more: A^T c = f."""
     rng, reached = np.random.default_rng(0), 0

@@ -57,24 +57,26 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
             f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} at least; allowed: a wrench "
             "inside the force polygon of the limits"
         )
-    # c / limit = best + n z with |z|^2 the cost above the best one, as a share of the largest weight, and the limits as
-    # G z >= h.  On the edge of the force polygon rounding would leave nothing between them, though drives that hold no
-    # part of the edge are free there.
-    share = limit / limit.max()
-    n, weight, best = cores.null_space(share[:, None] * A), share[:, None] * W * share, best / limit
-    n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ (weight / weight.max()) @ n)).T
-    wide = 1.0 + (1e-12 if peak > 1.0 - 1e-9 else 0.0)
+    # c = best + n z with |z|^2 the cost above the best one, as a share of the largest weight, and the limits as
+    # G z >= h, with rows of length 1 and so h the distances to them.  On the edge of the force polygon rounding would
+    # leave nothing between them, though drives that hold no part of the edge are free there.
+    n = cores.null_space(A)
+    n = n @ np.linalg.inv(np.linalg.cholesky(n.T @ (W / np.abs(W).max()) @ n)).T
+    wide = limit * (1.0 + (1e-12 if peak > 1.0 - 1e-9 else 0.0))
     G, h = np.concatenate([-n, n]), np.concatenate([best - wide, -best - wide])
-    size = np.abs(h).max()
+    length = np.linalg.norm(G, axis=1)
+    length = np.maximum(length, 1e-15 * length.max())
+    G, h = G / length[:, None], h / length
+    size = h.max() if h.max() > 0.0 else 1.0
     try:
         u, _ = nnls(np.vstack([G.T, h / size]), np.append(np.zeros(n.shape[1]), 1.0))
         r, slack = G.T @ u, 1.0 - h @ u / size
     except (RuntimeError, np.linalg.LinAlgError):  # SciPy 1.14 may go round in circles
         slack = 0.0
     # Where rounding leaves nothing to divide by, torques of least peak.
-    c = limit * np.clip(best + n @ r / slack * size if slack > 1e-12 else edge / limit, -1.0, 1.0)
+    c = np.clip(best + n @ r / slack * size if slack > 1e-12 else edge, -limit, limit)
     # Near the edge rounding is magnified, and what was clipped may make another force.
-    missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * limit[:, None]).max()
+    missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * c[:, None]).max()
     if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
         raise ValueError(
             f"prestress = {c0.tolist()} is so far beyond limit = {limit.tolist()}, or these are so far apart, that "
