@@ -62,6 +62,28 @@ def test_values_are_equal_by_value():
     assert Sample(float("nan")) == Sample(float("nan")) and hash(Sample(float("nan"))) == hash(Sample(float("nan")))
 
 
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ([1.0, -0.0], np.array([1, 0])),
+        (((1, 2), (3, 4)), np.array([[1.0, 2.0], [3.0, 4.0]])),
+        ([np.ones(2), np.ones(2)], np.ones((2, 2))),
+        ([1.0, np.nan], np.array([1.0, np.nan], dtype=np.float32)),
+        (["a", "b"], np.array(["a", "b"], dtype="U5")),
+        ([None, 1], np.array([None, 1], dtype=object)),
+        (np.array([1.0, 2.0]), np.array([1, 2], dtype=complex)),
+        (np.array(2**53 + 1), 2**53 + 1),
+        (np.array(2**53 + 1), 2.0**53),
+        ({1}, frozenset({1})),
+        (list(range(500)), np.arange(500.0)),
+    ],
+)
+def test_values_that_hold_lists_and_arrays_of_the_same_have_one_hash(one, other):
+    """What Python asks of any hash: a == b means hash(a) == hash(b)."""
+    assert Sample(extra=one, numbers=1.0) == Sample(extra=other, numbers=1.0)
+    assert hash(Sample(extra=one, numbers=1.0)) == hash(Sample(extra=other, numbers=1.0))
+
+
 def test_nan_of_either_sign_is_one_key():
     minus, plus = np.array([np.copysign(np.nan, -1.0), 1.0]), np.array([np.nan, 1.0])
     assert minus.tobytes() != plus.tobytes()

@@ -10,6 +10,9 @@ import numpy as np
 
 from .arguments import masked
 
+_LOOKED_AT = 64
+"""Items of an array or tuple that count in a hash; of more, three stand for all."""
+
 
 def equal(a: Any, b: Any, begun: frozenset = frozenset()) -> bool:
     """Are two things of the same kind equal, whatever they hold?  NaN equals NaN.
@@ -43,17 +46,18 @@ def key(value: Any) -> Any:
     (True, True)
     """
     if isinstance(value, np.ndarray):
-        numbers = np.ma.filled(value, 0) if masked(value) else value
-        if numbers.dtype.kind in "biuf":
-            numbers = numbers.astype(float)
-            numbers = np.where(np.isnan(numbers), np.nan, numbers + 0.0)
-        return numbers.item() if value.ndim == 0 else (value.shape, numbers.tobytes())
-    if isinstance(value, tuple):
-        return tuple(map(key, value))
+        value = np.ma.filled(value, 0) if masked(value) else value
+        value = value if value.ndim else value[()]
+    if isinstance(value, tuple | np.ndarray):  # tuples may equal arrays
+        items = value if len(value) <= _LOOKED_AT else (len(value), *(value[k] for k in (0, len(value) // 2, -1)))
+        return tuple(map(key, items))
+    if isinstance(value, set | frozenset):
+        return frozenset
     if _decides(value):
         try:
             hash(value)
-            return math.nan if isinstance(value, float) and value != value else value
+            value = float(value) if isinstance(value, int | np.integer) else value  # 2**53 + 1 in an array of floats
+            return math.nan if isinstance(value, float | np.inexact) and value != value else value
         except Exception:
             pass
     return type(value)  # an object may change, its hash may not
