@@ -352,6 +352,18 @@ def test_a_panel_in_which_no_curve_is_left_has_limits_too():
     assert hidden.ylim("a") == gaps.ylim("a")
 
 
+def test_a_weight_is_positive_definite_in_any_units_of_the_drives():
+    """Told as a diagonal or as a matrix it is one weight; torques S c in other units have S^-1 A and S^-1 W S^-1."""
+    far = np.array([1e-9, 1e9, 1.0])
+    assert np.array_equal(rk.weighted_pseudoinverse(A, np.diag(far)), rk.weighted_pseudoinverse(A, far))
+    W, S = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.3], [0.0, 0.3, 1.0]]), np.diag([1e4, 1.0, 1e-4])
+    told = rk.weighted_pseudoinverse(np.linalg.inv(S) @ A, np.linalg.inv(S) @ W @ np.linalg.inv(S))
+    assert_allclose(np.linalg.inv(S) @ told, rk.weighted_pseudoinverse(A, W), rtol=1e-9)
+    for wrong in (np.ones((3, 3)), np.diag([1.0, 0.0, 1.0]), [[1e9, 1.0, 0.0], [1.0, 1e-9, 0.0], [0.0, 0.0, 1.0]]):
+        with pytest.raises(ValueError, match=r"W has the eigenvalue .*; allowed: symmetric positive definite"):
+            rk.weighted_pseudoinverse(A, wrong)
+
+
 def test_each_weight_of_a_stack_is_judged_by_its_own_size():
     """With a multiple of the identity, (A^T)_W^+ is the pseudoinverse of A^T, whatever the multiple."""
     weights = np.array([1e-3, 1e12])[:, None, None] * np.eye(3)

@@ -185,8 +185,9 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     largest, skew = (np.abs(part).max(axis=(-2, -1), initial=0.0) for part in (array, array - array.mT))
     if skew := np.where(skew > 1e-12 * largest, skew, 0.0).max(initial=0.0):
         raise ValueError(f"{name} is not symmetric (by {skew:.3g}); allowed: symmetric positive definite")
-    least = np.linalg.eigvalsh(array).min(axis=-1, initial=np.inf)
-    if (least := np.where(least <= np.maximum(1e-14 * largest, _LEAST), least, np.inf).min(initial=np.inf)) < np.inf:
+    unit = np.sqrt(np.maximum(np.diagonal(array, axis1=-2, axis2=-1), _LEAST))  # far units are no loss of rank
+    if np.linalg.eigvalsh(array / unit[..., None] / unit[..., None, :]).min(initial=np.inf) <= 1e-14:
+        least = np.linalg.eigvalsh(array).min()
         raise ValueError(f"{name} has the eigenvalue {least:.3g}; allowed: symmetric positive definite")
     return array
 
