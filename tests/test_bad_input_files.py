@@ -88,6 +88,20 @@ def test_a_mark_before_the_first_line_is_no_part_of_the_file(tmp_path):
     assert read[0] == read[1]
 
 
+@pytest.mark.parametrize("line", [1, 2, 3])
+def test_a_field_of_a_log_ends_in_its_line(tmp_path, line):
+    """A quoted field may go on in the next line; then lines would no longer be records."""
+    lines = ["t in s,q1 measured in rad,q1 desired in rad,c1 in N m", "0,0.5,0,0", "1,0.5,0,0", "2,x,0,0"]
+    cells = lines[line - 1].split(",")
+    lines[line - 1] = ",".join([cells[0], f'"{cells[1]}\n"', *cells[2:]])
+    file = tmp_path / "own.csv"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(
+        ValueError, match=rf"the log 'own.csv', line {line}, column 2 .*holds '{cells[1]}\\n'; allowed: "
+    ):
+        rk.read_log(file)
+
+
 @pytest.mark.parametrize("number", ["1_0", "1_0.5", "0.1_5", "1e1_0"])
 def test_numbers_of_a_log_hold_no_underscore(tmp_path, number):
     """Python reads them so: float("1_0") is 10."""

@@ -136,7 +136,7 @@ def _names(path: Path, header: list[str]) -> list[str]:
     """The names of the columns; raises ValueError for others."""
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
-    names = [name.strip() for name in header]
+    names = [name.strip(" \t") for name in header]
     drives = max(sum(name.endswith(end) for name in names) for end in ("measured in rad", "desired in rad", "in N m"))
     wanted = columns(drives or max((len(header) - 1) // 3, 1))
     for column, (name, want) in enumerate(itertools.zip_longest(names, wanted), 1):
@@ -159,8 +159,8 @@ def _numbers(path: Path, header: list[str], number: int, line: list[str]) -> lis
     for column, (name, text) in enumerate(zip(header, line, strict=True), 1):
         try:
             row.append(float(text))
-            # Python reads 1_0 as 10; in a file an underscore between digits is a typo.
-            fine = abs(row[-1]) < 1e100 and "_" not in text
+            # Python reads 1_0 as 10, and a number with a quoted line break: in a file these are typos.
+            fine = abs(row[-1]) < 1e100 and not set("_\r\n") & set(text)
         except ValueError:
             fine = False
         if not fine:
