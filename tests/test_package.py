@@ -74,6 +74,15 @@ def test_a_reader_that_has_enough_is_no_error_to_tell():
     assert done.returncode == 1 and done.stderr == b""
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full, as Linux has")
+def test_a_full_device_is_told_in_a_sentence():
+    own = [sys.executable, "-m", "rapkm_lite"]
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(own, stdout=full, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert done.returncode == 1
+    assert done.stderr.startswith(b"the output cannot be written (No space left") and done.stderr.count(b"\n") == 1
+
+
 def test_lessons_are_copied_without_outputs_and_solutions(tmp_path):
     target = tmp_path / "my lessons"
     assert command("lessons", str(target)).returncode == 0
