@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -360,6 +361,13 @@ def test_numbers_of_poses_that_do_not_fit_are_named():
 def test_a_machine_without_moments_of_inertia_is_refused_for_mujoco():
     with pytest.raises(ValueError, match=r"inertias of arm 1 are 0 and .*; allowed: 1e-14"):
         rk.to_mjcf(rk.load().replace(inertias=0.0, load=0.0))
+
+
+@pytest.mark.parametrize("letter", ["\x01", "\x00", "\n", "\x7f", "\ud800", "\ufffe"])
+def test_a_name_with_letters_that_xml_has_not_is_written_without(letter):
+    """XML 1.0 allows no control characters, halves of pairs or non-characters, not even escaped (its section 2.2)."""
+    text = rk.to_mjcf(rk.load().replace(name=f"my{letter}rig"))
+    assert ElementTree.fromstring(text.encode("utf-8")).get("model") == "my rig"
 
 
 def test_stiffness_of_a_path_is_that_of_its_poses():

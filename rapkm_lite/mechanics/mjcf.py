@@ -52,8 +52,9 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     rates = "".join(f'    <jointvel name="qd{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
     # A tree is read arm by arm: base1 elbow1 base2 elbow2 ...
     start = f'  <keyframe><key name="start" qpos="{_row(pose.reshape(2, N).T.ravel())}"/></keyframe>\n'
+    name = "".join(letter if letter.isprintable() else " " for letter in robot.name)  # XML has no control characters
     return (
-        f"<mujoco model={quoteattr(robot.name)}>\n"
+        f"<mujoco model={quoteattr(name)}>\n"
         f'  <compiler angle="radian"/>\n'
         f'  <option timestep="{timestep:.17g}" integrator="RK4" gravity="{_row([gx, gy, 0.0])}" solver="Newton" '
         f'tolerance="1e-14" iterations="100" jacobian="dense"><flag contact="disable"/></option>\n'
