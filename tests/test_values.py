@@ -339,6 +339,17 @@ class Worn(rk.Sensors):
         return self.wear
 
 
+@pytest.mark.parametrize(
+    ("wear", "sentence"),
+    [(np.full(3, 1e-3), r"count has shape \(3,\); allowed: one number"), (-1.0, "count = -1; allowed: > 0")],
+)
+def test_encoders_of_a_user_have_one_count_for_all_drives(wear, sentence):
+    robot = rk.load()
+    for law in (rk.PD(7.05, 0.225), lambda t, q_a, qd_a, desired: 0 * q_a):
+        with pytest.raises(ValueError, match=sentence):
+            rk.simulate(robot, law, rk.hold(robot, [0.0, 0.0], 0.01), sensors=Worn(wear))
+
+
 class Tagged(rk.Manipulator):
     def __init__(self, robot, tag):
         super().__init__(**robot._fields())
