@@ -28,7 +28,7 @@ def workspace_box(robot) -> np.ndarray:
     return np.stack([there.min(axis=0), there.max(axis=0)], axis=-1)
 
 
-def scaled_frame(robot, left: float, right: float, low: float, high: float, drives: bool = False) -> dict:
+def scaled_frame(robot, left: float, right: float, low: float, high: float, *, drives: bool = False) -> dict:
     """Keywords of ``Axes.set``: limits in m that frame the testbed's workspace, for that of another machine.
 
     drives : as much more as it takes to hold the base points, which may be far outside a small workspace.
