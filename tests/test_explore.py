@@ -1064,23 +1064,30 @@ def laid_out(explorer):
 
 
 @pytest.mark.parametrize("N", [4, 6])
-def test_every_curve_is_named_and_no_legend_covers_a_title(N):
-    for name, panel in (("actuation", "sigma"), ("computed_torque", "plane"), ("prestress", "without")):
-        explorer = getattr(explore, name)(many_arms(N))
-        named = next(m.words for m in explorer.picture.fixed if m.kind == "legend" and m.panel == panel)
-        assert len(named) == (N if name == "prestress" else N * (N - 1) // 2)
-        if name == "actuation":
-            curves = [m.style for m in explorer.picture.marks if (m.kind, m.panel) == ("line", panel)]
-            looks = [
-                {(s["color"], s["linestyle"]) for s in these if "linestyle" in s}
-                for these in (curves, dict(named).values())
-            ]
-            assert looks[0] == looks[1] and len(looks[0]) == len(named)
-        for ax in laid_out(explorer).axes:
-            title = next(t for t in ax.findobj(Text) if t.get_text() == ax.get_title("left")).get_window_extent()
-            if ax.get_legend() is not None and title.width:
-                said = [t.get_window_extent() for t in ax.get_legend().get_texts() + ax.get_legend().get_lines()]
-                assert not any(title.overlaps(box) for box in said), (name, ax.get_title("left"))
+@pytest.mark.parametrize(
+    "name, panel", [("actuation", "sigma"), ("computed_torque", "plane"), ("prestress", "without")]
+)
+def test_every_curve_is_named_and_no_legend_covers_a_title(N, name, panel):
+    explorer = getattr(explore, name)(many_arms(N))
+    named = next(m.words for m in explorer.picture.fixed if m.kind == "legend" and m.panel == panel)
+    assert len(named) == (N if name == "prestress" else N * (N - 1) // 2)
+    for ax in laid_out(explorer).axes:
+        title = next(t for t in ax.findobj(Text) if t.get_text() == ax.get_title("left")).get_window_extent()
+        if ax.get_legend() is not None and title.width:
+            said = [t.get_window_extent() for t in ax.get_legend().get_texts() + ax.get_legend().get_lines()]
+            assert not any(title.overlaps(box) for box in said), ax.get_title("left")
+
+
+@pytest.mark.parametrize("N", [4, 6])
+def test_curves_look_as_the_legend_of_pairs_says(N):
+    picture = explore.actuation(many_arms(N)).picture
+    named = next(m.words for m in picture.fixed if m.kind == "legend" and m.panel == "sigma")
+    curves = [m.style for m in picture.marks if (m.kind, m.panel) == ("line", "sigma")]
+    drawn, told = (
+        {(style["color"], style["linestyle"]) for style in these if "linestyle" in style}
+        for these in (curves, dict(named).values())
+    )
+    assert drawn == told and len(told) == len(named)
 
 
 @pytest.mark.parametrize("name, robot", [("machine", rk.load("five_bar")), ("landscape", many_arms(4))])
