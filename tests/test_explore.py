@@ -611,6 +611,13 @@ def test_a_style_that_cannot_be_drawn_is_refused_where_it_is_written(mark, words
     assert not picture.marks
 
 
+def test_a_truth_value_is_no_number_of_a_style_though_it_equals_one():
+    picture = explore.Picture({"a": {}})
+    picture.line("a", [0, 1], [0, 1], linewidth=1)
+    with pytest.raises(ValueError, match=r"linewidth = True is not numeric"):
+        picture.line("a", [0, 1], [0, 1], linewidth=True)
+
+
 def test_a_message_that_failed_was_told_to_nobody():
     picture, known = explore.Picture({"a": {}}), {}
     picture.line("a", [0, 1], [0, 1], color="#123456")

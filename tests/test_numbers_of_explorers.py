@@ -58,13 +58,16 @@ def bill(run):
     return np.sum(PRICE * run.dt * c**2 + c * np.diff(run.q_a, axis=0))
 
 
-def test_every_pixel_of_the_map_stands_at_its_own_place():
-    image = next(m for m in explore.machine().set(drives="all drives").picture.marks if m.kind == "image")
-    values, (left, right, low, high), _ = image.words
+@pytest.mark.parametrize("mode", [(1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, -1)])
+def test_every_pixel_of_the_map_stands_at_its_own_place_in_every_mode(mode):
+    word = "(" + ", ".join("+" if way > 0 else "−" for way in mode) + ")"
+    picture = explore.machine().set(mode=word, drives="all drives").picture
+    values, (left, right, low, high), _ = next(m for m in picture.marks if m.kind == "image").words
     rows, columns = values.shape
     for i, j in ((60, 60), (45, 70), (75, 52)):
         x = [left + (j + 0.5) * (right - left) / columns, low + (i + 0.5) * (high - low) / rows]
-        assert values[i, j] == pytest.approx(np.linalg.svd(at(x))[1][1], rel=1e-9)
+        A = rk.control_matrix(ROBOT, rk.inverse_kinematics(ROBOT, x, mode))
+        assert values[i, j] == pytest.approx(np.linalg.svd(A)[1][1], rel=1e-9)
 
 
 @pytest.mark.parametrize("times", [0.5, 1, 2])

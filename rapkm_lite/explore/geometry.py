@@ -52,11 +52,16 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     # An image ends where its last pixels end, half a step beyond their centres.
     extent = tuple(end + way * (g[1] - g[0]) / 2 for g in (gx, gy) for end, way in ((g[0], -1), (g[-1], 1)))
     outline = marks.workspace_outline(robot)
-    matrices = lru_cache(maxsize=8)(
-        lambda mode: act.control_matrix(robot, inverse_kinematics(robot, points, modes[mode]))
+    # A row of A belongs to one arm, bent this way or that, whatever the others do.
+    one, other = (
+        act.control_matrix(robot, inverse_kinematics(robot, points, np.full(robot.n_arms, way))) for way in (1, -1)
     )
     # Outside, where the map is cut off, the value of the nearest point inside.
     nearest = tuple(np.asarray(distance_transform_edt(~inside, return_distances=False, return_indices=True)))
+
+    @lru_cache(maxsize=8)
+    def matrices(mode: str) -> np.ndarray:
+        return np.where(np.asarray(modes[mode])[:, None] > 0, one, other)
 
     @lru_cache(maxsize=64)
     def sigma_map(mode: str, drives: str) -> np.ndarray:

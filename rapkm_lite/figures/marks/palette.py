@@ -60,7 +60,20 @@ class Palette:
 
 def checked(kind: str, style: dict) -> dict:
     """The style as it is; raises ValueError for a keyword or a word that the canvas does not know."""
-    allowed = STYLES[kind]
+    items = kind, tuple(style.items()), tuple(map(type, style.values()))  # types, too: True equals 1
+    try:
+        hash(items)
+    except TypeError:
+        _check.__wrapped__(*items)
+    else:
+        _check(*items)
+    return style
+
+
+@lru_cache(maxsize=2048)
+def _check(kind: str, items: tuple, types: tuple) -> None:
+    """`checked` of (keyword, value) pairs, once for each style: a picture has the same ones at every step."""
+    style, allowed = dict(items), STYLES[kind]
     unknown = sorted(set(style) - allowed)
     if unknown:
         raise ValueError(f"{kind} has no style {unknown[0]!r}; allowed: {', '.join(sorted(allowed))}")
@@ -73,10 +86,9 @@ def checked(kind: str, style: dict) -> dict:
     for name, places in _PLACES.items():
         one_of(name, style.get(name, places[0]), places)
     try:
-        canvas_style(kind, tuple(style.items()))
+        canvas_style(kind, items)
     except (IndexError, TypeError, ValueError) as error:
         raise ValueError(f"{kind} cannot be drawn with {short(style)} ({error}); allowed: words and numbers") from None
-    return style
 
 
 @lru_cache(maxsize=2048)

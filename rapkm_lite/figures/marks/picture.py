@@ -84,7 +84,8 @@ class Picture:
         x, y = numbers("x", x, most=1), numbers("y", y, most=1)
         if x.size != y.size and 1 not in (x.size, y.size):
             raise ValueError(f"y has shape {y.shape}, x has {x.shape}; allowed: a number for each x")
-        data = np.stack(np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y)), -1)
+        data = np.empty((y.size if x.size == 1 else x.size, 2))
+        data[:, 0], data[:, 1] = x, y
         self._add("line", panel, data, checked("line", style))
 
     def trace(self, panel: str, t, y, points: int = 300, **style) -> None:
