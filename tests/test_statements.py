@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, TESTBED
 
 import rapkm_lite as rk
+from rapkm_lite.lessons.lesson10.tasks import geometry_fight
 
 OFFSET = np.array([4e-3, -2e-3, 5e-3])
 PATH = rk.triangle(FRICTIONLESS)
@@ -212,3 +213,42 @@ def test_pairs_agree_about_the_place_where_offsets_are_tangent():
     assert min(np.ptp(claims(q, OFFSET), axis=0).max() for q in PATH.q[::50]) > 0.05e-3
     q = rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0])
     assert np.ptp(claims(q, np.array([5e-3, -2e-3, -3e-3])), axis=0).max() < 1e-15
+
+
+def test_a_moved_base_point_is_silent_on_two_curves():
+    """Lesson 10: the tip held, d . db + den dq = 0 for the moved arm alone, and the fight is K_P eta eta_1 dq_1."""
+    shift = np.array([1e-6, 0.0])
+    moved = FRICTIONLESS.replace(base=FRICTIONLESS.base + [shift, 0 * shift, 0 * shift])
+    for x in np.random.default_rng(7).uniform(-0.09, 0.09, (6, 2)):
+        q = rk.inverse_kinematics(FRICTIONLESS, x)
+        pose, eta = rk.at(FRICTIONLESS, q), rk.null_vector(FRICTIONLESS, q)
+        a, d = pose.a[0], pose.d[0]
+        turn = -(d @ shift) / (d[1] * a[0] - d[0] * a[1])
+        wanted = 7.05 * eta * eta[0] * turn  # zero where eta_1 = 0, and where d stands square to the shift
+        assert_allclose(geometry_fight(FRICTIONLESS, moved, x, 7.05), wanted, rtol=0, atol=1e-4 * 7.05e-6)
+
+
+def test_an_encoder_that_stays_silent_is_worse_than_a_dead_drive_and_a_short_silence_is_not():
+    """Lesson 10, for each of the drives: the machine is thrown off, lags, or hardly feels it."""
+    path, law = rk.triangle(FRICTIONLESS, side=0.12, duration=2.5), rk.AntagonismFilter(rk.PD(7.05, 0.225))
+
+    def off(fault):
+        try:
+            run = rk.simulate(TESTBED, law, path, model=FRICTIONLESS, faults=fault)
+        except rk.SimulationError:
+            return np.inf
+        return np.linalg.norm(run.x - path.x, axis=1).max()
+
+    for drive in range(3):
+        dead, silent = off(rk.DeadDrive(drive, 0.5)), off(rk.EncoderDropout(drive, 0.6, 9.0))
+        assert off(rk.EncoderDropout(drive, 0.6, 0.62)) < 0.5 * dead < 5 * dead < silent
+
+
+def test_no_machine_of_three_arms_makes_the_fight_small_for_all_offsets():
+    """Lesson 12: the null space of A^T has one dimension, so tr S = R_el / k_t^2 K_P^2 T for every machine."""
+    turn = np.radians([210.0, 330.0, 90.0])
+    base = 0.29 * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    wide = rk.Manipulator(base=base, lengths=[0.18, 0.26], masses=0.1, mode=[1, 1, -1])
+    for robot in (TESTBED, wide, rk.load("asymmetric").replace(resistance=0.611, torque_constant=0.0259)):
+        trace = np.trace(rk.antagonism_form(robot, rk.triangle(robot, side=0.1, dt=5e-3), 7.05))
+        assert_allclose(trace, 0.611 / 0.0259**2 * 7.05**2 * 5.0, rtol=1e-9)
