@@ -118,8 +118,8 @@ EXERCISES = {
         tasks.unseen_offsets,
         hints=(
             "What would all three encoders show if the machine simply stood 2 mm beside the place?",
-            "Offsets that agree with each other have the form A xi, with A from rk.control_matrix at the pose, and xi "
-            "is the shift in m. Mind that the real shift is not exactly the one of the first-order theory.",
+            "Offsets that agree with each other have the form A xi, with A from rk.control_matrix at the pose, and "
+            "-xi is the shift in m. Mind that the real shift is not exactly the one of the first-order theory.",
             "A = rk.control_matrix(robot, rk.inverse_kinematics(robot, x)); return A @ np.array([0.0, 2.2e-3]).",
         ),
         unit="rad",

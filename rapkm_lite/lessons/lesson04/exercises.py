@@ -169,8 +169,8 @@ EXERCISES = {
     "04.filtered_command": Exercise(
         filtered_command,
         hints=(
-            "The drive multiplies the error by its gain on its own. What must the error be so that the torques hold "
-            "no antagonism, and the force stays?",
+            "The drive multiplies the error by its gain on its own. Which errors then make no force at the "
+            "end-effector? (17) removes these, and keeps what is perpendicular to them.",
             "The force is A^T K_P e = (K_P A)^T e. So it is the error that is projected, and the matrix of the "
             "projection is K_P A, row i times gain i.",
             "R = rk.antagonism_filter(K_P[:, None] * A), and the command is q_measured - R @ (q_measured - q_desired).",
