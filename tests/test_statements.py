@@ -252,3 +252,99 @@ def test_no_machine_of_three_arms_makes_the_fight_small_for_all_offsets():
     for robot in (TESTBED, wide, rk.load("asymmetric").replace(resistance=0.611, torque_constant=0.0259)):
         trace = np.trace(rk.antagonism_form(robot, rk.triangle(robot, side=0.1, dt=5e-3), 7.05))
         assert_allclose(trace, 0.611 / 0.0259**2 * 7.05**2 * 5.0, rtol=1e-9)
+
+
+def test_the_third_arm_buys_acceleration_in_the_weakest_direction_and_pays_in_the_best():
+    """Lesson 00: it has mass as well as a drive; against a pair, the worst direction gains in most places, not all."""
+    x, y, inside = rk.workspace_grid(TESTBED, 40)
+    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    angle = np.linspace(0.0, np.pi, 181)
+    u = np.stack([np.cos(angle), np.sin(angle)])
+
+    def reach(machine):
+        fields = rk.control_vector_fields(machine, rk.inverse_kinematics(machine, points))
+        along = np.abs(np.einsum("kim,it->kmt", fields, u)).sum(axis=1)
+        return along.min(axis=1), along.max(axis=1)
+
+    all_three = reach(TESTBED)
+    for pair in rk.drive_pairs(TESTBED):
+        worst, best = (
+            np.mean(three > two) for three, two in zip(all_three, reach(TESTBED.with_arms(pair)), strict=True)
+        )
+        assert 0.7 < worst < 0.9 and best < 0.5
+
+
+def test_at_an_input_singularity_joints_turn_with_the_square_of_the_way():
+    """Lesson 02: 14 µrad per mm across the distal links: the circle about an elbow bends away by s^2 / (2 l)."""
+    middle, mode = TESTBED.base[:2].mean(axis=0), [1, 1, -1]
+    q = rk.inverse_kinematics(TESTBED, middle, mode)
+    a, d = rk.arm_vectors(TESTBED, q)
+    across = np.array([-d[0, 1], d[0, 0]]) / 0.2
+    turned = np.abs(rk.inverse_kinematics(TESTBED, middle + 1e-3 * across, mode) - q)[:3]
+    lever = np.abs(a[:, 0] * d[:, 1] - a[:, 1] * d[:, 0]) / 0.2
+    assert_allclose(turned, 1e-6 / (2 * 0.2) / lever, rtol=0.01)
+    assert np.all(np.round(1e6 * turned) == 14)
+
+
+def test_offsets_that_nobody_sees_at_one_place_are_not_seen_on_a_curve_through_it():
+    """Lesson 03: 50 mm away the two crossings of the curve betray nothing, other places do."""
+    x = np.array([0.04, -0.05])
+    offset = rk.control_matrix(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, x)) @ [0.0, 2.2e-3]
+    ring = np.linspace(0.0, 2 * np.pi, 3601)
+    places = x + 0.05 * np.stack([np.cos(ring), np.sin(ring)], axis=-1)
+    rho = rk.null_vector(FRICTIONLESS, rk.inverse_kinematics(FRICTIONLESS, places)) @ offset
+    silent = np.flatnonzero(rho[:-1] * rho[1:] < 0)
+    assert len(silent) == 2
+
+    def held(place):
+        run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), rk.hold(FRICTIONLESS, place, 1.0), offset)
+        return np.abs(run.c[-1]).max(), np.linalg.norm(run.x[-1] - place)
+
+    for k in silent:
+        torque, shift = held(places[k])
+        assert torque < 1e-3 and shift > 1.5e-3
+    assert held(places[np.argmax(np.abs(rho))])[0] > 5e-3
+
+
+def test_lag_is_what_fights_without_offsets_and_it_grows_with_the_cube_of_the_speed():
+    """Lesson 04: 0.1 % at any sampling rate; lag ~ acceleration ~ speed^2, times the speed in eta.(rates)."""
+    law = rk.PD(7.05, 0.225)
+    shares = []
+    for dt in (2e-3, 2.5e-4):
+        run = rk.simulate(FRICTIONLESS, law, rk.triangle(FRICTIONLESS, dt=dt))
+        shares.append(rk.antagonistic_energy(run) / run.energy.sum())
+    assert_allclose(shares, 1.04e-3, rtol=5e-3)
+    durations, peaks = np.array([5.0, 3.5, 2.0]), []
+    for duration in durations:
+        run = rk.simulate(FRICTIONLESS, law, rk.triangle(FRICTIONLESS, duration=duration))
+        peaks.append(np.abs(rk.antagonistic_torque(run)).max())
+    assert_allclose(np.polyfit(np.log(1 / durations), np.log(peaks), 1)[0], 3.0, atol=0.4)
+    run = rk.simulate(FRICTIONLESS, law, rk.triangle(FRICTIONLESS, duration=2.0), OFFSET)
+    eta = rk.null_vector(FRICTIONLESS, run.q)
+    beside = np.abs(rk.antagonistic_torque(run) + 7.05 * eta * (eta @ OFFSET)[:, None]).max()
+    assert round(1e3 * np.abs(run.error).max()) == 27 and round(1e3 * beside) == 25
+
+
+def test_a_drive_loses_by_the_filter_whose_antagonism_was_opposed_to_its_share_of_the_motion():
+    """Lesson 04: |c|^2 = |c_eff|^2 + 2 c_eff c_null + |c_null|^2 for each drive; the middle term decides."""
+    run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), PATH, [0.7e-3, 1.5e-3, -3.0e-3])
+    null = rk.antagonistic_torque(run)
+    mixed, square = np.sum(null * (run.c - null), axis=0), np.sum(null**2, axis=0)
+    assert mixed[1] < 0 and np.array_equal(2 * mixed + square < 0, [False, True, False])
+
+
+def test_17_leaves_nothing_at_every_pose_only_for_equal_gains():
+    """Lesson 04: K R_K e is in the range of K^2 A, which is that of A where eta is an eigenvector of K^2."""
+
+    def left(x, K_P):
+        A = rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, x))
+        K = np.diag(K_P)
+        return np.abs(rk.null_basis(A).T @ K @ rk.antagonism_filter(K @ A)).max() / np.max(K_P)
+
+    middle, theta = TESTBED.base[1:].mean(axis=0), np.deg2rad(15.0)
+    along = (TESTBED.base[2] - TESTBED.base[1]) / 0.4
+    u = np.cos(theta) * along + np.sin(theta) * np.array([-along[1], along[0]])
+    on_curve = middle + np.sqrt(0.2**2 - 0.4**2 * np.sin(theta) ** 2) * u  # eta_1 = 0
+    assert left(on_curve, [20.0, 7.0, 7.0]) < 1e-12
+    assert left([0.03, 0.02], [20.0, 7.0, 7.0]) > 0.1 and left(on_curve, [7.0, 20.0, 7.0]) > 0.1
+    assert left([0.03, 0.02], [7.0, 7.0, 7.0]) < 1e-12
