@@ -14,6 +14,7 @@ import pytest
 from samples import MACHINES, machines, random_points
 
 import rapkm_lite as rk
+from rapkm_lite.machine.datafiles import read_toml
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="needs Node")
 
@@ -23,7 +24,6 @@ VALUES = (
     "base lengths masses centers inertias rotor_inertia resistance torque_constant friction friction_velocity gravity "
     "load mode"
 ).split()
-SIDES = {"testbed": 0.24, "five_bar": 0.16, "four_arms": 0.24, "asymmetric": 0.18}
 FILTERS = ("off", "true", "measured")
 
 
@@ -44,9 +44,9 @@ def values(robot):
     return {name: np.asarray(getattr(robot, name)).tolist() for name in VALUES}
 
 
-def triangle_of(side):
-    angle = np.deg2rad([210.0, 330.0, 90.0])
-    return (side / np.sqrt(3) * np.stack([np.cos(angle), np.sin(angle)], -1)).tolist()
+def triangle_of(side=0.24, centre=(0.0, 0.0), angle=0.0):
+    corner = np.deg2rad([210.0, 330.0, 90.0]) + angle
+    return (side / np.sqrt(3) * np.stack([np.cos(corner), np.sin(corner)], -1) + centre).tolist()
 
 
 def deviation(robot, path, law, corners, how):
@@ -78,7 +78,9 @@ def test_runs_agree_with_the_package(name, friction):
     """Path, law, filter, friction steps and energy: one model in two languages."""
     setting = rk.experiment(name)
     robot = setting.robot if friction else setting.robot.replace(friction=0.0)
-    path, corners = rk.triangle(robot, SIDES[name]), triangle_of(SIDES[name])
+    given = read_toml(name)["path"]
+    place = {key: given[key] for key in ("side", "centre", "angle") if key in given}
+    path, corners = rk.triangle(robot, **place), triangle_of(**place)
     how = settings(setting.law, robot.n_arms, [None])
     for h, torque, x, angle, energy in deviation(robot, path, setting.law, corners, how):
         assert torque.max() <= 1e-12, h
