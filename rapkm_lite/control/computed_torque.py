@@ -172,7 +172,7 @@ class SwitchedCTC(LawValue):
         return CTC(self.K_P, self.K_D, joint_indices("pair", pair, None, 2, "drive"), pose=self.pose)
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        """Torques for poses in the order of time, (k, ...), or for a single pose with its best pair."""
+        """Torques (k, N) for poses in the order of time, q (k, 2N), or (N,) for a single pose with its best pair."""
         q_a, qd_a = (s[..., : model.n_arms] for s in _joint_state(model, q, qd, q_a, qd_a, desired))
         if not (lead := q_a.shape[:-1]):
             return self.fixed(self.choose(model, q)).torque(model, q, qd, q_a, qd_a, desired)
