@@ -165,6 +165,16 @@ def test_another_model_and_real_encoders(name):
     agree(MACHINE, laws(3)[name], CIRCLE, model=MODEL, **SENSORS)
 
 
+@pytest.mark.parametrize("name", ["CTC in x", "RedundantAPD (29)"])
+@pytest.mark.parametrize("forces", ["friction", "gravity", "none"])
+def test_forces_that_the_machine_or_its_model_has_alone(name, forces):
+    """A law cancels what its model has, also where the machine has it not, and nothing else."""
+    free = MACHINE.replace(friction=0.0, gravity=(0.0, 0.0))
+    has = {"friction": {"friction": 6e-3}, "gravity": {"gravity": (0.3, -1.0)}, "none": {}}[forces]
+    machine, model = (MACHINE, free) if forces == "none" else (free, free.replace(**has))
+    agree(machine, laws(3)[name], CIRCLE, model=model)
+
+
 @pytest.mark.parametrize("sensors", [{}, SENSORS], ids=["ideal", "encoder"])
 @pytest.mark.parametrize(
     "name",
@@ -185,6 +195,29 @@ def test_another_model_and_real_encoders(name):
 def test_faults(name, sensors):
     run = agree(MACHINE, laws(3)[name], CIRCLE, faults=FAULTS, **sensors)
     assert not run.c[90:, 0].any() and (np.abs(run.c) <= [0.6, np.inf, 0.5]).all()
+
+
+def longer(robot, times):
+    """A machine whose lengths and gravity are multiplied, its masses divided by the square: the same inertias."""
+    lengths = {name: times * getattr(robot, name) for name in ("base", "lengths", "centers", "gravity")}
+    masses = {name: getattr(robot, name) / times**2 for name in ("masses", "load")}
+    return robot.replace(**lengths, **masses, inertias=robot.inertias)
+
+
+@pytest.mark.parametrize("name", ["filter", "CTC in x", "SwitchedCTC", "RedundantCTC line 2"])
+def test_no_bit_depends_on_the_unit_of_length(name):
+    """With a power of two all products and sums are the same but for their exponent, unless a bound has a unit."""
+    law, runs, rows = laws(3)[name], [], []
+    for times in (1.0, 128.0, 1.0 / 128.0):
+        robot, model = longer(MACHINE, times), longer(MODEL, times)
+        path = cut(rk.circle(robot, radius=0.11 * times, duration=0.8), 180, 121)
+        runs.append(rk.simulate(robot, law, path, OFFSET[:3], model=model, faults=FAULTS, **SENSORS))
+        rows.append(rk.sweep(robot, law, path, [OFFSET[:3], 2 * OFFSET[:3]], model=model, faults=FAULTS, **SENSORS))
+        for attribute in ("q_a", "qd_a", "c", "pairs"):
+            assert_array_equal(getattr(runs[-1], attribute), getattr(runs[0], attribute))
+        assert_array_equal(runs[-1].x, times * runs[0].x)
+        for column in ("energies", "torque_norm", "antagonistic_energy"):
+            assert_array_equal(getattr(rows[-1], column), getattr(rows[0], column))
 
 
 @pytest.mark.parametrize("machine", ["five_bar", "four_arms", "asymmetric"])
@@ -306,6 +339,31 @@ def test_laws_of_all_kinds_in_one_sweep():
         own = rk.sweep(MACHINE, law, CIRCLE, OFFSET[:3], faults=FAULTS)
         for name in COLUMNS:
             assert_array_equal(getattr(own, name)[0], getattr(study, name)[i])
+
+
+COARSE = cut(rk.circle(MACHINE, radius=0.11, duration=0.8, dt=2e-3), 90, 61)
+
+
+def test_a_row_has_the_gains_of_its_own_law():
+    """Of laws that run side by side, one as the other's neighbour: energies of single runs, whose torques differ."""
+    pairs = [
+        [rk.CTC([900.0, 700.0], 60.0, None), rk.CTC([400.0, 300.0], [30.0, 50.0], None)],
+        [rk.APD([300.0, 400.0], 20.0, None), rk.APD([500.0, 250.0], [15.0, 25.0], None)],
+        [rk.CommandFilter(rk.PD([5.0, 6.5, 8.0], 0.2)), rk.CommandFilter(rk.PD(6.0, [0.1, 0.2, 0.15]))],
+        [rk.SwitchedCTC(900.0, 60.0, 1.0), rk.SwitchedCTC(900.0, 60.0, 1.5)],
+    ]
+    every = [law for pair in pairs for law in pair]
+    study = rk.sweep(MACHINE, every, COARSE, OFFSET[:3])
+    runs = [rk.simulate(MACHINE, law, COARSE, OFFSET[:3]) for law in every]
+    for i, run in enumerate(runs):
+        assert np.abs(run.energy - runs[i ^ 1].energy).max() > 1e-6
+        assert_allclose(study.energies[i], run.energy, rtol=1e-11, atol=1e-11)
+        assert_allclose(study.antagonistic_energy[i], rk.antagonistic_energy(run), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["PID", "filter", "SwitchedCTC"])
+def test_another_sampling_time(name):
+    agree(MACHINE, laws(3)[name], COARSE, faults=FAULTS, **SENSORS)
 
 
 @pytest.mark.parametrize("name", ["PD", "filter", "CTC of elbows", "SwitchedCTC", "RedundantAPD"])

@@ -15,7 +15,16 @@ from rapkm_lite.simulation import compiled
 OFFSET = [4e-3, -2e-3, 5e-3]
 PD = rk.PD(7.05, 0.225)
 FAULTS = [rk.EncoderDropout(1, 0.03, 0.06), rk.OffsetJump(2, 0.3, 1e-3)]
-LAWS = [rk.AntagonismFilter(rk.PID(7.05, 0.225, 3.0, 0.5)), rk.SwitchedCTC(900.0, 60.0)]
+
+
+@rk.compiled(memory=1)
+def told(t, q_a, qd_a, d, memory):
+    """PD with a torque that goes by the time, and another one by the number of samples."""
+    memory[0] += 1.0
+    return -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a) + 1e-2 * t + 1e-5 * memory[0]
+
+
+LAWS = [rk.AntagonismFilter(rk.PID(7.05, 0.225, 3.0, 0.5)), rk.SwitchedCTC(900.0, 60.0), told]
 TEN_MINUTES = r"""
 import re
 from pathlib import Path
