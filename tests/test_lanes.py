@@ -297,6 +297,16 @@ def test_the_pose_of_readings_that_are_far_off_is_that_of_the_textbook(name):
     assert found > 5
 
 
+def test_a_pose_is_found_where_the_squared_error_bends_downwards_all_around_its_start():
+    """A step by that Hessian leads uphill, so that no half of it is taken: the search would end with no pose."""
+    robot = MACHINES["four_arms"].replace(friction=0.0)
+    path = rk.hold(robot, (0.031860931602637754, 0.1986939208956775), 0.001)
+    offset = np.array([0.36442871451885944, 0.38804617777992745, 0.7403486750086571, 1.359597090300016])
+    for law in (rk.CTC(400.0, 40.0, None), rk.AntagonismFilter(PD)):
+        expected = rk.simulate(robot, Textbook(law), path, offset).c[0]
+        assert_allclose(rk.simulate(robot, law, path, offset).c[0], expected, rtol=1e-6, atol=1e-6)
+
+
 def test_a_jump_at_the_first_sample_is_an_offset_also_where_angles_hardly_tell_the_pose():
     """A five-bar's angles always fit: what a row is filled up with must not look like an error of theirs."""
     robot = MACHINES["five_bar"].replace(friction=0.0)
