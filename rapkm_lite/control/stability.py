@@ -20,7 +20,7 @@ from ..mechanics.actuation import weighted_pseudoinverse
 from ..mechanics.at import at
 from ..mechanics.cores import full_rank
 from ..mechanics.dynamics import redundant_dynamics
-from ..mechanics.linalg import product
+from ..mechanics.linalg import product, singular_values
 from ..mechanics.partition import explicit_pseudoinverse, select_independent
 from .grammar import joint_gain
 
@@ -116,4 +116,4 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
         det = np.where(np.abs(det) < least, least, det)
         to_ee = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2) / det[..., None, None]
         M = product(weighted_pseudoinverse(pose.A), pose.F.mT, pose.G, pose.F, to_ee)
-    return np.linalg.norm(M, 2, axis=(-2, -1))
+    return singular_values(M)[..., 0]

@@ -59,10 +59,12 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         if np.ptp(np.sign(act.distal_cross_products(robot, coarse(side).q)[:, pairs.index(fixed[law])])):
             return "crossed"
         pieces = np.concatenate([np.stack([line[:-1], line[1:]]) for line in singular[fixed[law]]], axis=1)
-        far = cdist(coarse(side).x, pieces[0]).min(axis=0)
+        apart = cdist(coarse(side).x, pieces[0])
         # The points of a line are as far apart as those of a grid: twenty on each piece that may be the nearest.
-        start, end = pieces[:, far <= far.min() + np.linalg.norm(pieces[1] - pieces[0], axis=-1).max()]
-        gap = cdist(coarse(side).x, np.linspace(start, end, 20).reshape(-1, 2)).min()
+        room = apart.min() + np.linalg.norm(pieces[1] - pieces[0], axis=-1).max()
+        start, end = pieces[:, apart.min(axis=0) <= room]
+        near = coarse(side).x[apart.min(axis=1) <= room]
+        gap = cdist(near, np.linspace(start, end, 20).reshape(-1, 2)).min()
         return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
