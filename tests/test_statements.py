@@ -348,3 +348,69 @@ def test_17_leaves_nothing_at_every_pose_only_for_equal_gains():
     assert left(on_curve, [20.0, 7.0, 7.0]) < 1e-12
     assert left([0.03, 0.02], [20.0, 7.0, 7.0]) > 0.1 and left(on_curve, [7.0, 20.0, 7.0]) > 0.1
     assert left([0.03, 0.02], [7.0, 7.0, 7.0]) < 1e-12
+
+
+def test_the_feedback_of_19_in_the_angles_of_a_pair_stays_small_and_slackens_where_that_of_20_grows():
+    """Lesson 05: A holds the rows of I_2 at the pair, so that A^T A = I + a a^T and |(A^T)^+| = 1."""
+    some = PATH.q[600:1281:20]
+    A, A_x = rk.control_matrix(FRICTIONLESS, some, [0, 1]), rk.control_matrix(FRICTIONLESS, some)[:, :2]
+    assert_allclose(np.linalg.norm(np.linalg.pinv(A.mT), 2, axis=(1, 2)), 1.0, rtol=1e-9)
+    sine = np.abs(rk.distal_cross_products(FRICTIONLESS, some)[:, 0])
+    softest = np.linalg.eigvalsh(A_x.mT @ A_x)[:, 0] / sine**2  # rad^2/m^2 for springs of 1 N m/rad
+    assert sine.min() < 0.01 and np.ptp(np.log(softest)) < np.log(2.0)
+    product = rk.feedback_norm(FRICTIONLESS, some, (0, 1)) * sine
+    assert np.ptp(np.log(product)) < np.log(1.3)
+
+
+def test_a_fixed_pair_lasts_longer_with_the_offsets_reversed():
+    """Lesson 05, explorer: the pair (1,3) with offsets of (1, -1, 0.5) mrad and poles at -40 1/s."""
+    law, offset = rk.CTC(40.0**2, 80.0, (0, 2)), np.array([1e-3, -1e-3, 0.5e-3])
+
+    def lasts(side, sign):
+        path = rk.triangle(FRICTIONLESS, side=1e-3 * side)
+        try:
+            run = rk.simulate(FRICTIONLESS, law, path, sign * offset)
+        except rk.SimulationError:
+            return False
+        return np.abs(run.error).max() < 50e-3
+
+    assert [lasts(side, 1) for side in (215, 220)] == [True, False]
+    assert [lasts(side, -1) for side in (230, 235)] == [True, False]
+
+
+def test_line_2_of_32_has_complex_gains_in_part_of_the_workspace_and_line_1_nowhere():
+    """Lesson 11: at the centroid and in 44 % of the workspace, all its roots being stable at every pose."""
+    x, y = np.meshgrid(np.linspace(-0.195, 0.195, 120), np.linspace(-0.175, 0.23, 120))
+    points = np.stack([x, y], axis=-1)
+    q = rk.inverse_kinematics(FRICTIONLESS, np.vstack([[0.0, 0.0], points[rk.reachable(FRICTIONLESS, 1.01 * points)]]))
+    F, G, S = rk.orthogonal_complement(FRICTIONLESS, q), rk.mass_matrix(FRICTIONLESS, q), np.diag([1.0, 1, 1, 0, 0, 0])
+    line_2 = np.linalg.eigvals(np.linalg.solve(F.mT @ G @ F, F.mT @ G @ S @ F))
+    swirl = np.abs(line_2[:, 0].imag) > 1e-9
+    assert swirl[0] and 0.42 < swirl[1:].mean() < 0.46
+    # s^2 + K_D z s + K_P z = 0 with complex z = a + i b is stable where a > 0 and K_D^2 a |z|^2 > K_P b^2.
+    w = 2 * np.pi * 5
+    a, b = line_2.real, line_2.imag
+    assert a.min() > 0 and np.all((2 * w) ** 2 * a * (a**2 + b**2) > w**2 * b**2)
+    assert np.abs(np.linalg.eigvals(rk.effective_gain(F, S)).imag).max() < 1e-7
+
+
+def test_the_best_speed_of_a_loop_depends_on_whether_the_law_knows_the_inertia():
+    """Lesson 11: 100 g unknown, 2000 counts, 3 Hz at the centroid: PD misses three times as far as others."""
+    path, w, q = rk.triangle(FRICTIONLESS, 0.12, 2.5), 2 * np.pi * 3, rk.inverse_kinematics(FRICTIONLESS, [0.0, 0.0])
+    A, M = rk.control_matrix(FRICTIONLESS, q), rk.minimal_dynamics(FRICTIONLESS, q, 0 * q, None)[0]
+    spring = 2 / np.trace(np.linalg.solve(M, A.T @ A))
+    on_drives = np.full(3, spring * w**2), np.full(3, spring * 2 * w)
+    laws = [rk.CTC(w**2, 2 * w, None), rk.RedundantAPD(*on_drives), rk.PD(*on_drives)]
+    sensors = {"model": FRICTIONLESS, "encoder": 2000, "velocity_filter": 5e-3}
+    runs = [rk.simulate(FRICTIONLESS.replace(load=0.1), law, path, OFFSET, **sensors) for law in laws]
+    known, pair, blind = (np.linalg.norm(run.x - path.x, axis=1).max() for run in runs)
+    assert max(known, pair) < 1.5e-3 and blind > 4e-3
+
+
+def test_offsets_fight_in_pd_the_more_the_faster_the_loop():
+    """Lesson 11: torques K_P eta (eta . dq) with K_P ~ f^2, so that the energy of the fight grows with f^4."""
+    path, fights = rk.triangle(FRICTIONLESS, 0.12, 2.5), []
+    for f in (4.0, 8.0):
+        law = rk.PD(7.05 * (f / 4) ** 2, 0.225 * f / 4)
+        fights.append(rk.antagonistic_energy(rk.simulate(FRICTIONLESS, law, path, OFFSET)))
+    assert_allclose(np.log2(fights[1] / fights[0]), 4.0, atol=0.2)
