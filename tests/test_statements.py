@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from samples import FRICTIONLESS, TESTBED
+from scipy.optimize import brentq
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.lesson10.tasks import geometry_fight
@@ -21,6 +22,50 @@ READINGS = {
     "again (0.9, 76.9) mm": (0.1594, (0.0009, 0.0769), 0.906, 0.144, (-2.9, -8.15, 12.6), 11.15, 0.169, 7.31e-3),
     "centre (-7.4, 100) mm": (0.1626, (-0.0074, 0.1), 0.878, 0.102, (-3.1, -7.1, 12.6), 8.34, 0.119, 7.98e-3),
 }
+
+
+def test_the_bound_of_a_place_of_rest_cannot_be_improved():
+    """Lesson 08: where eta_1 = 0 the forces at rest ask for c_1 + friction = 0, so that drive 1 must rest on its own.
+
+    Midway between two counts its torque is K_P count / 2 at least, whatever the offsets and the others do.
+    """
+    quantum, friction = 2 * np.pi / 2000, TESTBED.friction[0]
+
+    def first(x, y):
+        return rk.null_vector(TESTBED, rk.inverse_kinematics(TESTBED, [x, y]))[0]
+
+    def pose(x):
+        return rk.inverse_kinematics(TESTBED, [x, brentq(lambda y: first(x, y), 0.12, 0.15)])
+
+    along = lambda x: pose(x)[0] / quantum  # noqa: E731  counts of drive 1 on the curve
+    half = np.floor(along(0.0)) + 0.5
+    q = pose(brentq(lambda x: along(x) - half, -3e-3, 3e-3))
+    for offset in np.random.default_rng(0).uniform(-5e-3, 5e-3, (5, 3)):
+        below, above = (
+            rk.rest_exists(TESTBED, q, ratio * 2 * friction / quantum, offset, quantum, friction)
+            for ratio in (0.999, 1.001)
+        )
+        assert below and not above
+
+
+def test_the_sign_of_offsets_decides_whether_a_fixed_pair_is_lost_at_its_curve():
+    """Question 05: as the explorer is set the run is lost at a side of 225 mm, the triangle still 2 mm from the curve.
+
+    With the opposite offsets it comes through, across the curve at 240 mm, a centimetre astray.
+    """
+    law, offset = rk.CTC(40.0**2, 80.0, (0, 1)), np.array([1e-3, -1e-3, 0.5e-3])
+    with pytest.raises(rk.SimulationError):
+        rk.simulate(FRICTIONLESS, law, rk.triangle(FRICTIONLESS, side=0.225), offset)
+    run = rk.simulate(FRICTIONLESS, law, PATH, -offset)
+    assert np.linalg.norm(run.x - PATH.x, axis=1).max() > 1e-2
+
+
+def test_the_filtered_energy_hardly_feels_twice_the_gain_but_a_far_higher_one():
+    """Question 04: a few per cent from 7.05 to 14.1 N m/rad, a quarter and more at 28.2."""
+    for offset in ([-3e-3, -4e-3, 7e-3], [5e-3, 5e-3, 5e-3], [5e-3, -5e-3, 0.0]):
+        laws = (rk.AntagonismFilter(rk.PD(K_P, 0.225)) for K_P in (7.05, 14.1, 28.2))
+        usual, twice, far = (rk.simulate(FRICTIONLESS, law, PATH, offset).energy.sum() for law in laws)
+        assert abs(twice / usual - 1) < 0.05 and far / usual > 1.2
 
 
 @pytest.mark.parametrize("reading", READINGS.values(), ids=READINGS)
