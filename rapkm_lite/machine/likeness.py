@@ -50,6 +50,9 @@ def key(value: Any) -> Any:
         value = value if value.ndim else value[()]
     if isinstance(value, tuple | np.ndarray):  # tuples may equal arrays
         items = value if len(value) <= _LOOKED_AT else (len(value), *(value[k] for k in (0, len(value) // 2, -1)))
+        if isinstance(items, np.ndarray) and items.ndim == 1 and items.dtype.kind in "biuf":
+            numbers = items.astype(float).tolist()  # at a fifth of the cost
+            return tuple(math.nan if number != number else number for number in numbers)
         return tuple(map(key, items))
     if isinstance(value, set | frozenset):
         return frozenset
