@@ -70,8 +70,12 @@ def motion_table(trajectory, width: int, count: int = ALL, rows: slice = slice(N
     if count > FEW:
         elbow = q[:, N:]
         blocks += [qdd[:, :N], qd[:, N:], qdd[:, N:], np.cos(elbow), np.sin(elbow), elbow]
-    rest = np.zeros((len(x), width - N))
-    return np.column_stack([x, xd, xdd, *(part for block in blocks for part in (block, rest))])
+    table = np.zeros((len(x), 6 + count * width))
+    table[:, 0:2], table[:, 2:4], table[:, 4:6] = x, xd, xdd
+    rooms = table[:, 6:].reshape(len(x), count, width)[..., :N]
+    for k, block in enumerate(blocks):
+        rooms[:, k] = block
+    return table
 
 
 def sizes(count: int) -> tuple:
