@@ -119,7 +119,8 @@ def look(context, base: str, name: str, shots: Path | None) -> list[str]:
 
 
 def search(context, base: str) -> list[str]:
-    """Type into the search box of a page; what is found is looked at on a telephone, the first of it opens."""
+    """Type into the search box of a page; what is found is looked at on a telephone, the first of it opens.
+    The number of an equation leads to it."""
     page, wrong = opened(context, base)
     page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
     page.fill("input[name=q] >> nth=0", "antagonism")
@@ -131,6 +132,9 @@ def search(context, base: str) -> list[str]:
         wrong += page.evaluate(LOOK)
         page.click("ul.search li a >> nth=0")
         page.wait_for_selector("article h1")
+        page.goto(f"{base}/search.html?q=(27)")
+        page.click("h1 + p a")
+        page.wait_for_selector("#eq-27:target", state="attached")
     except Exception as error:
         wrong.append(str(error).splitlines()[0])
     page.close()

@@ -8,9 +8,13 @@ function names() {
   document.querySelector(".toc-drawer")?.setAttribute("aria-label", "On this page");
   // What is written on a fold says more than one name for all of them.
   for (const fold of document.querySelectorAll("summary[aria-label]")) fold.removeAttribute("aria-label");
+  // A search looks for words, not for numbers.
   const found = document.getElementById("search-results"), make = (tag) => document.createElement(tag);
-  const index = Object.assign(make("a"), { href: "lessons/equations.html", textContent: "the equation index" });
-  const way = Object.assign(make("p"), { textContent: "By its number an equation is found in " });
+  const number = /^\W*(?:eq\w*\W*)?([1-9]|[12]\d|3[0-5])\b/i.exec(new URLSearchParams(location.search).get("q"))?.[1];
+  const href = "lessons/equations.html" + (number ? "#eq-" + number : "");
+  const index = Object.assign(make("a"), { href, textContent: "the equation index" });
+  const start = number ? `Equation (${number}) stands in ` : "By its number an equation is found in ";
+  const way = Object.assign(make("p"), { textContent: start });
   way.append(index, ".");
   found?.before(Object.assign(make("h1"), { textContent: "Search" }), way);
 }
