@@ -90,6 +90,45 @@ def test_mixed_modes_have_one_input_singularity_at_the_midpoint_of_a_side(mode):
         rk.null_vector(TESTBED, q)
 
 
+def turned(robot, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return robot.replace(base=robot.base @ [[c, s], [-s, c]])
+
+
+ANGLES = np.concatenate([[0.0], 10.0 ** np.arange(-12.0, 0.0)])
+
+
+@pytest.mark.parametrize("angle", ANGLES, ids=str)
+def test_singularities_are_refused_in_any_frame(angle):
+    """Input: one line for all distal links, nearly along y.  c-space: two arms stretched, the third folded (corner)."""
+    mixed = TESTBED.replace(mode=[1, 1, -1])
+    place = TESTBED.base[:2].mean(axis=0)
+    q = rk.inverse_kinematics(mixed, place)
+    turn = np.pi / 2 - (q[0] + q[3]) + angle
+    robot, q = turned(mixed, turn), q + np.repeat([turn, 0.0], 3)
+    assert rk.degree_of_actuation(robot, q) == 1
+    A = rk.control_matrix(robot, q)
+    for refused in (
+        lambda: rk.antagonism_filter(A),
+        lambda: rk.weighted_pseudoinverse(A),
+        lambda: rk.null_basis(A),
+        lambda: rk.null_vector(robot, q),
+        lambda: rk.inverse_dynamics(robot, q, 0 * q, 0 * q),
+        lambda: rk.at(robot, q).A_tilde_T_pinv,
+    ):
+        with pytest.raises(ValueError, match="input singularity"):
+            refused()
+    corner = np.array([0.7, np.pi, -2 * np.pi / 3, np.pi, 0.0, 0.0])
+    for k in range(6):
+        turn = k * np.pi / 6 + angle
+        robot, q = turned(TESTBED, turn), corner + np.repeat([turn, 0.0], 3)
+        assert rk.degree_of_freedom(robot, q) == 3
+        with pytest.raises(ValueError, match="c-space singularity"):
+            rk.nullspace_projector(robot, q)
+        with pytest.raises(ValueError, match="c-space singularity"):
+            rk.forward_dynamics(robot, q, 0 * q, np.zeros(3))
+
+
 @modes
 def test_null_vector_in_closed_form_spans_the_kernel(mode):
     for robot in (TESTBED, MACHINES["asymmetric"]):

@@ -1,5 +1,7 @@
 """The theory on matrices of any mechanism: the machine's own functions, and identities for delta = 3, m = 4."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,7 +10,7 @@ from samples import FRICTIONLESS, MACHINES, machines, random_motion
 import rapkm_lite as rk
 from rapkm_lite.mechanics.antagonism import _references
 from rapkm_lite.mechanics.cores import prestress_shares
-from rapkm_lite.mechanics.linalg import many_inverses, pivots
+from rapkm_lite.mechanics.linalg import least_singular_value, many_inverses
 
 TREE = rk.mass_matrix, rk.coriolis_matrix, rk.generalized_forces
 
@@ -139,12 +141,49 @@ def test_machines_are_unchanged_by_it():
     assert rk.nullspace_projector(FRICTIONLESS, q).shape == (6, 6)
 
 
-def test_pivots_do_not_feel_the_scale():
-    R = np.triu(np.random.default_rng(3).normal(size=(6, 2, 2)))
-    one_by_one = [pivots(1e-6 * matrix) for matrix in R]
-    size, relative = pivots(1e-6 * R)
-    assert_allclose([size, relative], [min(s for s, _ in one_by_one), min(r for _, r in one_by_one)], rtol=1e-15)
-    assert_allclose(relative, pivots(R)[1], rtol=1e-12)
+@pytest.mark.parametrize("k", [1, 2, 3, 5])
+def test_the_least_singular_value_is_that_of_lapack_near_zero_and_a_lower_bound_elsewhere(k):
+    R = np.triu(np.random.default_rng(3).normal(size=(40, k, k)))
+    R[20:, 0, 0] *= 10.0 ** -np.arange(20)
+    found = np.array([least_singular_value(1e-6 * matrix) for matrix in R])
+    sigma, norm = np.linalg.svd(R, compute_uv=False)[:, -1], np.linalg.norm(R, axis=(1, 2))
+    truth = np.stack([1e-6 * sigma, sigma / norm], axis=-1)
+    near = (sigma < 1e-9 * norm) & (k > 1)
+    assert near.any() == (k > 1)
+    least = truth * {1: 1.0, 2: np.sqrt(0.5)}.get(
+        k, 0.0
+    )  # of two singular values the norm is at most 2^(1/2) the larger
+    assert np.all(found <= truth * (1 + 1e-6)) and np.all(found >= least * (1 - 1e-6))
+    assert_allclose(found[near], truth[near], rtol=1e-5 if k > 2 else 0.3)
+    assert np.all(found[~near, 1] >= 1e-9 * np.sqrt(0.5))
+    assert_allclose(least_singular_value(1e-6 * R), found.min(axis=0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e-8, 1e-3, 1.0, 1e3, 1e5, 1e8])
+@pytest.mark.parametrize("delta", [2, 3])
+def test_lost_rank_is_seen_in_any_units_and_order_of_the_coordinates(unit, delta):
+    """Of two parallel columns either one may be the longer, and the first; where the others stand does not matter."""
+    u, v = np.array([1.0, 2.0, 3.0, 5.0]), np.array([1.0, -1.0, 0.3, 0.1])
+    parallel = np.stack([u, unit * u, v][:delta], axis=-1)
+    functions = [
+        rk.weighted_pseudoinverse,
+        rk.antagonism_filter,
+        rk.prestress_projector,
+        rk.null_basis,
+        rk.common_sign,
+        lambda A: rk.command_filter(A, [1.0, 2.0, 3.0, 4.0]),
+        lambda A: rk.weighted_pseudoinverse(A, [1.0, 2.0, 3.0, 4.0]),
+        lambda A: rk.steady_state_error(A, 7.0, [1e-3, 0.0, 0.0, 0.0]),
+        lambda A: rk.effective_gain(A, 7.0),
+    ]
+    for order in itertools.permutations(range(delta)):
+        A = parallel[:, order]
+        for function in functions:
+            for stack in (A, np.stack([np.eye(4, delta), A])):
+                with pytest.raises(ValueError, match="has lost rank"):
+                    function(stack)
+        with pytest.raises(ValueError, match="J has lost rank"):
+            rk.projector(A.T)
 
 
 def test_minors_are_for_stacks_of_two_columns_alone():

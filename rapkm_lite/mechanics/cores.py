@@ -10,7 +10,7 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import by_minors, linear, minors, orthogonal, pairs, pivots, product, solve
+from .linalg import by_minors, least_singular_value, linear, minors, orthogonal, pairs, product, solve
 
 _INPUT_SINGULARITY = (
     "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
@@ -183,11 +183,12 @@ def row_space(J: np.ndarray, size: float, of_pose: bool = True) -> tuple[np.ndar
     Raises ValueError where J, whose entries are of the order of `size`, lacks full rank.
     """
     Q, R = orthogonal(J.mT, complete=J.ndim == 2)
-    smallest = pivots(R)[0] / size
+    smallest = least_singular_value(R)[0] / size
     if smallest < 1e-12:
         start, place = ("q is a c-space singularity: ", "configurations") if of_pose else ("", "matrices")
         raise ValueError(
-            f"{start}J has lost rank (relative pivot {smallest:.3g}); allowed: {place} with rank J = r = {J.shape[-2]}"
+            f"{start}J has lost rank (relative sigma_min {smallest:.3g}); allowed: {place} with rank J = r = "
+            f"{J.shape[-2]}"
         )
     return Q, R
 
@@ -226,9 +227,9 @@ def redundant(N, N_dot, G, C, Q):
 def full_rank(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> tuple[np.ndarray, np.ndarray]:
     """Q and R of A (..., m, k); raises ValueError where A has lost rank."""
     Q, R = orthogonal(A)
-    measure = pivots(R)[1]
+    measure = least_singular_value(R)[1]
     if measure < 1e-12:
-        raise ValueError(f"{name} has lost rank (relative pivot {measure:.3g}): {where}")
+        raise ValueError(f"{name} has lost rank (relative sigma_min {measure:.3g}): {where}")
     return Q, R
 
 
