@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -355,6 +356,16 @@ def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
 def test_a_design_that_does_not_stop_is_not_told_that_it_stops(name, answer, said):
     """The check stops when it tries it; whose code raised the error, the traceback says."""
     assert judged(exercises()[name], answer).sentence.startswith(said)
+
+
+@pytest.mark.parametrize("offsets", [[1j, 1j, 1j], [4e-3 + 1j, -2e-3, 5e-3]])
+def test_complex_offsets_are_called_nothing_but_complex(offsets):
+    """An imaginary part is no number of rad, and what is left without it is not what the student answered."""
+    said = "the answer is complex; a real one is wanted"
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        assert examine("03.unseen_offsets", lambda robot, x: np.array(offsets)) == ("wrong", said)
+    assert not warned
 
 
 @pytest.mark.parametrize(("factor", "named"), [(1e3, True), (np.rad2deg(1.0), False)])

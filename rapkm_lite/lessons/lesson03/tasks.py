@@ -120,7 +120,7 @@ def asked(offsets):
     """The offsets of a design at one place of the testbed, with eta there."""
     robot = load().replace(friction=0.0)
     x = np.array([0.04, -0.05])
-    return np.asarray(offsets(robot, x), dtype=float), null_vector(robot, inverse_kinematics(robot, x))
+    return numbers(given(offsets, (robot, x))), null_vector(robot, inverse_kinematics(robot, x))
 
 
 def along_eta(offsets) -> bool:
