@@ -59,6 +59,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
 
     Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
     chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
+    tolerance : singular values of A~, which are at most 1, count above it.
     Raises ValueError at c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])

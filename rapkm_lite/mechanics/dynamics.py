@@ -109,6 +109,7 @@ def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndar
 
     The text after (7) prints delta = n - m.  Larger values than 2 mark c-space singularities, where J loses rank: on
     the testbed the three corners of the workspace, where one arm is folded and turns freely while two are stretched.
+    tolerance : as in `constraint_rank`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(rk.degree_of_freedom(robot, q))

@@ -186,7 +186,8 @@ def _follow(robot: Manipulator, t, motion: Motion, given: dict) -> Trajectory:
 def polygon(robot: Manipulator, corners, duration: float = 5.0, dt: float = 1e-3, rest: float = 0.0) -> Trajectory:
     """The closed polygon through `corners` (k, 2) in m, each edge quintic from rest to rest in the same time.
 
-    duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after.
+    duration : of the whole run in s, of which `rest` seconds are spent at the first corner before and after; dt of a
+        sample, s.
     Raises ValueError when the path leaves the workspace, or a time does not fit; every edge needs two samples.
 
     >>> import rapkm_lite as rk
@@ -224,7 +225,8 @@ def triangle(
 ) -> Trajectory:
     """The triangle of fig. 4; our choice: equilateral, one corner up, from the lower left corner, counter-clockwise.
 
-    side in m; centre (2,) in m; angle turns the triangle about its centre, rad; times in s and errors, see `polygon`.
+    side in m; centre (2,) in m; angle turns the triangle about its centre, rad.
+    duration, dt, rest in s, and errors: see `polygon`.
 
     >>> from rapkm_lite import load
     >>> triangle(load())
@@ -241,8 +243,9 @@ def triangle(
 def circle(
     robot: Manipulator, radius: float = 0.1, duration: float = 5.0, dt: float = 1e-3, centre=(0, 0), turns: float = 1
 ) -> Trajectory:
-    """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius in m, times in s.
+    """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius and centre (2,) in m.
 
+    duration, dt : of the whole run and of a sample, s.
     turns : how often around, above 0; 0.5 is half of it.  Raises ValueError when the path leaves the workspace.
 
     >>> import rapkm_lite as rk
