@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any
 
 import numpy as np
 
@@ -101,19 +100,17 @@ def least_singular_value(R: np.ndarray) -> tuple[float, float]:
     so it bounds the smallest one from below: closely for k <= 2, and well enough for more where it is far from zero.
     """
     k = R.shape[-1]
-    others = max(k - 1, 1) ** ((k - 1) / 2)  # the product of the others is at most norm^(k - 1) over this
+    others = (k - 1) ** ((k - 1) / 2) if k > 2 else 1  # the product of the others is at most norm^(k - 1) over this
     if R.ndim == 2:
-        norm: Any = max(math.sqrt(np.vdot(R, R)), 1e-300)
-        least = share = others * math.prod([abs(pivot) / norm for pivot in R.diagonal().tolist()])
-    else:
-        norm = np.maximum(np.linalg.norm(R, axis=(-2, -1)), 1e-300)
-        share: Any = others * np.abs(np.diagonal(R, axis1=-2, axis2=-1) / norm[..., None]).prod(axis=-1)
-        least = share.min(initial=np.inf)
-    if k > 2 and least < 1e-9:
-        share = np.linalg.svd(R / np.expand_dims(norm, (-2, -1)), compute_uv=False)[..., -1]
-        least = share.min(initial=np.inf)
-    size = share * norm
-    return float(size if R.ndim == 2 else size.min(initial=np.inf)), float(least)
+        norm = math.sqrt(np.vdot(R, R)) or 1e-300
+        least = others * math.prod([abs(pivot) / norm for pivot in R.diagonal().tolist()])
+        if k < 3 or least > 1e-9:
+            return least * norm, least
+    norms = np.maximum(np.linalg.norm(R, axis=(-2, -1)), 1e-300)
+    share = others * np.abs(np.diagonal(R, axis1=-2, axis2=-1) / norms[..., None]).prod(axis=-1)
+    if k > 2 and share.min(initial=np.inf) < 1e-9:
+        share = np.linalg.svd(R / np.expand_dims(norms, (-2, -1)), compute_uv=False)[..., -1]
+    return float((share * norms).min(initial=np.inf)), float(share.min(initial=np.inf))
 
 
 def minors(A: np.ndarray) -> np.ndarray:
