@@ -886,6 +886,16 @@ def test_controls_snap_to_their_steps():
     assert snap(explore.switch("friction"), True) is True
 
 
+@pytest.mark.parametrize(("step", "digits"), [(1.0, 0), (0.5, 1), (0.25, 2), (0.1, 1), (0.001, 3), (5.0, 0), (2.5, 1)])
+def test_a_slider_shows_as_many_digits_as_its_step_has(step, digits):
+    assert explore.slider("force in N", 0.0, 10.0, step, 0.0).readout_format == f".{digits}f"
+
+
+def test_offsets_are_cut_or_repeated_to_as_many_as_there_are_drives():
+    four, two = (explore.offset_sliders(rk.load(name), [4, -2, 5]) for name in ("four_arms", "five_bar"))
+    assert [one.value for one in four.values()] == [4, -2, 5, 4] and [one.value for one in two.values()] == [4, -2]
+
+
 def test_slow_steps_wait_for_the_release(monkeypatch):
     explorer = light()
     monkeypatch.setattr(sys.modules["rapkm_lite.explore.explorer"], "PATIENCE", -1.0)

@@ -141,6 +141,14 @@ def test_cells_that_a_spreadsheet_would_calculate_are_text(tmp_path):
     assert {row["points"] for row in rows} == {"-1.0"}
 
 
+def test_two_names_that_are_no_text_stay_two_names_in_the_table(tmp_path):
+    """Bytes of a file's name that are not UTF-8 are written as Python escapes them, and nothing is lost."""
+    names = [os.fsdecode(name) for name in (b"ren\xe9", b"ren\xe8")]
+    write_csv(tmp_path / "grades.csv", [Grade(name, NAMES[0], "ok", 1.0, 1.0, "", "") for name in names])
+    with (tmp_path / "grades.csv").open(newline="", encoding="utf-8") as lines:
+        assert [row["student"] for row in csv.DictReader(lines)] == [r"ren\udce9", r"ren\udce8"]
+
+
 def test_a_close_answer_is_no_mistake_in_the_table():
     wrong, close = Grade("ada", "04.x", "wrong", 0, 1, "", "sign"), Grade("ben", "04.x", "close", 1, 1, "", "rounded")
     said = by_exercise([wrong, close])

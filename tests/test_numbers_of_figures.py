@@ -791,6 +791,94 @@ def test_limits_of_x_leave_those_of_y():
     assert picture.xlim("a") == (-5, 5) and picture.ylim("a") == (2, 3)
 
 
+@pytest.mark.parametrize(
+    ("largest", "top"),
+    [(0.9, 1.0), (1.0, 1.5), (1.4, 1.5), (1.9, 2.0), (2.0, 3.0), (2.9, 5.0), (4.7, 5.0), (5.0, 7.0), (6.8, 10.0),
+     (9.6, 15.0), (6e-4, 7e-4)],
+)  # fmt: skip
+def test_limits_are_the_next_step_of_1_15_2_3_5_7_that_leaves_a_twentieth_of_room(largest, top):
+    for symmetric in (True, False):
+        picture = explore.Picture({"a": {"ylim": (-1e6, 1e6)}})
+        picture.fit("a", [0.1 * largest, -largest], symmetric=symmetric)
+        assert_allclose(picture.ylim("a"), (-top if symmetric else 0.0, top), rtol=1e-12)
+
+
+def test_limits_shrink_only_below_half_and_end_at_the_first_step_not_below_the_most():
+    picture = explore.Picture({"a": {"ylim": (-10.0, 10.0)}})
+    for largest, top in ((5.0, 10.0), (9.5, 10.0), (2.0, 3.0), (1.5, 3.0)):
+        picture.fit("a", [largest])
+        assert_allclose(picture.ylim("a"), (-top, top), rtol=1e-12)
+    for most, top in ((2.5, 3.0), (3.0, 3.0), (3.1, 5.0), (1e3, 150.0)):
+        picture.fit("a", [100.0], most=most)
+        assert_allclose(picture.ylim("a"), (-top, top), rtol=1e-12)
+        picture.limits("a", y=(-1e6, 1e6))
+
+
+@pytest.mark.parametrize("size", [0.01, 0.5])
+def test_an_arrow_is_its_own_mirror_image_about_its_vector_and_ends_there(size):
+    """A long one and one so short that its head is most of it; what is shorter than it is wide is none."""
+    picture, start, along = explore.Picture({"a": {}}), np.array([0.3, -0.2]), np.array([0.6, 0.8])
+    picture.arrow("a", start, size * along, 0.006)
+    way = (picture.marks[0].data - start) @ np.array([along, [-0.8, 0.6]]).T
+    assert_allclose(way[::-1] * [1.0, -1.0], way, atol=1e-15)
+    assert_allclose(way.max(axis=0), [size, 1.6 * 0.006])
+    assert_allclose(way[3], [size, 0.0], atol=1e-15)
+    # The shaft reaches to the head, which is four widths long at most.
+    assert_allclose(way[1], [size - min(0.024, 0.6 * size), 0.003])
+    picture.arrow("a", start, 0.005 * along, 0.006)
+    assert len(picture.marks) == 1
+
+
+def test_numbers_that_agree_are_written_once_between_the_bars_and_below_those_that_hang():
+    picture = explore.Picture({"a": {"ylim": (-2, 2)}})
+    explore.bars(picture, "a", [([1.0, -2.0], {}), ([1.0, -0.5], {})])
+    words = [(mark.data[0, 0], mark.data[0, 1], mark.words, mark.style["va"]) for mark in picture.marks if mark.words]
+    wide = 0.42 / 2
+    assert words == [
+        (1, 1.0, "1.00", "bottom"),
+        (2 - wide, -2.0, "−2.00", "top"),
+        (2 + wide, -0.5, "−0.50", "top"),
+    ]
+
+
+def test_rows_of_a_legend_are_read_from_the_left():
+    from rapkm_lite.figures.marks import figure
+
+    names = [f"a curve of some length, {i}" for i in range(7)]
+    picture = explore.Picture({"a": {"ylim": (0, 1), "legend": [(name, {}) for name in names]}}, size=(6.0, 3.0))
+    drawn = figure(picture)
+    drawn.draw_without_rendering()
+    texts = drawn.axes[0].get_legend().get_texts()
+    places = {text.get_text(): text.get_window_extent() for text in texts}
+    rows = {round(box.y0) for box in places.values()}
+    assert 1 < len(rows) < len(names)
+    assert sorted(places, key=lambda name: (-round(places[name].y0), places[name].x0)) == names
+
+
+def test_a_point_out_of_reach_gives_way_to_the_last_one_on_the_way_to_it():
+    """A millimetre before it: on the way from the middle, in reach, and two millimetres farther no more."""
+    from rapkm_lite.figures.marks import clamped
+
+    for point in ([0.4, 0.1], [-0.1, -0.5], [0.0, 0.3]):
+        found = clamped(ROBOT, np.array(point))
+        unit = np.array(point) / np.linalg.norm(point)
+        assert found @ [-unit[1], unit[0]] == pytest.approx(0.0, abs=1e-12) and found @ unit > 0.0
+        assert rk.reachable(ROBOT, found + 0.9e-3 * unit) and not rk.reachable(ROBOT, found + 1.1e-3 * unit)
+    assert clamped(ROBOT, np.array([0.02, 0.03])).tolist() == [0.02, 0.03]
+
+
+def test_on_the_outline_of_the_workspace_an_arm_is_stretched_or_folded():
+    from rapkm_lite.figures.marks import workspace_outline
+
+    robot = rk.Manipulator(base=[[-0.1, 0.0], [0.1, 0.0]], lengths=[0.3, 0.2], masses=0.1)
+    outline = workspace_outline(robot)
+    points = outline[np.isfinite(outline).all(axis=1)]
+    reach = np.linalg.norm(points[:, None] - robot.base, axis=-1)
+    stretched, folded = np.abs(reach - 0.5).min(axis=1), np.abs(reach - 0.1).min(axis=1)
+    # Corners are cut by a cell of the grid at most.
+    assert np.minimum(stretched, folded).max() < 0.01 and (stretched < 1e-3).any() and (folded < 1e-3).any()
+
+
 def test_a_line_without_a_line_has_no_width_on_the_canvas():
     from rapkm_lite.figures.marks.palette import canvas_style
 

@@ -291,7 +291,22 @@ def test_work_of_drives_that_fall_turns_behind_is_the_energy_of_the_machine(wrap
     laws = [wrap(rk.PD(0.02, 0.001)), wrap(rk.PD(200.0, 20.0)), wrap(rk.PD(1e-6, 1e-6))]
     study = rk.sweep(ROUND, laws, LAP, [0.0, 0.0, 0.0])
     for law, energy in zip(laws, study.energies, strict=True):
-        np.testing.assert_allclose(energy, rk.simulate(ROUND, law, LAP).energy, rtol=1e-9)
+        run = rk.simulate(ROUND, law, LAP)
+        assert np.abs(np.diff(run.q_a, axis=0)).max() < 0.1
+        np.testing.assert_allclose(energy, run.energy, rtol=1e-9)
+    # No run is far from its path in the end, though all are a turn behind.
+    twins = rk.sweep(ROUND, laws[2], LAP, np.zeros((2, 3)))
+    np.testing.assert_allclose(twins.energies, [run.energy, run.energy], rtol=1e-9)
+
+
+@pytest.mark.parametrize("wrap", [lambda law: law, textbook], ids=["engine", "textbook"])
+def test_a_drive_begins_on_the_turn_of_the_path_though_the_model_has_it_elsewhere(wrap):
+    """At 3.05 rad in the model and at -3.08 rad in the machine, which is 3.20 rad: the nearest turn."""
+    model = ROBOT.replace(base=ROBOT.base - [[0.0, 0.0], [0.0, 0.0], [0.0, 0.03]])
+    path = rk.hold(ROBOT, [-0.088, 0.053], 0.01)
+    wanted, at = rk.inverse_kinematics(model, path.x[0])[2], rk.inverse_kinematics(ROBOT, path.x[0])[2]
+    run = rk.simulate(ROBOT, wrap(rk.PD(7.05, 0.225)), path, model=model)
+    assert wanted > 3.0 and at < -3.0 and run.q_a[0, 2] == pytest.approx(at + 2 * np.pi, abs=1e-12)
 
 
 def test_pose_of_a_sample_is_on_the_turn_of_what_was_measured_and_found_once():
