@@ -159,6 +159,10 @@ def test_a_lesson_that_was_not_handed_in_has_no_points_and_a_wrong_one_has_zero(
     grades = [Grade("ada", "04.x", "wrong", 0.0, 5.0, "", ""), Grade("ben", "05.y", "ok", 3.0, 3.0, "", "")]
     lines = [line.split() for line in by_student(grades).splitlines()]
     assert lines[1:3] == [["ada", "0", "-", "0", "8"], ["ben", "-", "3", "3", "8"]]
+    # An exercise that two handed in counts once in what can be had.
+    grades.append(Grade("ben", "04.x", "ok", 5.0, 5.0, "", ""))
+    lines = [line.split() for line in by_student(grades).splitlines()]
+    assert lines[1:3] == [["ada", "0", "-", "0", "8"], ["ben", "5", "3", "8", "8"]]
 
 
 @pytest.mark.parametrize("names", [("04_a.ipynb", "04_b.ipynb"), ("04_b.ipynb", "04_a.ipynb")])
