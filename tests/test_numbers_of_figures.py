@@ -808,6 +808,10 @@ def test_limits_shrink_only_below_half_and_end_at_the_first_step_not_below_the_m
     for largest, top in ((5.0, 10.0), (9.5, 10.0), (2.0, 3.0), (1.5, 3.0)):
         picture.fit("a", [largest])
         assert_allclose(picture.ylim("a"), (-top, top), rtol=1e-12)
+    # A panel that begins with other limits keeps none of them.
+    picture.limits("a", y=(0.0, 7.3))
+    picture.fit("a", [6.0])
+    assert_allclose(picture.ylim("a"), (-7.0, 7.0), rtol=1e-12)
     for most, top in ((2.5, 3.0), (3.0, 3.0), (3.1, 5.0), (1e3, 150.0)):
         picture.fit("a", [100.0], most=most)
         assert_allclose(picture.ylim("a"), (-top, top), rtol=1e-12)
