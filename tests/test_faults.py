@@ -601,3 +601,15 @@ def test_a_fault_of_a_users_may_tell_several_times_or_none(time):
     with pytest.raises(rk.SimulationError, match="left the workspace") as lost:
         rk.simulate(ROBOT, rk.PD(7.05, 30.0), PATH, faults=[Slips()])
     assert len(lost.value.partial) > 5
+
+
+def test_a_dropout_ends_at_the_sample_of_its_end_whatever_rounding_made_of_both():
+    """k samples for every end 7 k / 10000 s, many of which are more than k times 7e-4 s in the last bit."""
+    from rapkm_lite.simulation.faults import blank_table
+
+    t = 7e-4 * np.arange(201)
+    for k in range(1, 201):
+        table = blank_table(t, 3)
+        rk.EncoderDropout(1, 0.0, 7 * k / 10000).mark(table, t)
+        assert table.held[:, 1].tolist() == [True] * k + [False] * (201 - k)
+    assert any(t[k] < 7 * k / 10000 for k in range(201))

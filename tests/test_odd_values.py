@@ -82,7 +82,34 @@ def test_numbers_out_of_reason(call, words):
         call()
 
 
-@pytest.mark.parametrize("bad", [-1e200, 1e200, -np.inf, np.nan])
+@pytest.mark.parametrize("times", [1e51, 1e-51])
+def test_a_matrix_just_out_of_the_range_that_is_told_is_refused(times):
+    for A in (times * np.eye(3, 2), times * np.ones((4, 3, 2))):
+        with pytest.raises(ValueError, match=r"A has 1e[+-]51 as largest entry; allowed: 1e-50 to 1e50 in magnitude"):
+            rk.weighted_pseudoinverse(A)
+
+
+def test_links_are_a_thousand_kilometres_long_at_most():
+    base = [[-1e6, 0.0], [1e6, 0.0]]
+    assert rk.Manipulator(base=base, lengths=1e6, masses=1.0).n_arms == 2
+    with pytest.raises(ValueError, match="allowed: up to 1e6 m"):
+        rk.Manipulator(base=base, lengths=1.01e6, masses=1.0)
+
+
+def test_rounding_of_a_large_weight_is_no_lack_of_symmetry():
+    """By some 1e-13 of its largest entry, whatever that is."""
+    W = np.array([[4.0, 1.0 + 4e-13, 0.0], [1.0, 3.0, 0.5], [0.0, 0.5, 2.0]])
+    A = np.eye(3, 2) + 0.1
+    one, large = rk.weighted_pseudoinverse(A, W), rk.weighted_pseudoinverse(A, 1e8 * W)
+    np.testing.assert_allclose(large, one, rtol=1e-12)
+
+
+def test_a_single_row_is_no_control_matrix_to_take_two_from():
+    with pytest.raises(ValueError, match=r"A_tilde has shape \(1, 3\); allowed: \(..., m, n\) with n >= m >= 2"):
+        rk.explicit_pseudoinverse(np.ones((1, 3)), (0, 1))
+
+
+@pytest.mark.parametrize("bad", [-1e200, 1e200, -1e100, 1e100, -np.inf, np.nan])
 def test_one_number_out_of_reason_among_thousands_is_named(bad):
     values = np.zeros(2000)
     values[7] = bad

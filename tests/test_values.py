@@ -313,9 +313,25 @@ def marked_spring(gain):
     return law
 
 
-@pytest.mark.parametrize("spring", [spring_of, keyword_spring, marked_spring])
+def default_spring(gain):
+    return lambda t, q_a, qd_a, d, gain=gain: -gain * (q_a - d.q_a)
+
+
+def elsewhere(gain):
+    """The same code in a module of its own, whose gain it reads."""
+    space = {"gain": gain}
+    exec("def law(t, q_a, qd_a, d):\n    return -gain * (q_a - d.q_a)", space)
+    return space["law"]
+
+
+def test_functions_of_two_modules_differ_though_their_code_is_the_same():
+    law, other = elsewhere(7.0), elsewhere(8.0)
+    assert law.__code__ == other.__code__ and equal(law, law) and not equal(law, other)
+
+
+@pytest.mark.parametrize("spring", [spring_of, keyword_spring, default_spring, marked_spring])
 def test_functions_differ_by_what_they_hold(spring):
-    """In a variable around them, in a default of a keyword, in an attribute."""
+    """In a variable around them, in a default, also of a keyword, in an attribute."""
     assert equal(spring(7.0), spring(7.0)) and not equal(spring(7.0), spring(8.0))
     assert rk.AntagonismFilter(spring(7.0)) != rk.AntagonismFilter(spring(8.0))
 
