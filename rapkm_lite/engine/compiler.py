@@ -1,10 +1,12 @@
 """Numba's compiler for kernels and their parts: less work before the first result, wider vector registers after it.
+What a user compiles, in a law or elsewhere, Numba compiles as ever.
 
 Most of a first run's time goes to Python code of Numba, not to LLVM, and grows with the lines that are compiled.
 """
 
 from __future__ import annotations
 
+import operator
 from types import BuiltinFunctionType
 from typing import ClassVar
 
@@ -12,11 +14,27 @@ from llvmlite import binding as llvm
 from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.cpu import CPUContext
 from numba.core.typing.context import Context
 from numba.extending import models, register_model
+from numba.np.arrayobj import load_item, store_item
 
-IDLE = {"inline_closure_likes", "nopython_rewrites"}
-"""Passes over every line that look for what kernels do without: closures and array expressions."""
+IDLE = {
+    "dump_parfor_diagnostics",
+    "find_literally",
+    "inline_closure_likes",
+    "inline_inlinables",
+    "inline_overloads",
+    "ir_legalization",
+    "literal_unroll",
+    "make_function_op_code_to_jit_function",
+    "nopython_rewrites",
+    "nopython_supported_feature_validation",
+    "Rewrite dynamic raises",
+    "with_lifting",
+}
+"""Passes over every line that look for what kernels do without.  That of legalization says where variables end, too,
+which matters to those with reference counting."""
 
 
 class Operator(types.Function):
@@ -29,6 +47,7 @@ class Operator(types.Function):
     def get_call_type(self, context, args, kws):
         if kws:
             return super().get_call_type(context, args, kws)
+        args = tuple(map(types.unliteral, args))
         if args not in self.known:
             self.known[args] = super().get_call_type(context, args, kws)
         return self.known[args]
@@ -45,13 +64,75 @@ class Rules(Context):
     def __init__(self, rules):
         self.__dict__ = rules.__dict__
 
-    def resolve_value_type(self, val):
-        if not isinstance(val, BuiltinFunctionType):
-            return super().resolve_value_type(val)
-        if val not in self.operators:
-            found = super().resolve_value_type(val)
-            self.operators[val] = Operator(found.templates) if type(found) is types.Function else found
-        return self.operators[val]
+    def _lookup_global(self, gv):
+        found = super()._lookup_global(gv)
+        builtin = isinstance(gv, BuiltinFunctionType) or gv is bool or gv is range
+        if not builtin or type(found) is not types.Function:
+            return found
+        if gv not in self.operators:
+            self.operators[gv] = Operator(found.templates)
+        return self.operators[gv]
+
+
+def _place(context, builder, kind, array, index, number):
+    """Pointer to an item of a flat array.
+
+    Elsewhere a negative index counts from the end.  Kernels have none: to test each index for that would take a tenth
+    of a first run's time, and prevent vectorization.
+    """
+    data = context.data_model_manager[kind].get(builder, array, "data")
+    return builder.gep(data, [context.cast(builder, index, number, types.intp)], inbounds=True)
+
+
+def _take(context, builder, kinds, values):
+    return load_item(context, builder, kinds[0], _place(context, builder, kinds[0], values[0], values[1], kinds[1]))
+
+
+def _put(context, builder, kinds, values):
+    place = _place(context, builder, kinds[0], values[0], values[1], kinds[1])
+    store_item(context, builder, kinds[0], context.cast(builder, values[2], kinds[2], kinds[0].dtype), place)
+
+
+ITEMS = {operator.getitem: _take, operator.setitem: _put}
+
+
+class Processor(CPUContext):
+    """Numba's context of the processor, with items of flat arrays at hand, builtins that are looked up once, and vector
+    registers of 512 bits: on processors of Intel Numba stops at 256, with which runs side by side take a third longer.
+    """
+
+    known: ClassVar[dict] = {}
+
+    def __init__(self, target):
+        self.__dict__ = target.__dict__
+
+    def declare_function(self, module, description):
+        function = super().declare_function(module, description)
+        # As text: llvmlite has no word for it.
+        set.add(function.attributes, '"prefer-vector-width"="512"')
+        return function
+
+    def get_function(self, fn, sig, _firstcall=True):
+        word = getattr(fn, "typing_key", None)
+        if word in ITEMS and _flat(*sig.args[:2]):
+            return lambda builder, values, loc=None: ITEMS[word](self, builder, sig.args, values)
+        if not isinstance(word, BuiltinFunctionType):
+            return super().get_function(fn, sig, _firstcall)
+        key = word, sig.args, sig.return_type
+        if key not in self.known:
+            self.known[key] = super().get_function(fn, sig, _firstcall)._imp
+
+        def apply(builder, values, loc=None):
+            self.add_linking_libs(getattr(self.known[key], "libs", ()))
+            return self.known[key](self, builder, sig, values, loc=loc)
+
+        return apply
+
+
+def _flat(array, index):
+    return (
+        isinstance(array, types.Array) and array.layout == "C" and array.ndim == 1 and isinstance(index, types.Integer)
+    )
 
 
 class Whole(JITCodeLibrary):
@@ -86,22 +167,11 @@ class Part(Whole):
 
 
 class Wide(Compiler):
-    """Numba's compiler, free to use vector registers of 512 bits: on processors of Intel it stops at 256, with which
-    runs side by side take a third longer."""
+    """Numba's compiler for kernels and their parts."""
 
     def __init__(self, rules, target, *rest):
-        super().__init__(Rules(rules), target, *rest)
-        context = self.state.targetctx
-        context.typing_context = self.state.typingctx
-        declare = context.declare_function
-
-        def wide(module, description):
-            function = declare(module, description)
-            # As text: llvmlite has no word for it.
-            set.add(function.attributes, '"prefer-vector-width"="512"')
-            return function
-
-        context.declare_function = wide
+        super().__init__(Rules(rules), Processor(target), *rest)
+        self.state.targetctx.typing_context = self.state.typingctx
 
     def define_pipelines(self):
         state = self.state
@@ -110,5 +180,6 @@ class Wide(Compiler):
         state.library.enable_object_caching()
         pipelines = super().define_pipelines()
         for manager in pipelines:
-            manager.passes = [step for step in manager.passes if step[0].name() not in IDLE]
+            idle = IDLE - {"ir_legalization"} if state.flags.nrt else IDLE
+            manager.passes = [step for step in manager.passes if step[0].name() not in idle]
         return pipelines

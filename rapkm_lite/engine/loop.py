@@ -156,7 +156,7 @@ def record(arms, history, w, k):
 
     What arms that fill up a row leave behind the drives, the next sample writes over.
     """
-    W, o = len(arms), counted(history.drives * k)
+    W, o = len(arms), history.drives * k
     history.x[2 * k], history.x[2 * k + 1] = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)]
     history.xd[2 * k], history.xd[2 * k + 1] = w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
     move(W, w, Q * W, history.q, o)
@@ -222,7 +222,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
     rows = len(table) // columns
     start(lanes, arms, history, clock, table, w)
     for row in range(rows):
-        k, o = counted(clock.first + row), counted(row * columns)
+        k, o = clock.first + row, row * columns
 
         # Sense: the machine as it is, and what the hold will start from.
         far = sense(lanes, arms, extra, study, history, table, o, w, dt)

@@ -54,15 +54,6 @@ ENVIRONMENT, SINGLES = 3, 63
 
 
 @index
-def counted(k):
-    """The whole number k, of which the compiler then knows that it is not negative.
-
-    A negative index counts from the end of an array: testing each index for that would prevent vectorization.
-    """
-    return k & 0xFFFFFFFFFF
-
-
-@index
 def at(block, i, j, W, L):
     """Index of arm i and run j in a pair row."""
     return (block * W + i) * L + j
