@@ -1,4 +1,13 @@
-"""Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel."""
+"""Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel.
+
+Joint vectors q (..., 2N) in rad hold the base angles of arms 1 to N, then their elbow angles, relative to the proximal
+links; rates qd and accelerations qdd likewise.  Points x (..., 2) are in m; of the drives, angles q_a (..., N) are in
+rad and torques c (..., N) in N m.  Dots are any leading axes: none for one pose, one for those of a trajectory.
+Indices count from 0; "arm 2" in words is the second one, of index 1.  Numbers in brackets are equations of the chapter.
+
+A wrong argument raises ValueError with its name, what was given and what is allowed; docstrings say what is raised
+besides.  Loops are open where tips are more than 1e-3 of the longest link apart; `close_loops` closes them.
+"""
 
 from .control.compiled_law import CompiledLaw, compiled
 from .control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC

@@ -1,7 +1,12 @@
 """Every figure under one name: ``plotting.plot_x(..., ax=None) -> ax``; one colour per arm everywhere.
 
-Written by ``python notebooks/build.py``, for editors and readers; the figures live in the modules below.
+ax, axes : where to draw, default a new figure; they are returned.  n : samples along a side of a map.
+robot : any `Manipulator`.  q : pose (2N,), rad.  offset : (N,) rad.  K_P : N m/rad.  mode : (N,) signs.
+pair, pairs : drives, counted from 0.  frames : how many pictures a ready-made film has.
+Wrong arguments raise ValueError, as in `rapkm_lite`, and so do poses that cannot be drawn.
 """
+
+# Written by python notebooks/build.py, for editors and readers; the figures live in the modules below.
 
 from .figures.arguments import guarded
 from .figures.film import LARGEST, film

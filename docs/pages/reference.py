@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import rapkm_lite
-from pages.hooks import escaped
+from pages.hooks import escaped, readable
 from rapkm_lite import checks, explore, plotting
 
 ROOMS = {
@@ -50,8 +50,15 @@ def _line(module: str, source, name: str) -> str:
     return f"* :py:obj:`{name} <{module}.{name}>`: {escaped(first)}"
 
 
+def _conventions(module) -> list[str]:
+    """What the docstring of a module says of all its functions: the paragraphs after the first, without the example."""
+    return readable(inspect.getdoc(module).split(">>>")[0].rstrip().splitlines()[2:])
+
+
 def _page(title: str, module: str, source, names: list[str]) -> str:
     lines = [title, "=" * len(title), "", f".. currentmodule:: {module}", ""]
+    if source is not rapkm_lite:
+        lines += [*_conventions(source), ""]
     for name in names:
         kind = "class" if inspect.isclass(getattr(source, name)) else "function"
         lines += [f".. auto{kind}:: {module}.{name}", *(["   :members:", ""] if kind == "class" else [""])]
@@ -69,6 +76,10 @@ def write(folder: Path) -> None:
         "=========",
         "",
         words,
+        "",
+        ".. currentmodule:: rapkm_lite",
+        "",
+        *_conventions(rapkm_lite),
         "",
         ".. toctree::",
         "   :hidden:",

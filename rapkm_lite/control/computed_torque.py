@@ -45,7 +45,7 @@ class APD(LawValue):
 
     K_P, K_D : one number, (2,) or (2, 2), N m/rad and N m s/rad (N/m and N s/m in end-effector coordinates).
     independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
-    Where the independent coordinates are singular `torque` raises ValueError, and a run ends with SimulationError.
+    Where `independent` or A is singular `torque` raises ValueError, and a run SimulationError.  For pose see `Law`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
     >>> law = rk.APD(K_P=7.0, K_D=0.2, independent=(0, 1))
@@ -95,7 +95,7 @@ class APD(LawValue):
 class CTC(APD):
     """Computed torque in minimal coordinates (20): c = (A^T)_W^+ (Gbar v2 + Cbar q2d + Qbar),
 
-    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments of `APD`; K_P in 1/s^2, K_D in 1/s.
+    v2 = q2dd^d - K_D e2d - K_P e2, with the arguments and errors of `APD`; K_P in 1/s^2, K_D in 1/s.
 
     >>> import rapkm_lite as rk
     >>> rk.CTC(K_P=400, K_D=40, independent=(0, 1))
@@ -116,6 +116,7 @@ class SwitchedCTC(LawValue):
 
     It keeps a pair (j, k) until another one has |d_j x d_k| larger by the factor `hysteresis` >= 1; of equal ones, to
     1e-9, it takes the first of `drive_pairs`.  The pair in use is its memory.
+    Where no pair is regular `torque` raises ValueError, and a run SimulationError.  For pose see `Law`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.SwitchedCTC(K_P=400, K_D=40, hysteresis=1.2).choose(robot, q)
@@ -198,6 +199,7 @@ class RedundantAPD(LawValue):
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     projected : False reads line 2 of the print, c = (A~^T)^+ N_J (G qdd^d + C qd^d + Q - K_P e - K_D ed), which is
         another law: both agree for e = ed = 0 and for a desired pose at rest.
+    At c-space and input singularities `torque` raises ValueError, and a run SimulationError.  For pose see `Law`.
 
     >>> import rapkm_lite as rk
     >>> rk.RedundantAPD(K_P=[7.0, 7.0, 7.0], K_D=[0.2, 0.2, 0.2])
@@ -241,7 +243,7 @@ class RedundantAPD(LawValue):
 class RedundantCTC(RedundantAPD):
     """Computed torque in redundant coordinates (32), v = qdd^d - K_D ed - K_P e; the print has qdd instead of qdd^d.
 
-    K_P in 1/s^2, K_D in 1/s : (m,) are the chapter's gains (29) on the driven joints, see `RedundantAPD`.
+    K_P in 1/s^2, K_D in 1/s, rule, pose and errors: see `RedundantAPD`; (m,) are the chapter's gains (29).
     projected : True reads line 1 of (32), c = (A~^T)^+ (G~ v + C~ qd + Q~) with G~ = N_J G N_J; False reads line 2,
         c = (A~^T)^+ N_J (G v + C qd + Q).  They differ unless v is tangent to V up to Ndot_J qd.
 

@@ -65,7 +65,7 @@ class Law:
     _unasked: ClassVar[dict[str, str]] = {}
 
     def start(self, model: Manipulator, dt: float):
-        """The memory at the beginning of a run sampled every dt in s."""
+        """The memory at the beginning of a run with this model, sampled every dt in s."""
         return None
 
     def step(self, memory, sample) -> tuple[np.ndarray, object]:
@@ -74,10 +74,10 @@ class Law:
         return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
 
     def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
-        """Drive torques c (..., N) in N m.
+        """Drive torques c (..., N) in N m at a pose of the model, q, qd, measured q_a, qd_a, and a desired motion.
 
-        Raises NotImplementedError for laws that have none without a memory, such as `PID`, for functions, and for a
-        filter around either.
+        Raises NotImplementedError for laws that have none without a memory, such as `PID`, functions, and a filter
+        around either; ValueError for open loops and at singularities of the law, where it uses the pose.
         """
         alone = type(self).start is Law.start and type(self).step is Law.step
         no = "gives neither torque nor step; needed: one of them"

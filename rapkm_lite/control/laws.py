@@ -139,6 +139,7 @@ class AntagonismFilter(LawValue):
     pose : "measured" or "true", where R is formed; the law inside keeps its own.
     W : positive definite number, (m,) or (m, m); then R = (A^T)_W^+ A^T, and of all torques with the same end-effector
         force c has the smallest c^T W c.  W = diag(R_el / k_t^2) makes the least heat; default the identity.
+    At input singularities, where there is no R, `torque` raises ValueError, and a run ends with SimulationError.
 
     >>> AntagonismFilter(PD(7.05, 0.225))
     AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
@@ -180,7 +181,7 @@ class CommandFilter(LawValue):
     """Command form: PD drives that get the commands (18), whose errors are filtered as in (17):
 
     c = -K_P R_{A^T K_P} e - K_D R_{A^T K_D} ed, see `command_filter`.  The end-effector force is that of (16), the
-    torques in general only for K = k_P I.
+    torques in general only for K = k_P I.  `law` is a `PD`; for pose and errors see `AntagonismFilter`.
 
     >>> import rapkm_lite as rk
     >>> rk.CommandFilter(rk.PD(7.05, 0.225))

@@ -30,7 +30,7 @@ def one_instant(model, t, q_a, qd_a, desired, truth) -> tuple:
 
 
 class Sample:
-    """What a controller knows at one instant.
+    """What a controller knows at one instant, as a law's `step` gets it.
 
     t, dt : time and sampling time, s.  model : the controller's own manipulator.
     q_a, qd_a : measured base angles and rates (N,), rad and rad/s, in a run read-only.  desired : the desired motion.
@@ -74,7 +74,7 @@ class Sample:
         raise AttributeError(f"{name} of a Sample cannot be set, others read it, too; allowed: a name of your own")
 
     def errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Measured minus desired base angles and rates, (N,) each."""
+        """Measured minus desired base angles and rates, (N,) each, rad and rad/s."""
         desired, N = self.desired, self.model.n_arms
         return self.q_a - desired.q[:N], self.qd_a - desired.qd[:N]
 
@@ -129,7 +129,7 @@ class Controller:
     `simulate` uses one per run.  Use your own in a loop of your own, called once per sample as
     ``controller(t, q_a, qd_a, desired, truth=(x, xd))`` with measured base angles and rates (N,); the true end-effector
     motion is needed for a law with pose="true" only.
-    dt : sampling time in s.
+    model : the controller's own manipulator.  dt : sampling time in s.
     Raises ValueError for arguments that do not fit, ConvergenceError when the angles fit no pose.
 
     nearest : a faster way than `estimate_pose` from angles and guess to the end-effector position, or None; it may
@@ -164,6 +164,6 @@ class Controller:
         return self.command(*one_instant(self.model, t, q_a, qd_a, desired, truth))
 
     def command(self, t, q_a, qd_a, desired, truth=None) -> np.ndarray:
-        """The same without a check of the measurement."""
+        """What a call of the controller returns, without its check of the measurement."""
         c, self.memory = ask(self.law, self.memory, Sample._made(self, t, q_a, qd_a, desired, truth))
         return c

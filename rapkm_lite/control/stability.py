@@ -79,7 +79,7 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
         tangent to V only, where the degree of actuation is delta.  eps : in 1/s, not negative.
     At a fixed desired pose V with eps = 0 falls under `RedundantAPD`, dV/dt = -ed^T K_D ed: not at all where ed = 0.
     With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that a small eps makes the tracking exponential is
-    what the chapter states.  Raises ValueError for arguments that do not fit, and at c-space singularities.
+    what the chapter states.  Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))
@@ -98,7 +98,8 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
 
     pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
-    (A~^T)^+ G~.  Raises ValueError at input singularities and for open loops.
+    (A~^T)^+ G~.  Raises ValueError at input singularities and for open loops, for a pair where an arm is stretched or
+    folded, too; where the pair is singular the norm is large, not infinite.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.feedback_norm(robot, q).round(4))

@@ -1,5 +1,8 @@
 """Pictures to take in hand: ready-made explorers, and `explorer` to build others.
 
+robot : any `Manipulator`; default the testbed, without friction but in `imperfections`.
+Wrong arguments raise ValueError; what cannot be computed is a sentence in the picture, `problem`.
+
 >>> from rapkm_lite import explore
 >>> explore.prestress().set(level=0).numbers["largest prestress"]
 '0 mN m'

@@ -26,6 +26,7 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
     """Draw the arms at one pose q (2N,); `arms` picks some of them (0-based), each from its own base to its own tip.
 
     Filled circles are driven joints, open circles passive ones, the square is the end-effector.
+    alpha : opacity, 0 to 1.  labels : number the drives.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_machine(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))

@@ -94,7 +94,7 @@ def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
 
 
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
-    """A measure over the workspace: x (n,), y (n,) in m and a masked array (n, n), rows along y.
+    """A measure over the workspace: x (n,), y (n,) in m, masked values (n, n), rows along y, colours vmin to vmax.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min(Ã), all drives")
@@ -115,6 +115,7 @@ def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, ba
 def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = False, n: int = 300, **line):
     """Curves where the two distal links of a pair are parallel: its parameterization singularities.
 
+    pairs : some of `drive_pairs`, as tuples; default all.
     on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
 
     >>> import rapkm_lite as rk

@@ -19,7 +19,7 @@ from .values import Array, Value
 class Log(Value):
     """A log of a run, one row per record; read-only.
 
-    t : (k,) s, increasing.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
+    name : text.  t : (k,) s, increasing.  q_a : (k, N) base angles as the encoders gave them, offsets included, rad.
     q_a_desired : (k, N) rad.  c : (k, N) drive torques, N m, in a laboratory with the noise of a current sensor.
     Raises ValueError for shapes that do not fit, numbers that are not finite, or times that do not increase.
 

@@ -45,7 +45,7 @@ class Manipulator(Value):
     friction_velocity : v0 of f_c tanh(qd / v0), rad/s; runs take time in proportion to f_c / v0 where it is stiff.
     gravity : (2,) gravity vector in the plane, m/s^2; default zero (horizontal plane).
     load : point mass at the end-effector, kg, carried by arm 2 of the cut tree.
-    mode : (N,) working mode, s_i = sign(sin(elbow angle i)).
+    mode : (N,) working mode, s_i = sign(sin(elbow angle i)).  name : what it is called.
 
     Raises ValueError naming the argument, its value and what is allowed; also when the arms cannot meet.
 

@@ -186,7 +186,7 @@ class Value:
 
     @classmethod
     def trusted(cls, *fields):
-        """A value of fields that are known to be right, and frozen: nothing is looked at."""
+        """A value made without any check, from fields that are known to be right, and frozen."""
         made = cls.__new__(cls)
         made.__dict__.update(zip(_names(cls), fields, strict=True))
         return made

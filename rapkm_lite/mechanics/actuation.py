@@ -31,7 +31,7 @@ def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
     """A(q) of the text before (6), qd_a = A q2d, so that A^T c are the control forces in (6), (..., m, 2).
 
     independent : two 0-based joint indices, or None for the end-effector position (then A is in rad/m).
-    Raises ValueError where the choice is singular.
+    Raises ValueError where the choice is singular, see `orthogonal_complement`, and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.control_matrix(robot, q).round(2)
@@ -45,7 +45,7 @@ def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
 def redundant_control_matrix(robot: Manipulator, q) -> np.ndarray:
     """A~(q) of (21), the rows of N_J of the driven joints, (..., m, 2N): the control forces in (22), (23) are A~^T c.
 
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.redundant_control_matrix(robot, q).shape
@@ -60,7 +60,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
     Counted as the rank of A~, whose entries need no scaling.  Where alpha changes in every neighbourhood of q, the
     chapter calls q an input singularity; here these are the poses with alpha < delta = 2.
     tolerance : singular values of A~, which are at most 1, count above it.
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(rk.degree_of_actuation(robot, q))
@@ -77,7 +77,7 @@ def actuation_type(robot: Manipulator, q):
     The text after it compares alpha with delta and with m, separately: since m >= 2, a pose with alpha < 2 is both
     underactuated (alpha < delta) and redundantly actuated (m > alpha), so redundantly underactuated.
     A str for one pose q (2N,), an array (...,) of str for many.
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.actuation_type(robot, q)
@@ -92,7 +92,7 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
     """Lower half Gbar^-1 A^T of the control vector fields g in (9), (..., 2, m): q2dd per unit torque of each drive.
 
     The state (q2, q2d) of (8) moves along the drift field f of (9) and the sum of these fields times the torques.
-    Raises ValueError where the choice of independent coordinates is singular.
+    `independent` and errors: see `control_matrix`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.control_vector_fields(robot, q).shape

@@ -22,7 +22,8 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
 
     tolerance : largest closure error relative to the longest link, and largest tangential remainder in rad; where the
         base is so far from the origin that its coordinates are rounded more coarsely, that rounding.
-    Raises ConvergenceError with the residual and the pose.
+    iterations : the most steps.
+    Raises ConvergenceError with the residual and the pose where it takes more steps or meets a c-space singularity.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> bool(abs(rk.loop_constraints(robot, rk.close_loops(robot, q + 0.01))).max() < 1e-13)
@@ -110,6 +111,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     exact Hessian is not positive definite; its working mode is ``robot.mode``.  For N = 2 this is the forward
     kinematics of the five-bar.  The minimum is that near the guess; near an input singularity another one may be close.
     Its base angles are on the turn of the measured ones, the elbow angles in (-pi, pi].
+    tolerance : largest last step relative to the longest link.  iterations : the most steps.
     Raises ConvergenceError with the residuals and the pose, also where the search ends at the rim of the workspace, and
     ValueError where it meets an input singularity.
 

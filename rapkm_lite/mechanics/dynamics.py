@@ -81,7 +81,7 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
     """Gbar, Cbar, Qbar of (7), the terms of (6):  Gbar q2dd + Cbar q2d + Qbar = A^T c.
 
     Gbar = F^T G F, Cbar = F^T (C F + G Fdot), both (..., 2, 2); Qbar = F^T Q, (..., 2).
-    Raises ValueError where the choice of independent coordinates is singular.
+    `independent` and errors: see `orthogonal_complement`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> Gbar, Cbar, Qbar = rk.minimal_dynamics(robot, q, 0 * q)
@@ -122,7 +122,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
     """N_J = I - J^+ J of section 4.3, (..., 2N, 2N): the orthogonal projector onto the tangent space of V.
 
     (21) partitions it into the rows of passive and driven joints; the latter are `redundant_control_matrix`.
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> N = rk.nullspace_projector(robot, q)
@@ -135,7 +135,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
 def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., 2N, 2N) in 1/s, of the text after (24), which prints B for J.
 
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> N, N_dot = rk.nullspace_projector(robot, q), rk.nullspace_projector_dot(robot, q, q)
@@ -150,7 +150,7 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
 
     It is (22), N_J (G qdd + C qd + Q) = A~^T c, with the motion projected to V, N_J qd and N_J qdd + Ndot_J qd:
     G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), both (..., 2N, 2N); Q~ = N_J Q, (..., 2N).
-    Raises ValueError at c-space singularities.
+    Raises ValueError at c-space singularities and for open loops.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> G, C, Q = rk.redundant_dynamics(robot, q, q)

@@ -46,7 +46,7 @@ def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tips(robot: Manipulator, q) -> np.ndarray:
-    """Tips of the N arms of the cut tree, (..., N, 2) in m.
+    """Tips of the N arms of the cut tree, (..., N, 2) in m; where the loops are open, they differ.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> np.allclose(rk.tips(robot, q), [0.02, 0.05])
@@ -59,7 +59,7 @@ def tips(robot: Manipulator, q) -> np.ndarray:
 def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
     """End-effector position (..., 2) in m: the tip of arm 2, from which all others are cut.
 
-    On the configuration space V all tips agree; `close_loops` brings a rough q there.
+    On the configuration space V all tips agree; a rough q is taken as it is, and `close_loops` brings it there.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.forward_kinematics(robot, q).round(12)

@@ -65,6 +65,7 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
         largest share |n_i| of each drive in a unit prestress, A^T n = 0, on a leading axis of length N >= 3: for three
         arms the components of `null_vector`, else the lengths of the rows of `null_basis`.
     mode : working mode (..., N), e.g. ``working_modes(robot)`` for all at once; default ``robot.mode``.
+    n, box : see `workspace_grid`.
     pair : two 0-based drives that alone are to act, for the first three measures; default all drives.  The zeros are
         then the parameterization singularities of the pair.
     Raises ValueError for an unknown measure, pair, mode or box, and for a prestress of two arms or of a pair.

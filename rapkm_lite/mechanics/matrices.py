@@ -60,6 +60,8 @@ def projector(J) -> np.ndarray:
 def projector_dot(J, J_dot) -> np.ndarray:
     """dN_J/dt = -(J^+ Jdot N_J) - (J^+ Jdot N_J)^T, (..., n, n), of the text after (24), which prints B for J.
 
+    J_dot : (..., r, n), dJ/dt.  Raises ValueError where J lacks full rank.
+
     >>> float(projector_dot([[1.0, 0.0]], [[0.0, 2.0]])[0, 1])
     -2.0
     """
@@ -69,7 +71,7 @@ def projector_dot(J, J_dot) -> np.ndarray:
 
 
 def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gbar, Cbar, Qbar of (7) from F, its rate and the tree: (..., delta, delta) twice, (..., delta).
+    """Gbar, Cbar, Qbar of (7) from F, F_dot (..., n, delta) and G, C, Q: (..., delta, delta) twice, (..., delta).
 
     >>> Gbar, Cbar, Qbar = minimal_terms([[1.0], [2.0]], [[0.0], [0.0]], np.eye(2), np.zeros((2, 2)), [0.0, 1.0])
     >>> Gbar, Qbar
@@ -82,7 +84,7 @@ def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """G~, C~, Q~ of (24) from N_J, its rate and the tree: (..., n, n) twice, (..., n).
+    """G~, C~, Q~ of (24) from N_J, N_dot (..., n, n) and G, C, Q of the tree: (..., n, n) twice, (..., n).
 
     >>> N = projector([[1.0, 0.0]])
     >>> redundant_terms(N, 0 * N, np.eye(2), np.zeros((2, 2)), [1.0, 1.0])[2]

@@ -16,9 +16,9 @@ from .sampling import Motion, check_rates, chosen, columns, equidistant, quintic
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Desired(Value):
-    """Desired motion at one sample (or many: leading axes): x, xd, xdd (..., 2) and q, qd, qdd (..., 2N), read-only.
+    """Desired motion at one sample (or many: leading axes), x, xd, xdd (..., 2) in m, s, q, qd, qdd (..., 2N) rad, s.
 
-    Every array is C-contiguous; who writes into one gets NumPy's ValueError, so that no law can shift the path.
+    n_arms : N.  Every array is C-contiguous and read-only: a law that writes into one gets NumPy's ValueError.
 
     >>> import rapkm_lite as rk
     >>> rk.triangle(rk.load())[2500].x.round(3)
@@ -64,6 +64,7 @@ class Trajectory(Desired):
     """A desired motion: `Desired` with one row per sample, and the times t (k,) in s; ``trajectory[k]`` is one sample.
 
     x, xd, xdd : (k, 2) in m, m/s, m/s^2.  q, qd, qdd : (k, 2N) in rad, rad/s, rad/s^2, continuous in time.
+    robot : the machine that q belongs to.  n_arms : its N.
 
     >>> import rapkm_lite as rk
     >>> path = rk.circle(rk.load(), radius=0.05, duration=1.0)
@@ -162,8 +163,8 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     """A trajectory from the sampled end-effector motion x, xd, xdd, each (k, 2), at equidistant times t (k,).
 
     Raises ValueError when the path leaves the workspace, for times that are not equidistant from zero on (to 1e-6 of a
-    step), and where xd errs by a tenth, or xdd by half, of the largest step that is made or meant, except at a few
-    jumps; xdd may be all 0.
+    step), and where x steps otherwise than xd says, by a tenth of the largest step, or xd otherwise than xdd, by half,
+    at more than two samples and 5 % of them; xdd may be all 0.
 
     >>> import rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
@@ -267,7 +268,7 @@ def circle(
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
-    """Stay at the point x (2,) in m for `duration` in s; raises ValueError unless x lies inside the workspace.
+    """Stay at x (2,) in m for `duration` in s, in samples of dt; raises ValueError unless x is inside the workspace.
 
     >>> import rapkm_lite as rk
     >>> rk.hold(rk.load(), [0.02, 0.05], duration=0.5)

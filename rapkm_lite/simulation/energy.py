@@ -43,7 +43,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
 
 
 def mechanical_work(run) -> np.ndarray:
-    """Work of the drives on the mechanism (N,) in J, over the holds c[k] (q_a[k+1] - q_a[k]).
+    """Work of the drives on the mechanism (N,) in J, the sum over holds of c[k] (q_a[k+1] - q_a[k]).
 
     Without friction it sums over the drives to the energy that the machine has gained: to zero in a horizontal plane on
     a closed path from rest to rest.
@@ -94,6 +94,7 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     S = integral of K_0^T (R_el / k_t^2) K_0 dt, where -K_0 dq are the torques at rest of the corrected (14) at each
     point of the path: quasi-static, to first order in the offsets, without friction.  Weight is left out: in a vertical
     plane drives of unequal gains fight over it, too, and the cost of offsets has a part that is linear in them.
+    K_P : number, (N,) or (N, N), N m/rad.  Raises ValueError outside the workspace and at input singularities.
 
     >>> import rapkm_lite as rk
     >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)

@@ -57,7 +57,7 @@ def experiment(source="testbed") -> Experiment:
 
     [sensor] holds the arguments of `Sensors`; each [[fault]] holds the `kind` of a fault and its arguments, such as
     ``kind = "DeadDrive"``, ``drive = 1``, ``time = 0.5``.
-    Raises ValueError for an unknown key or a value out of range.
+    source : see `load`.  Raises ValueError for an unknown key or a value out of range.
 
     >>> import rapkm_lite as rk
     >>> rk.experiment("table1_reading").offset.shape

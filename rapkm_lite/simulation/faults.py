@@ -46,7 +46,7 @@ class Fault(Value):
         raise NotImplementedError(f"{type(self).__name__} has no mark; needed: mark(table, t), see the other faults")
 
     def felt(self, c: np.ndarray) -> bool:
-        """Can it have cost a run in which the torques c (k, N) acted?"""
+        """Can it be why a run was lost in which the torques c (k, N) acted?"""
         return True
 
     def _check(self) -> None:
@@ -87,7 +87,7 @@ class TorqueLimit(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeadDrive(Fault):
-    """A drive gives no torque from `time` on; it goes on measuring.
+    """A drive (0-based) gives no torque from `time` in s on; it goes on measuring.
 
     >>> import rapkm_lite as rk
     >>> rk.DeadDrive(drive=1, time=0.5)
@@ -107,10 +107,10 @@ class DeadDrive(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EncoderDropout(Fault):
-    """An encoder repeats its last reading before `start` for start <= t < stop; at the first sample it reads once.
+    """The encoder of a drive (0-based) repeats its last reading before `start` for start <= t < stop, in s.
 
-    Its rate is that of the repeated reading: zero where rates are ideal and at the first sample, else what the velocity
-    filter makes of it.
+    At the first sample of a run it reads once.  Its rate is that of the repeated reading: zero where rates are ideal
+    and at the first sample, else what the velocity filter makes of it.
 
     >>> import rapkm_lite as rk
     >>> rk.EncoderDropout(drive=0, start=0.5, stop=0.7)
@@ -133,7 +133,7 @@ class EncoderDropout(Fault):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OffsetJump(Fault):
-    """The offset of a drive changes by `jump` in rad from `time` on (a slipping coupling); then the encoder rounds.
+    """From `time` in s on the offset of a drive (0-based) is larger by `jump` in rad (a slip); then the encoder rounds.
 
     >>> import rapkm_lite as rk
     >>> rk.OffsetJump(drive=2, time=0.5, jump=5e-3)

@@ -67,10 +67,10 @@ class SimulationError(RuntimeError):
 class Run(Value):
     """Result of a sampled closed loop, one row per sample.
 
-    law : the law that ran; a copy, when it was an object in Python.
+    robot : the machine.  law : the law that ran; a copy, when it was an object in Python.
     model : the controller's own manipulator; `trajectory` is its desired motion.
     sensors, faults : with which it measured, and what was broken.
-    t : (k,) s.  x, xd : (k, 2) true end-effector motion, m and m/s.  q_a, qd_a : (k, N) true base angles and rates.
+    t : (k,) s.  x, xd : (k, 2) true end-effector motion, m, m/s.  q_a, qd_a : (k, N) of the base joints, rad, rad/s.
     c : (k, N) drive torques in N m that act; c[k] is held from t[k] to t[k+1] (the last row is never applied).
     pairs : (k, 2) independent joints in use at each sample, -1 where the law has none.
 
@@ -140,7 +140,7 @@ class Run(Value):
 
     @property
     def path_error(self) -> np.ndarray:
-        """Distance (k,) in m of the end-effector from its desired place at each sample, along the path, too."""
+        """Distance (k,) in m of the end-effector from its desired place at each sample, also where it lags."""
         return np.linalg.norm(self.x - self.trajectory.x[: len(self)], axis=-1)
 
     @property

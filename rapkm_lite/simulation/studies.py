@@ -24,6 +24,7 @@ from .setup import prepare
 class Sweep(Value):
     """Result of `sweep`, one row per run; rows of failed runs are masked, and zero under the mask: use `compressed`.
 
+    law : the law, or a tuple of k.  offsets : (k, N) rad; robot and trajectory were the same for all runs.
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.
     antagonistic_energy : (k,) J, (R_el / k_t^2) times the integral of ||c_null||^2 at the true pose.

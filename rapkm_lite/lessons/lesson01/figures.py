@@ -204,7 +204,7 @@ def plot_loop_gaps(t, gaps: dict, ax=None):
 
 
 def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, title: str = ""):
-    """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, as arrows from the pin.
+    """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, arrows of 1 / newton_per_metre m per N.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> ax = plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])

@@ -103,7 +103,7 @@ def plot_prestress_maps(robot, axes=None, n: int = 161):
 
 
 def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=None, drives=True):
-    """Forces at the end-effector that torques up to `torque` N m can produce at one pose q, and each drive's own share.
+    """Forces at the end-effector that torques up to `torque` N m can produce at one pose q; `drives`: each one's, too.
 
     guaranteed : radius in N of a disc to draw, the force that is available in every direction.
 

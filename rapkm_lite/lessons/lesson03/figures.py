@@ -87,7 +87,7 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
 def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, title: str = ""):
     """Norm of the rest torques over the workspace, with the lines on which these offsets cause no fight at all.
 
-    For three arms.
+    trajectory : a path to draw; default none.  For three arms.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_fight_map(rk.load(), [4e-3, -2e-3, 5e-3], 7.05, n=21)

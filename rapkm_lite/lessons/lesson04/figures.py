@@ -33,7 +33,7 @@ def _pair_poses(robot, q_a, guess) -> dict:
 def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     """The machine at x (2,) in m as two five-bars that share a drive, with offsets (N,) in rad.
 
-    Left: both five-bars as their measured angles say, the offsets magnified.  Right: in mm about x, the end-effector
+    Left: both five-bars as their measured angles say, offsets times `magnify`.  Right: in mm about x, the end-effector
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
 
     >>> import rapkm_lite as rk; ax = plot_synchronization(rk.load(), [0.0, 0.0], [4e-3, -2e-3, 5e-3])

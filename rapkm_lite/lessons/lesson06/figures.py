@@ -48,7 +48,7 @@ def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
 
 
 def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J", path=None):
-    """A value (k,) for each path centre (k, 2) in m as coloured squares on the machine's workspace, and one path.
+    """A value (k,) for each path centre (k, 2) in m as coloured squares on the workspace, and a Trajectory `path`.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_placement(rk.load(), [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02], [0.02, 0.02]], [1.0, 2.0, 3.0, 4.0])
@@ -86,7 +86,7 @@ def plot_bands(samples: dict, ax=None):
 
 
 def plot_readings(names, low, high, readings, reference=None, ax=None):
-    """Parameter sets (k, p) as dots in their search ranges low, high (p,), one row per parameter; one line per set.
+    """Parameter sets (k, p), and a marked one `reference`, as dots in their ranges low, high (p,), a row per parameter.
 
     >>> ax = plot_readings(["K_P", "K_D"], [0.0, 0.0], [10.0, 1.0], [[7.05, 0.225], [6.0, 0.3]])
     """
