@@ -62,7 +62,11 @@ class Rules(Context):
     operators: ClassVar[dict] = {}
 
     def __init__(self, rules):
+        rules.refresh()
         self.__dict__ = rules.__dict__
+
+    def refresh(self):
+        """Nothing has come since; and what Numba adds to, are its own operators."""
 
     def _lookup_global(self, gv):
         found = super()._lookup_global(gv)
@@ -104,7 +108,11 @@ class Processor(CPUContext):
     known: ClassVar[dict] = {}
 
     def __init__(self, target):
+        target.refresh()
         self.__dict__ = target.__dict__
+
+    def refresh(self):
+        """As `Rules.refresh`."""
 
     def declare_function(self, module, description):
         function = super().declare_function(module, description)

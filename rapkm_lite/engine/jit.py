@@ -17,6 +17,7 @@ COMPILED = compiled()
 if COMPILED:
     from llvmlite import ir
     from numba import njit, types
+    from numba.core.runtime import rtsys
     from numba.extending import intrinsic
 
     from .compiler import Wide
@@ -93,9 +94,15 @@ def _forgiving(dispatcher):
                 old.unlink(missing_ok=True)
         save(*arguments)
 
+    def loaded(signature, context):
+        """A kernel from the cache, with Numba's runtime; of all that Numba can compile, and would import first for half
+        of a second, it needs nothing."""
+        rtsys.initialize(context)
+        return cache._load_overload(signature, context)
+
     cache = dispatcher._cache
     save = cache.save_overload
-    cache.load_overload, cache.save_overload = quiet(cache.load_overload), quiet(swept)
+    cache.load_overload, cache.save_overload = quiet(loaded), quiet(swept)
     return dispatcher
 
 

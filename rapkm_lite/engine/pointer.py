@@ -52,11 +52,13 @@ def _pointer(function, N: int, matrices: bool, memory: int):
     from numba import cfunc, njit, types
     from numba.core import errors
 
+    # Python calls none of this: to compile ways for it to do so would take a second.
+    within: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     # What the user writes stays inside its arrays.
-    law: Any = njit(error_model="numpy", boundscheck=True)(function) if isfunction(function) else function
+    law: Any = njit(error_model="numpy", boundscheck=True, **within)(function) if isfunction(function) else function
     ask: Any = law
     # All around the law is inlined: handing on an array costs more than reading a number in it.
-    inner = njit(forceinline=True)
+    inner = njit(forceinline=True, **within)
     n, r = 2 * N, 2 * N - 2
     kept, answer, _ = places(N, matrices, memory)
     if matrices and not memory:
