@@ -115,6 +115,8 @@ def test_singularities_are_refused_in_any_frame(angle):
         lambda: rk.null_vector(robot, q),
         lambda: rk.inverse_dynamics(robot, q, 0 * q, 0 * q),
         lambda: rk.at(robot, q).A_tilde_T_pinv,
+        lambda: rk.estimate_pose(robot, q[:3], rk.forward_kinematics(robot, q)),
+        lambda: rk.steady_state_error(A, 7.0, [1e-3, 0.0, 0.0]),
     ):
         with pytest.raises(ValueError, match="input singularity"):
             refused()
@@ -127,6 +129,31 @@ def test_singularities_are_refused_in_any_frame(angle):
             rk.nullspace_projector(robot, q)
         with pytest.raises(ValueError, match="c-space singularity"):
             rk.forward_dynamics(robot, q, 0 * q, np.zeros(3))
+        with pytest.raises(rk.ConvergenceError, match="near a regular configuration"):
+            rk.close_loops(robot, q)
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-8, 1e-9, 1e-10], ids=str)
+def test_functions_answer_alike_close_to_an_input_singularity_in_any_frame(apart):
+    """`apart` m from where rank A drops; A = U S V^T has the range of U, and sigma_2 near 25 `apart` per m^2."""
+    mixed = TESTBED.replace(mode=[1, 1, -1])
+    place, offset = TESTBED.base[:2].mean(axis=0) + apart * np.array([-0.8, 0.6]), np.array([4e-3, -2e-3, 5e-3])
+    for angle in np.arange(24) * np.pi / 12:
+        robot = turned(mixed, angle)
+        x = place @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        q = rk.inverse_kinematics(robot, x)
+        A, A_tilde = rk.control_matrix(robot, q), rk.redundant_control_matrix(robot, q)
+        sharp = 1e-14 / apart  # what rounding leaves of the range of A
+        e = rk.steady_state_error(A, 7.0, offset)
+        assert_allclose(e, -rk.antagonism_filter(A) @ offset, rtol=0, atol=sharp * np.linalg.norm(offset))
+        found = rk.estimate_pose(robot, q[:3], x)
+        assert_allclose(found, q, rtol=0, atol=1e-14)
+        explicit = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde))
+        assert_allclose(explicit * apart, rk.at(robot, q).A_tilde_T_pinv * apart, rtol=0, atol=10 * sharp)
+        xd = np.array([0.3, -0.2])
+        sample = rk.Sample(rk.Controller(rk.PD(7.0, 0.2), robot), 0.0, q[:3], A @ xd, rk.hold(robot, x, 0.1)[0])
+        rates = A @ xd  # of A at an x that is rounded, too
+        assert_allclose(sample.pose()[1][:3], rates, rtol=0, atol=sharp * np.linalg.norm(rates))
 
 
 @modes
@@ -462,6 +489,8 @@ def test_explicit_pseudoinverse_knows_the_rank_whatever_the_unit(scale):
     assert_allclose(found, np.linalg.pinv(A_tilde.T), rtol=0, atol=1e-12 / abs(scale))
     with pytest.raises(ValueError, match="rows holds 1 of the rows, below the rank of A_tilde; allowed: delta of them"):
         rk.explicit_pseudoinverse(A_tilde, (0,))
+    with pytest.raises(ValueError, match="below the rank"):  # whatever the other matrices of a stack
+        rk.explicit_pseudoinverse(np.stack([A_tilde, 1e9 * A_tilde[:1] * np.ones((3, 1))]), (0,))
 
 
 @pytest.mark.parametrize("name", ["testbed", "four_arms", "five_bar"])

@@ -1109,3 +1109,15 @@ def test_of_many_readings_that_which_fits_no_pose_is_named(place):
         rk.estimate_pose(TESTBED, angles, guess)
     with pytest.raises(ValueError, match=r"q_a = \[0\.0, 0\.0, 0\.0\]"):
         rk.calibrate(TESTBED, angles)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e5, 1e6])
+def test_base_points_in_the_coordinates_of_a_map_are_calibrated_as_well(far):
+    """A shift moves nothing but the base points; these are rounded to `far` times 2e-16 m then."""
+    shift, offset = far * np.array([1.0, -0.3]), np.array([4e-3, -2e-3, 5e-3])
+    angles = rk.inverse_kinematics(TESTBED, random_points(TESTBED, 24))[:, :3] + offset
+    robot = TESTBED.replace(base=TESTBED.base + shift)
+    found = rk.calibrate(robot, angles, unknowns="all")
+    assert found.rank == 11
+    assert_allclose(found.offset, offset, rtol=0, atol=1e-11 + 1e3 * np.spacing(far))
+    assert_allclose(found.lengths, TESTBED.lengths, rtol=0, atol=1e-12 + 1e3 * np.spacing(far))

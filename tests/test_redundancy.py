@@ -375,3 +375,21 @@ def test_stiffness_of_a_path_is_that_of_its_poses():
     c = np.random.default_rng(2).normal(size=(len(path), 3))
     rows = [rk.endeffector_stiffness(FRICTIONLESS, *pose, 7.05, c_k) for *pose, c_k in zip(path.q, c, strict=True)]
     assert_allclose(rk.endeffector_stiffness(FRICTIONLESS, path.q, 7.05, c), rows, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize("power", [7, 8, 9, 10, 11])
+def test_torques_within_limits_make_their_force_close_to_an_input_singularity(power):
+    """In any coordinates of the force, A = U S V^T: c = U U^T c0 + t n, and |c_i| <= limit leaves an interval of t."""
+    rng, used = np.random.default_rng(power), 0
+    while used < 20:
+        U, V = (np.linalg.qr(rng.normal(size=(k, 2)))[0] for k in (3, 2))
+        inside = rng.uniform(-1, 1, 3)
+        A = U * [1.0, 10.0**-power] @ V.T
+        limit = np.abs(inside).max() * 1.05
+        if np.abs(U @ (U.T @ inside)).max() < 1.02 * limit:
+            continue
+        c = rk.allocate_torques(A, A.T @ inside, limit)
+        assert np.abs(c).max() <= limit
+        assert_allclose(A.T @ c, A.T @ inside, rtol=0, atol=1e-12)
+        assert_allclose(c @ U[:, 0], inside @ U[:, 0], rtol=0, atol=1e-12)
+        used += 1

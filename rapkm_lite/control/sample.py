@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number, solve
+from ..machine.arguments import ConvergenceError, exact_array, matvec, of_kind, one_of, positive_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.at import at
 from ..mechanics.closure import estimate_pose, misfit, on_the_turn_of
@@ -119,8 +119,7 @@ class Sample:
                 raise NoPose(str(error)) from error
         keeper.places = np.asarray(found), x, x1
         here = at(model, inverse_kinematics(model, found))
-        A = here.A
-        return here, solve("A^T A (an input singularity)", A.mT @ A, (A.mT @ self.qd_a)[:, None])[:, 0]
+        return here, matvec(here.A_T_pinv.T, self.qd_a)
 
 
 class Controller:

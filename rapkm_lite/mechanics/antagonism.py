@@ -182,8 +182,11 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     K = positive_definite("K_P", K_P, A.shape[-2])
     wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
     check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
-    force = matvec(A.mT @ K, offset) + wrench
-    return -matvec(A, np.linalg.solve(A.mT @ K @ A, force[..., None])[..., 0])
+    L = np.linalg.cholesky(K)  # A^T K_P A itself would square the condition number of A
+    Q, R = cores.full_rank("A weighted with K_P", L.mT @ A)
+    carried = np.linalg.solve(R.mT, wrench[..., None])[..., 0]
+    shared = matvec(Q, matvec(Q.mT, matvec(L.mT, offset)) + carried)
+    return -np.linalg.solve(L.mT, shared[..., None])[..., 0]
 
 
 def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
@@ -241,7 +244,9 @@ def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:
     prestress by p, |p_i| <= friction.  Their equilibrium A^T K (A x + offset + r) + A^T p = 0, all in counts, makes
     counts - ideal = (1 - S K) r - S p with S = A (A^T K A)^-1 A^T: soft drives are carried far by the others' friction.
     """
-    S = A @ np.linalg.solve(A.T @ K @ A, A.T)
+    L = np.linalg.cholesky(K)
+    half = np.linalg.solve(L.T, cores.full_rank("A weighted with K_P", L.T @ A)[0])
+    S = half @ half.T
     reach = np.abs(np.eye(len(A)) - S @ K).sum(axis=-1) / 2 + ratio * np.abs(S).sum(axis=-1)
     if np.prod(np.sort(2 * reach + 1)[:2]) > 1e6:
         raise ValueError(

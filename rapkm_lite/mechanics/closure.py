@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..machine.arguments import ConvergenceError, check_leading, matvec, real_array, small_number, solve, whole_number
+from ..machine.arguments import ConvergenceError, check_leading, matvec, real_array, small_number, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
 from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
+from .linalg import by_minors, least_singular_value
 from .redundancy import base_angle_hessians
 
 
@@ -36,7 +37,7 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
         Q, R = np.linalg.qr(J.mT, mode="complete")
-        if np.any(np.abs(np.diagonal(R, axis1=-2, axis2=-1)).min(axis=-1) < 1e-10 * scale):
+        if least_singular_value(R[..., :r, :])[0] < 1e-10 * scale:
             break
         range_, tangent = Q[..., :r], Q[..., r:]
         back = -matvec(range_, np.linalg.solve(R[..., :r, :].mT, h[..., None])[..., 0])
@@ -76,15 +77,23 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
     return H
 
 
-def _pose_hessian(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """The Hessian of half the squared residuals in x, (..., 2, 2); A^T A where it is not well positive definite.
+def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Newton's step in x, (..., 2) in m, to the least squares; that of A^+ where the Hessian is not well positive.
 
-    Where the residuals are large, A^T A alone makes steps that shrink slowly, or not at all.
+    Where the residuals are large, A^+ alone makes steps that shrink slowly, or not at all.  A^T A and the Hessian
+    square the singular values of A: whether they are regular is asked of A, and nothing is solved with their rounding.
+    Raises ValueError at input singularities.
     """
     square = A.mT @ A
     hessian = square - np.einsum("...i,...ikl->...kl", residual, base_angle_hessians(robot, q))
-    regular = (hessian[..., 0, 0] > 0.0) & (np.linalg.det(hessian) > 1e-3 * np.linalg.det(square))
-    return np.where(regular[..., None, None], hessian, square)
+    over, whole = by_minors(A)
+    det, size = np.linalg.det(hessian), np.trace(square, axis1=-2, axis2=-1) ** 2
+    if not np.all((whole := np.reshape(whole, size.shape)) > 1e-24 * size):
+        raise ValueError("A has lost rank (an input singularity); allowed: another pose")
+    regular = (hessian[..., 0, 0] > 0.0) & (det > 1e-3 * whole) & (det > 1e-14 * size)
+    hessian = np.where(regular[..., None, None], hessian, np.eye(2))
+    newton = np.linalg.solve(hessian, matvec(A.mT, residual)[..., None])[..., 0]
+    return np.where(regular[..., None], newton, matvec(over.mT, residual) / whole[..., None])
 
 
 def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -130,8 +139,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         if np.isinf(square).any():
             break
         A = at(robot, q).A
-        hessian = _pose_hessian(robot, q, A, residual)
-        step = solve("A^T A (an input singularity)", hessian, matvec(A.mT, residual)[..., None])[..., 0]
+        step = _pose_step(robot, q, A, residual)
         size = np.abs(step).max(axis=-1, keepdims=True)
         # Near an input singularity the rounding of angles that fit moves x further.
         fits = np.abs(residual).max(axis=-1) < 4e-15 * (1.0 + np.abs(q_a).max(axis=-1))

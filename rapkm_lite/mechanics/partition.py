@@ -34,7 +34,10 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     where = "an input singularity, or dependent rows; allowed: the full degree of actuation, rows by select_independent"
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
-    if np.abs(product(B.mT, A1) - A2).max(initial=0.0) > 1e-6 * np.abs(A_tilde).max(initial=0.0):
+    # Each matrix by itself, whatever the size of the others, and near an input singularity up to the rounding of B.
+    size, inverse = np.abs(A_tilde).max(axis=(-2, -1)), np.abs(A1T_pinv).max(axis=(-2, -1))
+    left = np.abs(product(B.mT, A1) - A2).max(axis=(-2, -1), initial=0.0)
+    if np.any(left > np.maximum(1e-6, 1e-14 * size * inverse) * size):
         raise ValueError(f"rows holds {first.shape[-1]} of the rows, below the rank of A_tilde; allowed: delta of them")
     small, right = product(B.mT, B), product(B.mT, A1T_pinv)
     bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)

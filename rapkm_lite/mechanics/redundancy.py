@@ -47,7 +47,10 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     c0 = np.zeros(m) if prestress is None else exact_array("prestress", prestress, m)
     W = np.eye(m) if W is None else positive_definite("W", W, m)
     shaped("W", W, W.ndim == 2, f"one number, ({m},) or ({m}, {m}), one pose")
-    best = matvec(weighted_pseudoinverse(A, W), wrench) + matvec(prestress_projector(A, W), c0)
+    inverse = weighted_pseudoinverse(A, W)
+    best = matvec(inverse, wrench) + matvec(prestress_projector(A, W), c0)
+    for _ in range(3):  # near an input singularity the inverse is as inexact as A is badly conditioned, up to 1e-4
+        best += matvec(inverse, wrench - matvec(A.T, best))
     if np.all(np.abs(best) <= limit):
         return best
     edge, peak = _least_peak(A, wrench, limit)
