@@ -482,6 +482,16 @@ def printed_27(A_tilde, rows):
     return whole, small
 
 
+@pytest.mark.parametrize("rule", PARTITION_RULES)
+def test_rounding_does_not_choose_rows_at_a_symmetric_pose(rule):
+    """At the centroid all three pairs are equal, whichever way the machine is turned: the first one."""
+    for angle in np.arange(24) * np.pi / 12:
+        robot = turned(TESTBED, angle)
+        A_tilde = rk.redundant_control_matrix(robot, rk.inverse_kinematics(robot, [0.0, 0.0]))
+        assert rk.select_independent(A_tilde, rule).tolist() == [0, 1]
+        assert rk.select_independent(np.stack([A_tilde] * 2), rule).tolist() == [[0, 1]] * 2
+
+
 @pytest.mark.parametrize("scale", [1e-9, -1.0, 1e9])
 def test_explicit_pseudoinverse_knows_the_rank_whatever_the_unit(scale):
     A_tilde = scale * rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, [0.02, 0.05]))

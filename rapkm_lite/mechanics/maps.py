@@ -14,7 +14,7 @@ from .at import at
 from .cores import prestress_shares
 from .kinematics import inverse_kinematics
 from .linalg import singular_values
-from .partition import PARTITION_RULES
+from .partition import PARTITION_RULES, first_best
 
 
 def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:
@@ -109,7 +109,7 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
         F = at(robot, q).F
         A_tilde = F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
         merit = np.stack([PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)], axis=-1)
-    return x, y, _on_grid(np.argmax(merit, axis=-1), inside, limit=np.inf)
+    return x, y, _on_grid(first_best(merit), inside, limit=np.inf)
 
 
 def poses_inside(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode=None) -> np.ndarray:

@@ -95,6 +95,13 @@ PARTITION_RULES = {
 }
 
 
+def first_best(merit: np.ndarray) -> np.ndarray:
+    """Index (...,) of the largest merit (..., choices), of equal ones the first: rounding must not choose at symmetric
+    poses, so 1e-9 of it counts as equal, as for `SwitchedCTC`."""
+    most = merit.max(axis=-1, keepdims=True)
+    return np.argmax(merit >= most - 1e-9 * np.abs(most), axis=-1)
+
+
 @functools.cache
 def _choices(m: int, delta: int) -> np.ndarray:
     return frozen(list(itertools.combinations(range(m), delta)))
@@ -105,6 +112,7 @@ def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.n
 
     rule : "sigma_min" takes the largest smallest singular value, "condition" the smallest condition number; "printed"
     is the smallest row-sum norm of section 4.5, for study only: it is the wrong way round.
+    Of choices that are equal to 1e-9, as at symmetric poses, the first one.
     delta : how many, the rank of A~; 2 for the machines of `Manipulator`.
     Raises ValueError for another rule, and for more rows than there are.
 
@@ -118,5 +126,5 @@ def select_independent(A_tilde, rule: str = "sigma_min", delta: int = 2) -> np.n
     if delta > m:
         raise ValueError(f"delta = {delta}; allowed: at most the {m} rows of A_tilde")
     choices = _choices(m, delta)
-    best = np.argmax(PARTITION_RULES[rule](A_tilde.take(choices, axis=-2)), axis=-1)
+    best = first_best(PARTITION_RULES[rule](A_tilde.take(choices, axis=-2)))
     return choices.take(best, axis=0)  # a copy, also for one matrix
