@@ -97,6 +97,19 @@ def test_links_that_are_parallel_are_counted_from_one():
     assert labels == ["links 1 and 2 parallel", "links 1 and 3 parallel", "links 2 and 3 parallel"]
 
 
+@pytest.mark.parametrize("pair", [(1, 0), [0, 1], np.array([1, 0]), np.array([0, 1])])
+def test_a_pair_is_the_same_in_either_order_as_a_list_and_as_an_array(pair):
+    """As `drive_pairs` writes it, (0, 1)."""
+    (curve,) = plotting.plot_pair_curves(ROBOT, pairs=[pair], n=41).get_legend_handles_labels()[1]
+    assert curve == "links 1 and 2 parallel"
+    (wanted,) = plotting.plot_pair_curves(ROBOT, pairs=[(0, 1)], n=41).collections
+    (drawn,) = plotting.plot_pair_curves(ROBOT, pairs=np.array([pair]), n=41).collections
+    np.testing.assert_array_equal(drawn.get_paths()[0].vertices, wanted.get_paths()[0].vertices)
+    assert plotting.pair_line(rk.load("four_arms"), pair) == plotting.pair_line(rk.load("four_arms"), (0, 1))
+    at = [axes[0].lines for axes in (plotting.plot_torques_and_errors(RUN, pair=p) for p in (pair, (0, 1)))]
+    assert len(at[0]) == len(at[1])
+
+
 @pytest.mark.parametrize(
     ("least", "most", "extend"),
     [(None, 0.5, "max"), (0.0, 2.0, "neither"), (None, None, "neither"), (0.15, 2.0, "min"), (0.15, 0.5, "both")],

@@ -49,13 +49,18 @@ def _guard(picture: Callable) -> Callable:
 
     @functools.wraps(picture)
     def checked(*args, **named):
-        given = signature.bind(*args, **named).arguments
+        bound = signature.bind(*args, **named)
+        given = bound.arguments
         parameters = [signature.parameters[name] for name in given]
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
         for parameter in plain:
             _check(parameter, given)
+        if given.get("pair") is not None:
+            given["pair"] = _ordered(given["pair"])
+        if given.get("pairs") is not None:
+            given["pairs"] = [_ordered(pair) for pair in given["pairs"]]
         try:
-            return picture(*args, **named)
+            return picture(*bound.args, **bound.kwargs)
         except Exception as error:
             if isinstance(error, RuntimeError) and type(error).__module__.startswith("rapkm_lite."):
                 raise  # a run that was lost, say
@@ -137,6 +142,11 @@ def _offset(name: str, value, known: Known) -> None:
 
 def _pair(name: str, value, known: Known) -> None:
     joint_indices(name, value, _drives(known), 2, "drive")
+
+
+def _ordered(pair) -> tuple[int, ...]:
+    """A pair as `drive_pairs` writes it, given in either order, as a list or an array."""
+    return tuple(sorted(int(drive) for drive in pair))
 
 
 def _pairs(name: str, value, known: Known) -> None:

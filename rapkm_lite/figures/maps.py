@@ -115,7 +115,7 @@ def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, ba
 def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = False, n: int = 300, **line):
     """Curves where the two distal links of a pair are parallel: its parameterization singularities.
 
-    pairs : some of `drive_pairs`, as tuples; default all.
+    pairs : some of `drive_pairs`; default all.
     on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
 
     >>> import rapkm_lite as rk
