@@ -17,7 +17,7 @@ COMPILED = compiled()
 if COMPILED:
     from llvmlite import ir
     from numba import njit, types
-    from numba.core.runtime import rtsys
+    from numba.core.runtime.nrt import rtsys
     from numba.extending import intrinsic
 
     from .compiler import Wide
