@@ -207,6 +207,27 @@ ROOTS = """if True:
     rk.sweep(robot, rk.PD(7.0, 0.2), path, [[0.0] * 3] * 2)
     print(*(len(re.findall(r"\\tv?sqrtpd", code)) for code in closed_loops.inspect_asm().values()))
 """
+BESIDE = """if True:
+    import operator, sys, rapkm_lite as rk
+    robot = rk.load().replace(friction=0.0)
+    path = rk.hold(robot, (0.0, 0.0), 0.01)
+    run = rk.simulate(robot, rk.PD(7.0, 0.2), path, [4e-3, -2e-3, 5e-3])
+    if len(sys.argv) > 1:
+        from numba import njit, types
+        from numba.extending import overload
+
+        @overload(operator.sub)
+        def nothing_less(one, other):
+            if isinstance(one, types.UnicodeType):
+                return lambda one, other: one
+
+        assert njit(lambda one, other: one - other)("as it was", 1) == "as it was"
+        assert njit(lambda row: row[-1] + row[0])(run.c[0]) == run.c[0, -1] + run.c[0, 0]
+    else:
+        assert not {"scipy.linalg", "numba.np.arraymath"} & set(sys.modules)
+    study = rk.sweep(robot, rk.PD(7.0, 0.2), path, [[4e-3, -2e-3, 5e-3]] * 2)
+    print(run.energy.sum().hex(), study.energy[0].sum().hex())
+"""
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="instructions of other processors")
@@ -217,6 +238,21 @@ def test_kernels_take_the_roots_of_arms_and_of_runs_several_at_once(tmp_path):
     done = subprocess.run([sys.executable, "-c", ROOTS], env=environment, capture_output=True, text=True, check=True)
     single, study = map(int, done.stdout.split())
     assert single >= 4 and study >= 4
+
+
+def test_kernels_and_what_others_compile_leave_each_other_alone(tmp_path):
+    """Another package may teach Numba a new difference between two kernels, and count from the end of an array; a
+    kernel from the cache needs nothing of what Numba would import to compile one, and gives the same bits."""
+    pytest.importorskip("numba")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "RAPKM_LITE_NUMBA": "1"}
+    first, again = (
+        subprocess.run(
+            [sys.executable, "-c", BESIDE, *words], env=environment, capture_output=True, text=True, check=True
+        )
+        for words in (["first"], [])
+    )
+    assert first.stdout == again.stdout
+    assert first.stderr == again.stderr == ""
 
 
 def test_read_only_package_folder(tmp_path):

@@ -17,7 +17,6 @@ from numba.core.compiler import Compiler
 from numba.core.cpu import CPUContext
 from numba.core.typing.context import Context
 from numba.extending import models, register_model
-from numba.np.arrayobj import load_item, store_item
 
 IDLE = {
     "dump_parfor_diagnostics",
@@ -89,12 +88,14 @@ def _place(context, builder, kind, array, index, number):
 
 
 def _take(context, builder, kinds, values):
-    return load_item(context, builder, kinds[0], _place(context, builder, kinds[0], values[0], values[1], kinds[1]))
+    place = _place(context, builder, kinds[0], values[0], values[1], kinds[1])
+    return context.unpack_value(builder, kinds[0].dtype, place)
 
 
 def _put(context, builder, kinds, values):
     place = _place(context, builder, kinds[0], values[0], values[1], kinds[1])
-    store_item(context, builder, kinds[0], context.cast(builder, values[2], kinds[2], kinds[0].dtype), place)
+    item = context.cast(builder, values[2], kinds[2], kinds[0].dtype)
+    context.pack_value(builder, kinds[0].dtype, item, place)
 
 
 ITEMS = {operator.getitem: _take, operator.setitem: _put}
