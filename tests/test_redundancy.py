@@ -393,3 +393,13 @@ def test_torques_within_limits_make_their_force_close_to_an_input_singularity(po
         assert_allclose(A.T @ c, A.T @ inside, rtol=0, atol=1e-12)
         assert_allclose(c @ U[:, 0], inside @ U[:, 0], rtol=0, atol=1e-12)
         used += 1
+
+
+def test_torques_on_the_limit_are_the_only_ones_that_as_many_drives_as_forces_have():
+    """A square A leaves no choice, c = A^-T f; limits that rounding puts below it are those torques."""
+    two = rk.control_matrix(MACHINES["five_bar"], rk.inverse_kinematics(MACHINES["five_bar"], [0.02, 0.05]))
+    for A, force in ((two, [1.0, 2.0]), (np.eye(2), [0.0, 1.0]), (np.eye(3), [0.3, -1.0, 0.2])):
+        c = np.linalg.solve(A.T, force)
+        for limit in (np.abs(c) + 1e-3, np.maximum((1.0 - 1e-13) * np.abs(c), 1e-3)):
+            assert_allclose(rk.allocate_torques(A, force, limit), c, rtol=1e-12, atol=1e-15)
+            assert np.all(np.abs(rk.allocate_torques(A, force, limit, prestress=np.ones(len(A)))) <= limit)
