@@ -754,3 +754,20 @@ def test_shapes_of_rows_are_told_as_shapes(x, words):
     A_tilde = rk.redundant_control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, x))
     with pytest.raises(ValueError, match=words):
         rk.explicit_pseudoinverse(A_tilde, np.array([[0, 1], [0, 2]]))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda A, K: rk.weighted_pseudoinverse(A, 1.0 / K),
+        lambda A, K: rk.command_filter(A, K),
+        lambda A, K: rk.steady_state_error(A, K, [1e-3, 0.0, 0.0]),
+    ],
+)
+def test_weights_that_differ_too_much_are_no_input_singularity_of_the_pose(call):
+    """With two stiffnesses of nearly nothing one drive is left for two forces, at a pose where A is regular."""
+    A = rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, [0.02, 0.05]))
+    assert np.linalg.cond(A) < 3.0
+    with pytest.raises(ValueError, match=r"weighted|K A has") as caught:
+        call(A, np.array([1e-30, 1e-30, 1.0]))
+    assert str(caught.value).endswith("and gains or weights that differ less")

@@ -154,7 +154,7 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
         return cores.right_inverse("A", A) if inverses is None else inverses
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    return np.linalg.solve(L.mT, cores.right_inverse("A", np.linalg.solve(L, A)))
+    return np.linalg.solve(L.mT, cores.right_inverse("A weighted with W", np.linalg.solve(L, A), cores.UNEVEN))
 
 
 def prestress_projector(A, W=None) -> np.ndarray:

@@ -53,7 +53,7 @@ def command_filter(A, K) -> np.ndarray:
     A = tall_matrix("A", A)
     K = positive_definite("K", K, A.shape[-2])
     check_leading(A=A.shape[:-2], K=K.shape[:-2])
-    Q, _ = cores.full_rank("K A", K @ A)
+    Q, _ = cores.full_rank("K A", K @ A, cores.UNEVEN)
     return product(Q, Q.mT)
 
 
@@ -183,7 +183,7 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
     check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
     L = np.linalg.cholesky(K)  # A^T K_P A itself would square the condition number of A
-    Q, R = cores.full_rank("A weighted with K_P", L.mT @ A)
+    Q, R = cores.full_rank("A weighted with K_P", L.mT @ A, cores.UNEVEN)
     carried = np.linalg.solve(R.mT, wrench[..., None])[..., 0]
     shared = matvec(Q, matvec(Q.mT, matvec(L.mT, offset)) + carried)
     return -np.linalg.solve(L.mT, shared[..., None])[..., 0]
@@ -245,7 +245,7 @@ def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:
     counts - ideal = (1 - S K) r - S p with S = A (A^T K A)^-1 A^T: soft drives are carried far by the others' friction.
     """
     L = np.linalg.cholesky(K)
-    half = np.linalg.solve(L.T, cores.full_rank("A weighted with K_P", L.T @ A)[0])
+    half = np.linalg.solve(L.T, cores.full_rank("A weighted with K_P", L.T @ A, cores.UNEVEN)[0])
     S = half @ half.T
     reach = np.abs(np.eye(len(A)) - S @ K).sum(axis=-1) / 2 + ratio * np.abs(S).sum(axis=-1)
     if np.prod(np.sort(2 * reach + 1)[:2]) > 1e6:

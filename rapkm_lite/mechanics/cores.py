@@ -16,6 +16,10 @@ _INPUT_SINGULARITY = (
     "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
     "actuation"
 )
+UNEVEN = (
+    "an input singularity, or gains or weights that differ too much; allowed: poses with the full degree of actuation, "
+    "and gains or weights that differ less"
+)
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
