@@ -241,6 +241,22 @@ SETS += [
     ("working mode.*; with the machine's own it is", ROBOT, TASK, CIRCLE, mode(1, 1, -1) | fault(LATER)),
     # Its singularity was passed a dozen samples before.
     ("singularity of its independent drives 1 and 3", ROBOT, rk.CTC(900.0, 60.0, (0, 2)), FASTER, {"offset": SMALL}),
+    # No torque has acted: the coordinates of the law are not to blame for a pose that the encoders do not show.
+    (
+        r"^at t = 0.0000 s the measured.*\(encoder = 2 counts per turn are too coarse",
+        ROBOT,
+        rk.CTC(900.0, 60.0, (0, 2)),
+        rk.hold(ROBOT, [-0.1, -0.05], 0.1),
+        {"encoder": 2},
+    ),
+    # Differences of one count, 2 pi / 50, in a sample of 1 ms; ideal angles in the same filter lose nothing.
+    (
+        "encoder = 50 counts per turn with velocity_filter = 0 s make rates in steps of 126 rad/s; with the true",
+        ROBOT,
+        CTC,
+        rk.circle(ROBOT, 0.03, 0.5, centre=(0.0, 0.08)),
+        {"encoder": 50, "velocity_filter": 0.0},
+    ),
     (UNSTABLE, ROBOT, rk.PID(0.02, 1.0, 1e-3), rk.hold(ROBOT, [0.0, 0.0], 2.0), {"offset": [0.08, -0.04, 0.1]}),
     (
         r"OffsetJump\(1, 0.1, -2.0\)",

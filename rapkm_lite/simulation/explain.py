@@ -98,6 +98,8 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
     factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
     yield from _model(setup, law, k, factor)
     yield from _broken(setup, law, k, begun)
+    if status == NO_POSE and not len(c):  # nor are the coordinates of the law
+        yield from _sensors(setup, law, k)
     yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
     if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
@@ -207,9 +209,16 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
     def without(**ideal) -> bool:
         return _runs(setup._replace(sensors=dataclasses.replace(sensors, **ideal)), law, k)
 
-    if sensors.velocity_filter is not None and without(velocity_filter=None):
-        yield f"velocity_filter = {sensors.velocity_filter:g} s delays the rates; with the true ones it is not lost"
-    if sensors.encoder is not None and without(encoder=None):
+    delay, coarse = sensors.velocity_filter, sensors.encoder is not None and without(encoder=None)
+    if delay is not None and without(velocity_filter=None):
+        if coarse:
+            step = sensors.count / (delay + setup.trajectory.dt)
+            yield (
+                f"encoder = {sensors.encoder} counts per turn with velocity_filter = {delay:g} s make rates in steps "
+                f"of {step:.3g} rad/s; with the true rates, or ideal angles, it is not lost"
+            )
+        yield f"velocity_filter = {delay:g} s delays the rates; with the true ones it is not lost"
+    if coarse:
         yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
     if sensors.offset.any() and without(offset=0.0 * sensors.offset):
         yield f"{_offsets(setup)}, is too large here; with right encoders it is not lost"
