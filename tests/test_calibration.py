@@ -1121,3 +1121,12 @@ def test_base_points_in_the_coordinates_of_a_map_are_calibrated_as_well(far):
     assert found.rank == 11
     assert_allclose(found.offset, offset, rtol=0, atol=1e-11 + 1e3 * np.spacing(far))
     assert_allclose(found.lengths, TESTBED.lengths, rtol=0, atol=1e-12 + 1e3 * np.spacing(far))
+
+
+def test_a_sum_of_offsets_that_is_nothing_has_no_sign():
+    """At the desired pose itself every sum of offsets is zero, which is not negative."""
+    robot = rk.load().replace(friction=0.0)
+    log = rk.simulate(robot, rk.PD(7.05, 0.225), rk.hold(robot, [0.02, 0.05], 0.1)).log()
+    with pytest.raises(rk.CalibrationError, match="determines 1 of 3") as caught:
+        rk.calibrate(robot, log)
+    assert not np.signbit(caught.value.value[caught.value.value == 0.0]).any() and "= -0" not in str(caught.value)

@@ -267,7 +267,7 @@ def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
     value = known @ moved - step
     Q, R = np.linalg.qr(known.T)  # orthonormal in radians and metres, too
     sign = np.where(Q.max(axis=0) < -Q.min(axis=0), -1.0, 1.0)
-    known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value), unknown_names(robot.n_arms)
+    known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value) + 0.0, unknown_names(robot.n_arms)
     spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
     within = (f" ± {s:.2g}" if s > 0.0 else "" for s in spread)
     terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])
