@@ -350,6 +350,7 @@ def test_arguments_are_looked_at_before_a_picture_is_drawn(world):
         ("jumps", lambda: plotting.plot_chatter([0.5, 2.0], [1j, 40.0], [True, False])),
         ("gap", lambda: plotting.plot_spacing([0.1, 0.2], 0.0, ("offsets", 5e-3))),
         ("colour", lambda: plotting.plot_workspace(robot, colour="no colour")),
+        ("run", lambda: plotting.plot_pairs(world["run"])),
         ("names", lambda: plotting.plot_readings("ab", [0, 0], [1, 1], scatter(6).reshape(3, 2))),
     ]
     for name, call in wrong:

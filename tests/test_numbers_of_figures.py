@@ -510,6 +510,13 @@ def test_one_pair_is_in_use_at_a_time():
     assert np.all(np.sum(np.isfinite(lines), axis=0) == 1)
     for k, (line, pair) in enumerate(zip(lines, rk.drive_pairs(ROBOT), strict=True)):
         assert np.array_equal(np.isfinite(line), [tuple(p) == pair for p in run.pairs]) and np.nanmax(line) == k
+    for pair in ((0, 2), (2, 0)):  # the same coordinates
+        fixed = rk.simulate(ROBOT, rk.APD(7.0, 0.2, pair), rk.hold(ROBOT, [0.0, 0.0], 0.01))
+        assert [np.isfinite(line.get_ydata()).all() for line in plotting.plot_pairs(fixed).lines] == [
+            False,
+            True,
+            False,
+        ]
 
 
 def test_thin_lines_are_where_the_path_crosses_the_curve_of_the_pair():

@@ -195,16 +195,19 @@ def film_mirror(run, pair, frames: int = 23):
 
 
 def plot_pairs(run, ax=None):
-    """The pair of independent joints in use over time, one bar per pair.
+    """The pair of independent joints in use over time, one bar per pair; ValueError for a law that uses no pair.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_pairs(rk.simulate(path.robot, rk.SwitchedCTC(400.0, 40.0), path))
     """
     pairs = drive_pairs(run.robot)
+    used = np.all(np.sort(run.pairs)[:, None] == pairs, axis=-1)
+    if not used.any():
+        raise ValueError("run has no pair of drives as coordinates; allowed: one of SwitchedCTC, or of a law in two")
     ax = axes_or_new(ax, figsize=(8.0, max(1.6, 0.8 + 0.2 * len(pairs))))
     for k, pair in enumerate(pairs):
-        used = np.where(np.all(run.pairs == pair, axis=-1), float(k), np.nan)
-        ax.plot(run.t, used, lw=6, solid_capstyle="butt", color=pair_line(run.robot, pair)["color"])
+        bar = np.where(used[:, k], float(k), np.nan)
+        ax.plot(run.t, bar, lw=6, solid_capstyle="butt", color=pair_line(run.robot, pair)["color"])
     ax.set_yticks(range(len(pairs)), [f"pair {pair_name(p)}" for p in pairs])
     ax.set(xlabel="time in s", xlim=(0, run.t[-1]), ylim=(-0.6, len(pairs) - 0.4))
     return ax
