@@ -276,3 +276,29 @@ def test_read_only_package_folder(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("W", [[1e-12, 1.0, 1.0], [1.0, 1e-9, 1.0], [1e-12, 1e-6, 1.0]])
+def test_weights_change_no_force_however_unequal(W):
+    """A^T (A^T)_W^+ = I in (11): the force is that of the same law without weights, in runs and in studies."""
+    robot = machine(3)
+    path = rk.circle(robot, 0.03, 0.1, dt=2e-3)
+    pairs = [
+        (rk.AntagonismFilter(PD, "true", W), PD),
+        (
+            rk.AntagonismFilter(
+                rk.compiled(lambda t, q_a, qd_a, d: -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)), W=W
+            ),
+            PD,
+        ),
+        (rk.CTC(400.0, 40.0, None, W, "true"), rk.CTC(400.0, 40.0, None, pose="true")),
+        (rk.APD(7.0, 0.2, (0, 1), W, "true"), rk.APD(7.0, 0.2, (0, 1), pose="true")),
+    ]
+    for law, plain in pairs:
+        run = rk.simulate(robot, law, path)
+        A = rk.control_matrix(robot, run.q)
+        force = np.einsum("kij,ki->kj", A, run.c)
+        asked = np.einsum("kij,ki->kj", A, plain.torque(robot, run.q, run.qd, run.q_a, run.qd_a, path))
+        np.testing.assert_allclose(force, asked, rtol=0, atol=1e-9 * np.abs(asked).max())
+        study = rk.sweep(robot, [law, plain], path, 0.0)
+        np.testing.assert_allclose(study.energies[0], run.energy, rtol=1e-9)

@@ -51,7 +51,8 @@ FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
 def code_of(law: Any, model) -> Code | None:
     """The engine's form of a law, or None where it has none.
 
-    The engine knows diagonal gains and weights, and filters that share the pose of the law inside.
+    The engine knows diagonal gains and weights that are not too unequal, and filters that share the pose of the law
+    inside.
     """
     form, weights, pose = "NO_FILTER", getattr(law, "W", None), getattr(law, "pose", None)
     if type(law) in FILTERS:
@@ -67,8 +68,20 @@ def code_of(law: Any, model) -> Code | None:
     else:
         return None
     drives["EASE"] = np.ones(model.n_arms) if weights is None else 1 / _per("W", weights, model.n_arms)
+    squares = [drives[name] ** 2 for name in ("GAIN_P", "GAIN_D")] if form == "COMMAND_FILTER" else []
+    if any(map(_one_for_all, [drives["EASE"], *squares])):
+        return None
     task, switched = getattr(law, "independent", ()) is None, isinstance(law, SwitchedCTC)
     return Code(code, form, pose == "true", task, switched, drives, run, user)
+
+
+def _one_for_all(ease: np.ndarray) -> bool:
+    """Does one drive outweigh all others in A^T W^-1 A, whose other direction would be rounding?
+
+    That matrix squares the condition number of what the textbook's factorization works on.
+    """
+    first, second = np.sort(ease)[:-3:-1]
+    return bool(first > 1e6 * second)
 
 
 def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
