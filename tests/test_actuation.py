@@ -771,3 +771,38 @@ def test_weights_that_differ_too_much_are_no_input_singularity_of_the_pose(call)
     with pytest.raises(ValueError, match=r"weighted|K A has") as caught:
         call(A, np.array([1e-30, 1e-30, 1.0]))
     assert str(caught.value).endswith("and gains or weights that differ less")
+
+
+def near_the_curve(distance):
+    """A pose at this distance in m from where the drives 0 and 1 are no coordinates."""
+
+    def cross(y):
+        return rk.distal_cross_products(TESTBED, rk.inverse_kinematics(TESTBED, [0.0, y]))[0]
+
+    low, high = next((y, y + 0.01) for y in np.arange(-0.16, 0.26, 0.01) if cross(y) * cross(y + 0.01) < 0.0)
+    return rk.inverse_kinematics(TESTBED, [0.0, brentq(cross, low, high, xtol=1e-16) + distance])
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_control_vector_fields_do_not_lose_digits_where_coordinates_do(distance):
+    """What the drives accelerate is there whatever the coordinates: by the multipliers of (2) it is found without."""
+    robot, q = TESTBED.replace(friction=0.0, gravity=[0, 0]), near_the_curve(distance)
+    fields = rk.control_vector_fields(robot, q, (0, 1))
+    for i, c in enumerate(np.eye(3)):
+        qdd, _ = rk.forward_dynamics(robot, q, 0 * q, c)
+        assert_allclose(fields[:, i], qdd[:2], rtol=0, atol=1e-12 * np.abs(qdd).max())
+
+
+@pytest.mark.parametrize("W", [None, [1.0, 2.0, 0.25]])
+@pytest.mark.parametrize("least", [1.0, 1e-4, 1e-8, 1e-11])
+def test_a_prestress_moves_nothing_near_an_input_singularity(W, least):
+    """A^T N_{A^T,W} = 0 to the rounding of A, however small one of its singular values."""
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        U, V = np.linalg.qr(rng.normal(size=(3, 2)))[0], np.linalg.qr(rng.normal(size=(2, 2)))[0]
+        A = U @ np.diag([1.0, least]) @ V.T
+        for of in (A, np.array([A, A])):
+            N = rk.prestress_projector(of, W)
+            assert np.abs(np.swapaxes(of, -1, -2) @ N).max() < 1e-14
+            weighted = N if W is None else np.array(W)[:, None] * N
+            assert_allclose(weighted, np.swapaxes(weighted, -1, -2), rtol=0, atol=1e-14)

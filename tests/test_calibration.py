@@ -885,6 +885,17 @@ def test_noise_of_angles_blurs_a_gain_unless_the_torques_follow_it():
         assert_allclose(gain.error, error, rtol=1e-9, atol=1e-6)
 
 
+def test_torques_that_follow_their_readings_exactly_leave_a_gain_without_error():
+    """The variance of c + K_P q is zero, which rounding may put below: a wrong gain is still named."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        K_P, e = 7.0 * rng.uniform(0.5, 0.9, 3), 2e-3 + 1e-4 * rng.normal(size=(40, 3))
+        gain = fitted_gain(rests([rk.Log("still", 1e-3 * np.arange(40), e, 0 * e, -K_P * e)]))
+        assert gain is not None
+        assert_allclose(gain.error, 0.0, rtol=0, atol=1e-6)
+        assert len(gain.objections(np.full(3, 7.0))) == 3
+
+
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 def test_few_rests_that_scatter_show_no_other_gain(count):
     """Friction of up to a millinewton metre at each rest is seldom called another gain, which is never far off."""

@@ -408,3 +408,18 @@ def test_tips_of_stretched_and_folded_arms_are_reached_whatever_rounding_did_to_
     for length in (0.4, 0.2):
         x = robot.base[0] + length * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         assert_allclose(rk.tips(robot, rk.inverse_kinematics(robot, x)), np.stack([x, x], axis=1), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_an_arm_that_is_nearly_folded_keeps_all_its_digits(distance):
+    """Two equal links l and the distance r of their ends are an isosceles triangle: the elbow angle is
+    pi - 2 asin(r / 2 l), and the proximal link leads the line to the tip by half of it."""
+    robot, l1 = rk.Manipulator(base=[[0.0, 0.0], [0.2, 0.0]], lengths=0.2, masses=0.1), 0.2
+    for angle in np.linspace(0.1, 3.0, 30):
+        x = distance * np.array([np.cos(angle), np.sin(angle)])
+        for mode in (1, -1):
+            q = rk.inverse_kinematics(robot, x, [mode, 1])
+            elbow = np.pi - 2 * np.arcsin(np.hypot(*x) / (2 * l1))
+            assert_allclose(q[2], mode * elbow, rtol=0, atol=2e-15)
+            assert_allclose(wrap(q[0] - np.arctan2(x[1], x[0]) + mode * elbow / 2), 0.0, atol=2e-15)
+            assert_allclose(rk.tips(robot, q), [x, x], rtol=0, atol=5e-16)

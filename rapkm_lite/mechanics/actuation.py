@@ -99,7 +99,15 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
     (2, 3)
     """
     pose = at(robot, q).using(independent)
-    return np.linalg.solve(product(pose.F.mT, pose.G, pose.F), pose.A.mT)
+    _ = pose.F  # raises where the choice is singular
+    # As joint accelerations T (T^T G T)^-1 T_a^T in an orthonormal basis T of the motions: Gbar = F^T G F squares the
+    # condition number of F, which the choice of coordinates makes large, while the fields stay as they are.
+    T, N = cores.tangent(pose._row_space[0], pose.J), robot.n_arms
+    qdd = product(T, np.linalg.solve(product(T.mT, pose.G, T), T[..., :N, :].mT))
+    if pose.independent is not None:
+        return qdd[..., list(pose.independent), :]
+    arm = [1, N + 1]
+    return product(pose.tip_columns[..., arm], qdd[..., arm, :])
 
 
 def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
@@ -167,7 +175,15 @@ def prestress_projector(A, W=None) -> np.ndarray:
     1
     """
     A = tall_matrix("A", A)
-    return np.eye(A.shape[-2]) - product(weighted_pseudoinverse(A, W), A.mT)
+    one = np.eye(A.shape[-2])
+    # The pseudoinverse times A^T would err by the condition number of A: torques that move something.
+    if W is None:
+        Q, _ = cores.full_rank("A", A)
+        return one - product(Q, Q.mT)
+    L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
+    check_leading(A=A.shape[:-2], W=L.shape[:-2])
+    Q, _ = cores.full_rank("A", np.linalg.solve(L, A))
+    return one - np.linalg.solve(L.mT, product(Q, Q.mT, L.mT))
 
 
 def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> np.ndarray:

@@ -32,11 +32,13 @@ def joint_angles(robot, x: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np
     l1, l2 = robot.lengths.T
     # Along the poses in memory: NumPy's loops over the few arms of a pose would cost more than the arithmetic.
     dx, dy = (np.add.outer(-base, point.T).T for base, point in zip(robot.base.T, (x[..., 0], x[..., 1]), strict=True))
-    cosine = (np.sqrt(dx * dx + dy * dy) ** 2 - l1**2 - l2**2) / (2 * l1 * l2)
-    elbow = mode * np.arccos(np.clip(cosine, -1.0, 1.0))
-    base = np.arctan2(dy, dx) - np.arctan2(l2 * np.sin(elbow), l1 + l2 * np.cos(elbow))
-    q = np.empty((*base.shape[:-1], 2 * len(l1)))
-    return np.concatenate([wrap(base), elbow], axis=-1, out=q), cosine
+    reach = np.sqrt(dx * dx + dy * dy)
+    # Factors, exact where an arm is nearly folded or stretched: a cosine has no digits left there.
+    straight, bend = (l1 + l2 - reach) * (l1 + l2 + reach), (reach - (l1 - l2)) * (reach + (l1 - l2))
+    lever, along = mode * np.sqrt(np.maximum(straight * bend, 0.0)), reach * reach + (l1 - l2) * (l1 + l2)
+    q = np.empty((*lever.shape[:-1], 2 * len(l1)))
+    angles = np.arctan2(along * dy - lever * dx, along * dx + lever * dy), np.arctan2(2.0 * lever, bend - straight)
+    return np.concatenate(angles, axis=-1, out=q), (bend - straight) / (4.0 * l1 * l2)
 
 
 def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:

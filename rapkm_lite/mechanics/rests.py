@@ -50,7 +50,7 @@ class Rests(NamedTuple):
         b = np.linalg.solve(information, weighted @ self.c[:, i])
         left = self.c[:, i] - design @ b
         both = np.array([1.0, b[0]])
-        noise = np.mean(both @ self.noise[:, i] @ both)
+        noise = max(np.mean(both @ self.noise[:, i] @ both), 0.0)  # of torques that follow exactly, rounding: below 0
         if spare:
             from scipy.special import stdtrit
 
