@@ -135,3 +135,15 @@ def test_a_point_out_of_reach_is_no_pose():
     robot = MACHINES["testbed"]
     case = {"robot": values(robot), "points": [[0.5, 0.0]], "K_P": 7.05, "offset": [0.0, 0.0, 0.0]}
     assert answers([case]) == [[None]]
+
+
+@pytest.mark.parametrize("distance", [1e-3, 1e-5, 1e-7])
+def test_a_nearly_folded_arm_keeps_its_digits_on_the_page(distance):
+    """Equal links l and the distance r of their ends are an isosceles triangle, with acos(r / 2 l) at its ends."""
+    robot = MACHINES["testbed"]
+    angle = np.linspace(0.2, 0.8, 20)
+    away = distance * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    case = {"robot": values(robot), "points": (robot.base[0] + away).tolist(), "K_P": 7.05, "offset": [0.0, 0.0, 0.0]}
+    x, y = ((robot.base[0] + away) - robot.base[0]).T  # as rounded
+    expected = np.arctan2(y, x) - np.arccos(np.hypot(x, y) / (2 * robot.lengths[0, 0]))
+    assert np.allclose([page["angle"][0] for page in answers([case])[0]], expected, rtol=0, atol=2e-15)

@@ -42,7 +42,7 @@ export class Pose {
     this.x = x, this.y = y;
     for (let i = 0; i < N; i++) {
       const arm = arms[i], X = x - arm.x, Y = y - arm.y, reach2 = X * X + Y * Y;
-      const kappa = 0.5 * (reach2 + arm.l1sq - arm.l2sq), area2 = arm.l1sq * reach2 - kappa * kappa;
+      const kappa = 0.5 * (reach2 + (arm.l1sq - arm.l2sq)), area2 = arm.l1sq * reach2 - kappa * kappa;
       if (!(area2 > 0)) return false;
       const root = arm.mode * Math.sqrt(area2), k = kappa / reach2, h = root / reach2, inv = 1 / root;
       const ax = k * X + h * Y, ay = k * Y - h * X, dx = X - ax, dy = Y - ay;

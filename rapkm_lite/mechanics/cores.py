@@ -35,7 +35,8 @@ def joint_angles(robot, x: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np
     reach = np.sqrt(dx * dx + dy * dy)
     # Factors, exact where an arm is nearly folded or stretched: a cosine has no digits left there.
     straight, bend = (l1 + l2 - reach) * (l1 + l2 + reach), (reach - (l1 - l2)) * (reach + (l1 - l2))
-    lever, along = mode * np.sqrt(np.maximum(straight * bend, 0.0)), reach * reach + (l1 - l2) * (l1 + l2)
+    lever = mode * np.sqrt(np.maximum(straight, 0.0)) * np.sqrt(np.maximum(bend, 0.0))
+    along = reach * reach + (l1 - l2) * (l1 + l2)
     q = np.empty((*lever.shape[:-1], 2 * len(l1)))
     angles = np.arctan2(along * dy - lever * dx, along * dx + lever * dy), np.arctan2(2.0 * lever, bend - straight)
     return np.concatenate(angles, axis=-1, out=q), (bend - straight) / (4.0 * l1 * l2)
