@@ -211,7 +211,7 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
 
     delay, coarse = sensors.velocity_filter, sensors.encoder is not None and without(encoder=None)
     if delay is not None and without(velocity_filter=None):
-        if coarse:
+        if coarse and sensors.count:
             step = sensors.count / (delay + setup.trajectory.dt)
             yield (
                 f"encoder = {sensors.encoder} counts per turn with velocity_filter = {delay:g} s make rates in steps "
