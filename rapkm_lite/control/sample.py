@@ -119,6 +119,10 @@ class Sample:
                 raise NoPose(str(error)) from error
         keeper.places = np.asarray(found), x, x1
         here = at(model, inverse_kinematics(model, found))
+        (m11, m12), (_, m22) = (here.A.T @ here.A).tolist()
+        # As in the engine: closer to an input singularity a pose that fits no angles is rounding, and its rates are.
+        if not m11 * m22 - m12 * m12 > 1e-15 * (m11 + m22) ** 2:
+            raise ValueError("A has lost rank (an input singularity) at the measured pose; allowed: another pose")
         return here, matvec(here.A_T_pinv.T, self.qd_a)
 
 
