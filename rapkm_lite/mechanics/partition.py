@@ -34,15 +34,22 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     where = "an input singularity, or dependent rows; allowed: the full degree of actuation, rows by select_independent"
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
-    # Each matrix by itself, whatever the size of the others, and near an input singularity up to the rounding of B.
-    size, inverse = np.abs(A_tilde).max(axis=(-2, -1)), np.abs(A1T_pinv).max(axis=(-2, -1))
-    left = np.abs(product(B.mT, A1) - A2).max(axis=(-2, -1), initial=0.0)
-    if np.any(left > np.maximum(1e-6, 1e-14 * size * inverse) * size):
+    if not _spans(A_tilde, A1T_pinv, product(B.mT, A1) - A2):
         raise ValueError(f"rows holds {first.shape[-1]} of the rows, below the rank of A_tilde; allowed: delta of them")
     small, right = product(B.mT, B), product(B.mT, A1T_pinv)
     bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
     return _rows(np.concatenate([top, bottom], axis=-2), back)
+
+
+def _spans(A_tilde: np.ndarray, A1T_pinv: np.ndarray, left: np.ndarray) -> bool:
+    """Do the chosen rows make the others, but for `left`: to 1e-6, near an input singularity to the rounding of B?"""
+    # Each matrix by itself, whatever the size of the others; for one of them two products mostly decide.
+    if left.ndim == 2 and A_tilde.size * np.vdot(left, left) <= 1e-12 * np.vdot(A_tilde, A_tilde):
+        return True
+    size, inverse = np.abs(A_tilde).max(axis=(-2, -1)), np.abs(A1T_pinv).max(axis=(-2, -1))
+    limit = np.maximum(1e-6, 1e-14 * size * inverse) * size
+    return bool(np.all(np.abs(left).max(axis=(-2, -1), initial=0.0) <= limit))
 
 
 def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
@@ -98,6 +105,10 @@ PARTITION_RULES = {
 def first_best(merit: np.ndarray) -> np.ndarray:
     """Index (...,) of the largest merit (..., choices), of equal ones the first: rounding must not choose at symmetric
     poses, so 1e-9 of it counts as equal, as for `SwitchedCTC`."""
+    if merit.ndim == 1:  # of one matrix: NumPy's calls would cost more than the comparison
+        values = merit.tolist()
+        most = max(values)
+        return np.array(next(i for i, value in enumerate(values) if value >= most - 1e-9 * abs(most)))
     most = merit.max(axis=-1, keepdims=True)
     return np.argmax(merit >= most - 1e-9 * np.abs(most), axis=-1)
 
