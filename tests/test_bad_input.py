@@ -332,6 +332,23 @@ def test_rank_loss_is_named():
     refused(rk.redundant_dynamics, "q", TESTBED, rk.inverse_kinematics(TESTBED, TESTBED.base[0]), np.zeros(6))
 
 
+def test_weights_too_far_apart_are_told_from_an_input_singularity():
+    """The pose is regular, A has full rank: what hides it is W."""
+    W = [1e-30, 1.0, 1.0]
+    for f in (rk.weighted_pseudoinverse, rk.prestress_projector):
+        with pytest.raises(ValueError, match=r"A weighted with W has lost rank .* weights that differ too much"):
+            f(A[0], W)
+
+
+def test_a_corner_of_the_workspace_is_no_input_singularity():
+    """Arm 3 folded, the others stretched: J loses rank, and the distal links of arms 1 and 2 are not parallel."""
+    corner = rk.inverse_kinematics(TESTBED, TESTBED.base[2])
+    assert rk.degree_of_freedom(TESTBED, corner) == 3
+    assert abs(rk.distal_cross_products(TESTBED, corner)[0]) > 0.8
+    for f in (rk.null_vector, rk.feedback_norm):
+        refused(f, "q is a c-space singularity", TESTBED, corner)
+
+
 def test_a_pose_of_open_loops_has_no_null_vector():
     open_loops = Q[0] + 0.1 * np.eye(6)[0]
     with pytest.raises(ValueError, match="q leaves the loops open"):

@@ -503,6 +503,8 @@ def test_faults_that_do_not_fit_the_machine_are_refused_when_a_file_is_read(tmp_
     given = rk.experiment("testbed")
     with pytest.raises(ValueError, match=r"drive = 3 in .*; allowed: 0 to 2"):
         rk.Experiment(given.robot, given.law, given.trajectory, given.sensors, [rk.DeadDrive(3, 0.1)])
+    with pytest.raises(ValueError, match=r"K_P has shape \(2,\); allowed: one number, \(3,\)"):
+        rk.Experiment(given.robot, rk.PD([7.0, 7.0], [0.2, 0.2]), given.trajectory, given.sensors)
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ def drive_pairs(robot: Manipulator) -> list[tuple[int, int]]:
 def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
     """d_j x d_k of the unit distal directions for all `drive_pairs`, (..., pairs).
 
-    Zero where the angles of the pair (j, k) are no coordinates (parameterization singularity).
+    Zero where the angles of the pair (j, k) are no coordinates (parameterization singularity); open loops are taken.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.distal_cross_products(robot, q).round(3)
@@ -136,6 +136,7 @@ def singular_values(A) -> np.ndarray:
     """Singular values (..., delta) of A (..., m, delta), largest first, for any mechanism.
 
     For two columns from the minors, which near an input singularity errs by less than a general decomposition.
+    A lost rank is a zero, no error.  Raises ValueError for fewer rows than columns.
 
     >>> import rapkm_lite as rk
     >>> rk.singular_values([[3.0, 0.0], [0.0, 4.0], [0.0, 0.0]])
@@ -148,7 +149,8 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     """(A^T)_W^+ = W^-1 A (A^T W^-1 A)^-1 of (11), (..., m, delta): of all c with A^T c = f the one of least c^T W c.
 
     W : symmetric positive definite, one number, (m,) or (..., m, m); default the identity.
-    Raises ValueError when W is not positive definite, and at input singularities.
+    Raises ValueError when W is not positive definite, at input singularities, and for weights so far apart that
+    rounding hides the rank of A (some 1e24).
 
     >>> import rapkm_lite as rk
     >>> rk.weighted_pseudoinverse([[2.0, 1.0], [1.0, 2.0], [1.0, 0.5]], W=[1.0, 1.0, 3.0]).round(3)
@@ -168,7 +170,7 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
 def prestress_projector(A, W=None) -> np.ndarray:
     """N_{A^T,W} = I - (A^T)_W^+ A^T of (11), (..., m, m): its range is the torques that move nothing.
 
-    Raises ValueError at input singularities.
+    W and errors: see `weighted_pseudoinverse`.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(np.linalg.matrix_rank(rk.prestress_projector(rk.control_matrix(robot, q))))
@@ -182,7 +184,7 @@ def prestress_projector(A, W=None) -> np.ndarray:
         return one - product(Q, Q.mT)
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    Q, _ = cores.full_rank("A", np.linalg.solve(L, A))
+    Q, _ = cores.full_rank("A weighted with W", np.linalg.solve(L, A), cores.UNEVEN)
     return one - np.linalg.solve(L.mT, product(Q, Q.mT, L.mT))
 
 
@@ -194,7 +196,8 @@ def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> 
     prestress : c0 (..., m) in N m, of which the part in the null space of A^T is added; default none.
     Evaluated in end-effector coordinates, so that no parameterization singularity enters; without W and prestress it is
     also the inverse dynamics (25) in redundant coordinates.
-    Raises ValueError at input singularities, for open loops, and where an arm is stretched or folded.
+    Raises ValueError at input singularities, for open loops, where an arm is stretched or folded, and for a W that
+    `weighted_pseudoinverse` refuses.
 
     >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1)
     >>> rk.inverse_dynamics(robot, path.q, path.qd, path.qdd).shape
@@ -235,8 +238,10 @@ def _driven(robot: Manipulator, q, qd, qdd):
 
 
 def force_polygon(A, torque: float) -> np.ndarray:
-    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque, A (m, 2), from the lowest one on
-    counter-clockwise.
+    """Corners (2m, 2) in N of the zonotope of all forces A^T c with |c_i| <= torque in N m, A (m, 2) in rad/m.
+
+    From the lowest one on counter-clockwise; a line where A has lost rank.
+    Raises ValueError for A of more than one pose, and unless `torque` is above 0.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.force_polygon(rk.control_matrix(robot, q), torque=0.1).shape

@@ -43,7 +43,7 @@ def command_filter(A, K) -> np.ndarray:
     """R_{A^T K} = (A^T K)^+ A^T K of (17), (..., m, m), for a gain K (number, (m,) or (m, m)), applied to errors.
 
     -K R_{A^T K} e has the end-effector force of the filtered -R K e; the same torques in general only for K = k_P I.
-    Raises ValueError at input singularities, and for a gain that is not positive definite.
+    Raises ValueError at input singularities, and for gains that are not positive definite or too far apart.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.control_matrix(robot, q)
@@ -100,7 +100,7 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
     """Unit null vector of A^T for three arms in closed form, (..., 3): n_i ~ (a_i x d_i) (d_j x d_k), i, j, k cyclic.
 
     Its sign is that of the cross product of the two columns of A, as in `null_basis`, which takes any number of drives.
-    Raises ValueError for another number of arms or open loops, and at input singularities: two null directions.
+    Raises ValueError for another number of arms, open loops, and at input (null plane) and c-space singularities.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.null_vector(robot, q).round(3)
@@ -115,6 +115,7 @@ def null_vector(robot: Manipulator, q) -> np.ndarray:
     n = levers * cross(np.roll(d, -1, axis=-2), np.roll(d, -2, axis=-2))
     size = np.linalg.norm(n, axis=-1, keepdims=True)
     if np.any(size < 1e-12 * robot.lengths[:, 0].max()):
+        _ = pose.N  # says so at a c-space singularity, where no arm has a lever
         raise ValueError(
             "q is an input singularity (all distal links parallel), where the null space of A^T is a plane; allowed: "
             "poses with degree of actuation 2"
@@ -170,7 +171,7 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
 
     offset : (..., m) in rad, measured minus true angle.  K_P : positive definite, N m/rad.
     wrench : static control force A^T c (..., delta) that gravity and load demand (Qbar at rest); default none.
-    Raises ValueError at input singularities, and for a gain that is not positive definite.
+    Raises ValueError at input singularities, and for gains that are not positive definite or too far apart.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.steady_state_error(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(5)
@@ -207,8 +208,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
 
     True when counts exist that a pose of the closed loops reads, and whose torques differ by no more than the friction
     of each drive from torques that carry the weight, prestress included: a place of rest exists, to first order about q
-    and with exact rates.  It does for K_P quantum <= 2 friction, whatever the offsets.  Whether a run finds it is
-    another question.
+    and with exact rates.  It does for K_P quantum <= 2 friction, whatever the offsets; a run may still not find it.
     K_P : number, (N,) or (N, N), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.
     friction : number, N m of each drive.
     Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and

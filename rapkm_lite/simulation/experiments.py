@@ -21,6 +21,8 @@ from .setup import prepare
 class Experiment(Value):
     """A machine, a law, a path, sensors and faults that belong together, as read from a data file.
 
+    Raises ValueError for gains, offsets or faults of another number of drives, and a path out of the robot's reach.
+
     >>> import rapkm_lite as rk
     >>> rk.experiment("testbed").law
     PD(K_P=7.05, K_D=0.225)
@@ -35,6 +37,7 @@ class Experiment(Value):
     def __post_init__(self):
         # What a run would refuse is refused here.
         super().__post_init__(faults=prepare(self.robot, self.trajectory, self.sensors, faults=self.faults).broken)
+        self.law.gains(self.robot.n_arms)
 
     @property
     def offset(self) -> np.ndarray:
@@ -57,7 +60,8 @@ def experiment(source="testbed") -> Experiment:
 
     [sensor] holds the arguments of `Sensors`; each [[fault]] holds the `kind` of a fault and its arguments, such as
     ``kind = "DeadDrive"``, ``drive = 1``, ``time = 0.5``.
-    source : see `load`.  Raises ValueError for an unknown key or a value out of range.
+    source : see `load`.  Raises ValueError for an unknown or missing table, key or kind, a value out of
+    range, and a path that leaves the workspace.
 
     >>> import rapkm_lite as rk
     >>> rk.experiment("table1_reading").offset.shape
@@ -73,7 +77,6 @@ def experiment(source="testbed") -> Experiment:
         if key not in control:
             raise ValueError(f"the table [control] of {str(source)!r} lacks {key!r}; needed: K_P, K_D")
     law = PD(control["K_P"], control["K_D"])
-    law.gains(robot.n_arms)
     path = triangle(robot, dt=control.get("dt", 1e-3), **tables["path"])
     sensors = Sensors(**tables.get("sensor", {})).of_drives(robot.n_arms)
     faults = tuple(map(read_fault, tables.get("fault", [])))
