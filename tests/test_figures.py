@@ -499,6 +499,44 @@ def test_a_linkage_of_other_lengths_and_unlike_drives_are_refused():
         plotting.plot_machine(robot, rk.inverse_kinematics(robot, [0.0, 0.0]), arms=(5,))
 
 
+def refused_with(words, picture, *args, **named):
+    with pytest.raises(ValueError, match=words):
+        picture(*args, **named)
+    plt.close("all")
+
+
+@pytest.mark.parametrize("name", ["plot_crossed_linkage", "film_force_polygon", "plot_parameterization_singularities"])
+def test_the_pair_that_a_picture_takes_by_itself_is_looked_at_too(name):
+    """Its default pair (2,3) is none of a five-bar."""
+    robot = rk.load("five_bar")
+    first = rk.circle(robot, 0.03, 0.1, centre=[0.0, 0.1]) if name.startswith("plot_param") else robot
+    more = () if name == "plot_crossed_linkage" else ([0.0, 0.1],)
+    refused_with(r"pair = \(1, 2\); allowed: .*from 0 to 1", getattr(plotting, name), first, *more)
+
+
+def test_a_sample_of_a_run_lies_within_the_run():
+    path = rk.hold(rk.load(), [0.02, 0.0], 6.0)
+    run = rk.simulate(path.robot, rk.PD(7.05, 0.225), path)
+    ax = plotting.plot_mirror(run, 6000, (0, 1))[0]
+    assert ax.get_title() == "6.00 s"
+    refused_with("k = 6001; allowed: .*to 6000", plotting.plot_mirror, run, 6001, (0, 1))
+    refused_with(r"pair = \(0, 1\): the path crosses its curve 0 times", plotting.film_mirror, run, (0, 1))
+
+
+def test_what_stands_side_by_side_has_as_many_parts_as_the_picture(world):
+    robot, q, gap = world["robot"], world["q"], [0.0, 1e-3]
+    refused_with(r"forces has shape \(2, 2\); allowed: \(3, 2\)", plotting.plot_pin_forces, robot, q, np.ones((2, 2)))
+    for gaps, poses in (("ab", "a"), ("a", "ab"), ("abc", "ab")):
+        given = dict.fromkeys(gaps, gap), {name: [q, q] for name in poses}
+        refused_with("(gaps|poses) has . entries; allowed: 2", plotting.film_loops, robot, [0.0, 1.0], *given, frames=2)
+    three = dict.fromkeys("abc", gap)
+    refused_with("theories has 3 entries; allowed: 1 to 2", plotting.plot_gain_ratio, [0.5, 1.0], gap, three)
+    assert len(plotting.plot_gain_ratio([0.5, 1.0], gap, {"one": gap}).lines) == 2
+    refused_with("rule = 'cross'; allowed: 'sigma_min'", plotting.plot_partition_rules, robot, ("cross",), n=9)
+    assert len(plotting.plot_partition_rules(robot, ("sigma_min",), n=9)) == 1
+    plt.close("all")
+
+
 def test_a_frame_with_the_drives_holds_them_all_and_is_that_of_the_testbed():
     testbed = rk.load()
     small = testbed.replace(lengths=0.15, centers=None)

@@ -50,6 +50,7 @@ def _guard(picture: Callable) -> Callable:
     @functools.wraps(picture)
     def checked(*args, **named):
         bound = signature.bind(*args, **named)
+        bound.apply_defaults()  # a pair that the machine of the call has not
         given = bound.arguments
         parameters = [signature.parameters[name] for name in given]
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
@@ -95,7 +96,8 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
     if check is not None:
         check(name, value)
     elif kind.startswith("int"):
-        whole_number(name, value, -1 if default == -1 else 0, _MOST)
+        run = known.get("run") if name == "k" else None
+        whole_number(name, value, -1 if default == -1 else 0, _MOST if run is None else len(run.c) - 1)
     elif kind.startswith("Callable"):
         function(name, value)
     elif name in _RULES:

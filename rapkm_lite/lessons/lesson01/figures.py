@@ -13,7 +13,7 @@ from ...figures.film import film
 from ...figures.machine import plot_machine
 from ...figures.maps import mode_name, pair_line
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_text_colour, axes_or_new
-from ...machine.arguments import positive_number
+from ...machine.arguments import exact_array, positive_number
 from ...mechanics.dynamics import orthogonal_complement
 from ...mechanics.kinematics import forward_kinematics, inverse_kinematics, reachable, tips, unit_vector, wrap
 
@@ -128,6 +128,7 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     """The c-space V in the space of the first three base angles, in degrees: one sheet per working mode in `modes`.
 
     q (2N,) marks a configuration, F (2N, 2) a patch of the tangent plane there, `trajectory` draws its path on V.
+    For three arms or more.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_configuration_space(rk.load(), [(1, 1, 1)])
@@ -206,13 +207,16 @@ def plot_loop_gaps(t, gaps: dict, ax=None):
 def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, title: str = ""):
     """Forces (N, 2) in N that the end-effector pin exerts on the arm tips, arrows of 1 / newton_per_metre m per N.
 
+    Raises ValueError for another number of forces than arms; `q` may leave the loops open.
+
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> ax = plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])
     """
     scale = positive_number("newton_per_metre", newton_per_metre)
+    forces = exact_array("forces", forces, robot.n_arms, 2)
     ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
-    for i, force in enumerate(np.asarray(forces)):
+    for i, force in enumerate(forces):
         arrow = {"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", tuple(x + force / scale), tuple(x), zorder=7, arrowprops=arrow)
         ax.plot([], [], color=arm_colour(i), lw=2.4, label=f"on arm {i + 1}: {np.hypot(*force):.2f} N")
@@ -222,12 +226,17 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
 
 
 def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
-    """A film of poses (k, 2N) by name, as cut trees side by side, with their largest gaps (k,) in m over t (k,).
+    """A film of poses (k, 2N) of two motions by name, as cut trees side by side; their largest gaps (k,) over t (k,).
+
+    t in s, gaps in m.  Raises ValueError unless `gaps` and `poses` have two entries each.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> film_loops(robot, [0.0, 1.0], {"a": [0, 1e-3], "b": [0, 0]}, {"a": [q, q], "b": [q, q]}, frames=2).size
     (844, 288)
     """
+    for what, entries in (("gaps", gaps), ("poses", poses)):
+        if len(entries) != 2:
+            raise ValueError(f"{what} has {len(entries)} entries; allowed: 2, which stand side by side")
     size = 1e3 * max(np.max(gap) for gap in gaps.values())
 
     def draw(axes, k):

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...figures._shared import with_looks
 from ...figures.film import film
 from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
@@ -69,11 +70,13 @@ def plot_rest_torques(run, theory, ax=None, title: str = ""):
 def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
     """Rest torque in mN m against a ratio of gains: dots for runs, a line for each theory (label -> values in N m).
 
+    Raises ValueError for more than two theories.
+
     >>> ax = plot_gain_ratio([0.5, 1.0], [0.03, 0.05], {"printed": [0.04, 0.04], "corrected": [0.03, 0.05]})
     """
     ax = axes_or_new(ax)
     looks: list[dict[str, Any]] = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
-    for look, (label, values) in zip(looks, theories.items(), strict=True):
+    for (label, values), look in with_looks("theories", theories, looks):
         ax.plot(ratio, 1e3 * np.asarray(values), label=label, **look)
     ax.plot(ratio, 1e3 * np.asarray(simulated), "o", mfc="white", mec=AFTER, mew=1.5, label="simulated")
     ax.set(xscale="log", xlabel="gain of drive 3 / gain of drives 1 and 2", ylabel="largest rest torque in mN m")

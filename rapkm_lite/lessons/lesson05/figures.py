@@ -42,6 +42,7 @@ def _box(robot, zoom, *testbed: float) -> dict:
 def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     """Fig. 8 with the poses of a path: the five-bar of a pair, in colour, where the path crosses the pair's curve.
 
+    Raises ValueError where it crosses none of theirs.
     The arrow is the direction in which the end-effector moves while both base joints of the pair stand still.
 
     >>> import rapkm_lite as rk
@@ -176,11 +177,16 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=None):
 def film_mirror(run, pair, frames: int = 23):
     """A film of `plot_mirror` from just before the first crossing of the pair's curve to just after the second.
 
+    Raises ValueError for a path that crosses it less than twice.
+
     >>> import rapkm_lite as rk; path = rk.triangle(rk.load())
     >>> film_mirror(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), (0, 1), frames=4).size
     (768, 345)
     """
-    first, second = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)][:2]
+    crossings = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
+    if len(crossings) < 2:
+        raise ValueError(f"pair = {pair}: the path crosses its curve {len(crossings)} times; allowed: two or more")
+    first, second = crossings[:2]
     steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, frames).astype(int)
     alt = (
         "Left the machine, right the lower right corner of the triangle, enlarged. At the curve on which the distal "
@@ -216,10 +222,12 @@ def plot_pairs(run, ax=None):
 def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: int = 200):
     """Smallest singular value of the block A~_1 that each partition rule of (27) picks, over the workspace.
 
+    Raises ValueError for what is no rule of `select_independent`.
+
     >>> import rapkm_lite as rk
     >>> ax = plot_partition_rules(rk.load(), n=21)
     """
-    axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True)[1] if axes is None else axes
+    axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True, squeeze=False)[1][0] if axes is None else axes
     x, y, inside, points = grid_points(robot, n)
     A = redundant_control_matrix(robot, inverse_kinematics(robot, points))
     for ax, rule in zip(axes, rules, strict=True):
@@ -234,6 +242,8 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
 
 def plot_lyapunov(t, functions: dict, rate, axes=None):
     """Lyapunov functions in J by label on a logarithmic axis, and their rates of decay; a line at `rate` in 1/s.
+
+    functions : one or two, of label -> (k,).
 
     >>> ax = plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
     """
