@@ -2,11 +2,14 @@
 
 Joint vectors q (..., 2N) in rad hold the base angles of arms 1 to N, then their elbow angles, relative to the proximal
 links; rates qd and accelerations qdd likewise.  Points x (..., 2) are in m; of the drives, angles q_a (..., N) are in
-rad and torques c (..., N) in N m.  Dots are any leading axes: none for one pose, one for those of a trajectory.
+rad and torques c (..., N) in N m.  Dots are any leading axes: none for one pose, one for those of a trajectory;
+those of several arguments broadcast.  One bad pose among many stops the whole call.
 Indices count from 0; "arm 2" in words is the second one, of index 1.  Numbers in brackets are equations of the chapter.
 
 A wrong argument raises ValueError with its name, what was given and what is allowed; docstrings say what is raised
-besides.  Loops are open where tips are more than 1e-3 of the longest link apart; `close_loops` closes them.
+besides.  Loops are open where tips are more than 1e-3 of the longest link apart; `close_loops` closes them.  What
+the cut tree alone tells (tips, h, J, G, C, Q, energies) is there for any pose; F, N_J, A and what follows from them
+refuse open loops.
 """
 
 from .control.compiled_law import CompiledLaw, compiled

@@ -50,7 +50,7 @@ class Law:
         (`estimate_pose`), "true", for study, or None; a `step` of your own asks for it, ``sample.pose(self.pose)``.
         The laws of this package compare driven joints as measured, whatever the pose, elbows and end-effector of it.
 
-    A law of your own gives `torque`, or `start` and `step` when it remembers something:
+    A law of your own gives `torque`, or `start` and `step` when it remembers something (neither: NotImplementedError):
 
     >>> import rapkm_lite as rk
     >>> class Push(rk.Law):

@@ -139,7 +139,8 @@ class AntagonismFilter(LawValue):
     pose : "measured" or "true", where R is formed; the law inside keeps its own.
     W : positive definite number, (m,) or (m, m); then R = (A^T)_W^+ A^T, and of all torques with the same end-effector
         force c has the smallest c^T W c.  W = diag(R_el / k_t^2) makes the least heat; default the identity.
-    At input singularities, where there is no R, `torque` raises ValueError, and a run ends with SimulationError.
+    Where there is no R, at input singularities and where an arm is stretched or folded, `torque` raises ValueError, and
+    a run ends with SimulationError.
 
     >>> AntagonismFilter(PD(7.05, 0.225))
     AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')

@@ -84,7 +84,8 @@ class Sample:
         The base angles of q are on the turn of the measured ones, of the true pose on that of the desired ones.
         source : "measured", by least squares from the measured base angles, the default whatever the law's own `pose`;
         "true", for study; None for (None, None).
-        Raises ConvergenceError when the measured angles fit no pose, ValueError where the true motion was not told.
+        Raises ConvergenceError when the measured angles fit no pose, ValueError where the true motion was not told or
+        lies out of reach, and where the measured pose is an input singularity.
         """
         if source is None:
             return None, None

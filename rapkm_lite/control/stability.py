@@ -98,8 +98,8 @@ def feedback_norm(robot, q, pair=None) -> np.ndarray:
     """Largest singular value (...,) of the map from feedback acceleration to torques, in N m per rad/s^2.
 
     pair : drives whose angles are the independent coordinates, A (A^T A)^-1 Gbar; None for redundant coordinates,
-    (A~^T)^+ G~.  Raises ValueError at input singularities and for open loops, for a pair where an arm is stretched or
-    folded, too; where the pair is singular the norm is large, not infinite.
+    (A~^T)^+ G~.  Raises ValueError at input and c-space singularities and for open loops, for a pair where an arm is
+    stretched or folded, too; where the pair is singular the norm is large, not infinite.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.feedback_norm(robot, q).round(4))

@@ -21,6 +21,8 @@ _COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": 
 def slider(label: str, low: float, high: float, step: float, value: float) -> widgets.Widget:
     """A slider; whole numbers when all four are.  The label names the unit.
 
+    Raises ValueError unless low < high, low <= value <= high and step > 0.
+
     >>> slider("offset in mrad", -10, 10, 1, 4).value
     4
     """
@@ -37,6 +39,8 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 def log_slider(label: str, low: float, high: float, value: float, steps: int = 40) -> widgets.Widget:
     """A slider with equal ratios, for gains: `steps` steps from about `low` to about `high`, one of them at `value`.
 
+    Raises ValueError unless 0 < low < high, low <= value <= high and steps >= 1.
+
     >>> round(log_slider("K_P in N m/rad", 0.1, 100.0, 7.05).value, 2)
     7.05
     """
@@ -50,7 +54,7 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
 
 
 def choice(label: str, options, value=None) -> widgets.Widget:
-    """A drop-down list of words, or of (word, value) pairs.
+    """A drop-down list of words, or of (word, value) pairs; ValueError for a `value` that is no option.
 
     >>> choice("drive", ["1", "2", "3"]).value
     '1'
@@ -84,6 +88,8 @@ def switch(label: str, value: bool = False) -> widgets.Widget:
 
 def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
     """One slider per drive, offset_1, offset_2, ..., in mrad; `values` are cut or repeated to as many.
+
+    Raises ValueError for values beyond +-`limit`.
 
     >>> import rapkm_lite as rk
     >>> sorted(offset_sliders(rk.load(), [4, -2, 5]))

@@ -48,7 +48,7 @@ def explorer(
     live: bool | None = None,
     about: str = "",
 ) -> Explorer:
-    """Build an explorer from ``draw(picture, **controls)`` and draw it once.
+    """Build an explorer from ``draw(picture, **controls)`` and draw it once; `problem` shows ValueErrors of `draw`.
 
     draw : puts marks into the `Picture`, and returns the numbers that matter, a dict of name -> text (or None).
     controls : name -> widget, from `slider`, `log_slider`, `choice`, `switch`, or any widget with a value; the names
@@ -58,7 +58,7 @@ def explorer(
     live : redraw while a slider is dragged, with ipywidgets 8 or later; by default where the engine is compiled.
     about : a sentence of what is to be seen, for those who do not see it; default the first line of the docstring of
         `draw`, or else of the function that it is local to.
-    Raises ValueError, naming both sides, when the controls and the arguments of `draw` differ.
+    Raises ValueError, naming both, where controls and arguments of `draw` differ, and for a `play` of no whole numbers.
 
     >>> from rapkm_lite import explore
     >>> def draw(picture, gain):

@@ -86,6 +86,8 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
 def calibration(robot: Manipulator | None = None) -> Explorer:
     """Places on a circle, what each drive contributes to the equation there, and the error of the offsets found.
 
+    For three arms or more.
+
     >>> calibration().set(turn=60).numbers["condition"]
     '1.36'
     """

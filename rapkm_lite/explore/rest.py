@@ -152,6 +152,8 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
 def landscape(robot: Manipulator | None = None) -> Explorer:
     """Level lines of the antagonistic energy over two offsets, and the share of each principal direction.
 
+    For three arms or more.
+
     >>> landscape().numbers["antagonistic energy"]
     '2.83 J'
     """

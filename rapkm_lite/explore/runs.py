@@ -172,6 +172,8 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 def via_points(robot: Manipulator | None = None) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
 
+    Raises ValueError where not even a tenth of the edge lies within the reach of all arms.
+
     >>> via_points().set(filter=True).numbers["largest torque that only presses"]
     '0.0 mN m'
     """

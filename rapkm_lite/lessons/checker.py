@@ -67,7 +67,7 @@ def check(name: str, answer: Any) -> Any:
     A function comes back guarded: it is called with copies, so arithmetic in place changes nothing outside.  Where the
     package's answer is a secret (hidden offsets, gains) the student's own numbers come back, or NaN while there are
     none.  Raises AssertionError instead when the environment variable RAPKM_LITE_STRICT is 1 and the answer is neither
-    right nor close.
+    right nor close; ValueError for an unknown exercise.
 
     >>> shift = check("04.filtered_torques", ...)
     TODO 04.filtered_torques: not yet

@@ -18,6 +18,7 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
     per_arm : one column of y for each arm, in its colour.
 
     Nothing happens when the answer is right or not there yet; one that cannot be drawn ends in a sentence.
+    Raises ValueError for an unknown exercise.
     """
     from ..figures.style import ALARM, arm_colour  # matplotlib is not needed for a check
 

@@ -130,7 +130,7 @@ def calibrate(
     K_P : number or (N,) N m/rad, for torques; default: fitted to the rests of the log.
     noise : rad, standard deviation of a reading; default: from the residual and the steps of the readings.
     Raises `CalibrationError` where the samples do not determine the unknowns, with the combinations that they do, and
-    ValueError for two drives, a log that does not fit the machine, or angles that fit no pose.
+    ValueError for two drives, a log that does not fit the machine or has no rests for "torques", or angles of no pose.
 
     >>> import rapkm_lite as rk
     >>> rk.calibrate(rk.load(), rk.mystery_run("offset_b")).rank

@@ -94,7 +94,7 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
 
 
 def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
-    """Rank of J(q) of (1), (...,): how many singular values are above `tolerance` times the longest link.
+    """Rank of J(q) of (1), (...,): how many singular values are above `tolerance`, 0 to 1, times the longest link.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(rk.constraint_rank(robot, q))

@@ -92,7 +92,8 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
 
     rule : "cross" takes the largest |d_j x d_k|, as `SwitchedCTC` does; "sigma_min", "condition" and "printed" are the
         partition rules of `select_independent`.
-    mode, n, box : see `actuation_map`.
+    mode, n, box : see `actuation_map`.  Raises ValueError for another rule, mode or box; no error for points out of
+        reach, which are masked, nor for two arms, whose one pair is always the best.
 
     >>> import rapkm_lite as rk
     >>> x, y, pair = rk.switching_map(rk.load(), n=20)

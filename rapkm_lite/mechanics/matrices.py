@@ -73,6 +73,8 @@ def projector_dot(J, J_dot) -> np.ndarray:
 def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gbar, Cbar, Qbar of (7) from F, F_dot (..., n, delta) and G, C, Q: (..., delta, delta) twice, (..., delta).
 
+    Raises ValueError where F and F_dot differ in shape, or G, C (..., n, n), Q (..., n) are of another n.
+
     >>> Gbar, Cbar, Qbar = minimal_terms([[1.0], [2.0]], [[0.0], [0.0]], np.eye(2), np.zeros((2, 2)), [0.0, 1.0])
     >>> Gbar, Qbar
     (array([[5.]]), array([2.]))
@@ -85,6 +87,8 @@ def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """G~, C~, Q~ of (24) from N_J, N_dot (..., n, n) and G, C, Q of the tree: (..., n, n) twice, (..., n).
+
+    Raises ValueError unless N and N_dot are square and of one shape, or where G, C, Q are of another n.
 
     >>> N = projector([[1.0, 0.0]])
     >>> redundant_terms(N, 0 * N, np.eye(2), np.zeros((2, 2)), [1.0, 1.0])[2]

@@ -64,7 +64,7 @@ class Trajectory(Desired):
     """A desired motion: `Desired` with one row per sample, and the times t (k,) in s; ``trajectory[k]`` is one sample.
 
     x, xd, xdd : (k, 2) in m, m/s, m/s^2.  q, qd, qdd : (k, 2N) in rad, rad/s, rad/s^2, continuous in time.
-    robot : the machine that q belongs to.  n_arms : its N.
+    robot : the machine that q belongs to.  n_arms : its N.  A k beyond the samples raises IndexError.
 
     >>> import rapkm_lite as rk
     >>> path = rk.circle(rk.load(), radius=0.05, duration=1.0)
@@ -246,8 +246,9 @@ def circle(
 ) -> Trajectory:
     """A circle from its rightmost point, counter-clockwise, quintic from rest to rest; radius and centre (2,) in m.
 
-    duration, dt : of the whole run and of a sample, s.
-    turns : how often around, above 0; 0.5 is half of it.  Raises ValueError when the path leaves the workspace.
+    duration, dt : of the whole run and of a sample, s.  turns : how often around, above 0; 0.5 is half of it.
+    Raises ValueError when the path leaves the workspace, unless dt is a whole fraction of `duration`, and for more than
+    a quarter turn per sample.
 
     >>> import rapkm_lite as rk
     >>> rk.circle(rk.load(), radius=0.05, duration=1.0).x[0]

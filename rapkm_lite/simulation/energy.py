@@ -30,6 +30,8 @@ def work_of_holds(c, q_a) -> np.ndarray:
 def copper_loss(robot, c, dt) -> np.ndarray:
     """Joule heat R (c / k_t)^2 dt of torques c (..., k, N) in N m, each held for dt in s: (..., N) in J per drive.
 
+    Raises ValueError for a single row (N,), for another number of drives, and unless dt is above 0.
+
     >>> import rapkm_lite as rk
     >>> rk.copper_loss(rk.load(), np.full((1000, 3), 0.0259), dt=1e-3).round(3)
     array([0.611, 0.611, 0.611])
@@ -46,7 +48,7 @@ def mechanical_work(run) -> np.ndarray:
     """Work of the drives on the mechanism (N,) in J, the sum over holds of c[k] (q_a[k+1] - q_a[k]).
 
     Without friction it sums over the drives to the energy that the machine has gained: to zero in a horizontal plane on
-    a closed path from rest to rest.
+    a closed path from rest to rest.  Raises ValueError for what is no run, such as a `Log`.
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
@@ -66,6 +68,8 @@ def root_mean_square_torque(run) -> float:
 def antagonistic_torque(run) -> np.ndarray:
     """The part N_{A^T} c of the torques (k, N) in N m that moves nothing, at the true pose.
 
+    Raises ValueError where a sample is an input singularity, and for what has no true pose, such as a `Log`.
+
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), [4e-3, 0.0, 0.0])
     >>> np.allclose(rk.antagonistic_torque(run)[-1], run.c[-1], atol=1e-3)
@@ -78,6 +82,8 @@ def antagonistic_torque(run) -> np.ndarray:
 
 def antagonistic_energy(run) -> float:
     """(R_el / k_t^2) times the integral of ||c_null||^2, J: what a true-pose filter removes, for identical drives.
+
+    Errors: see `antagonistic_torque`.
 
     >>> import rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
@@ -94,7 +100,8 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     S = integral of K_0^T (R_el / k_t^2) K_0 dt, where -K_0 dq are the torques at rest of the corrected (14) at each
     point of the path: quasi-static, to first order in the offsets, without friction.  Weight is left out: in a vertical
     plane drives of unequal gains fight over it, too, and the cost of offsets has a part that is linear in them.
-    K_P : number, (N,) or (N, N), N m/rad.  Raises ValueError outside the workspace and at input singularities.
+    K_P : number, (N,) or (N, N), N m/rad.  Raises ValueError at input singularities, where the path
+    leaves the workspace of `robot`, and for another number of arms.
 
     >>> import rapkm_lite as rk
     >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)

@@ -67,6 +67,8 @@ FaultsLike = Iterable[Fault] | Fault | None
 class TorqueLimit(Fault):
     """The drives give no more than +-limit in N m: one number, or one per drive (infinity: no limit).
 
+    Raises ValueError for a negative limit, and in a run for another number of drives.
+
     >>> TorqueLimit(0.3)
     TorqueLimit(0.3)
     """
@@ -88,6 +90,8 @@ class TorqueLimit(Fault):
 @dataclass(frozen=True, eq=False, repr=False)
 class DeadDrive(Fault):
     """A drive (0-based) gives no torque from `time` in s on; it goes on measuring.
+
+    Raises ValueError for a time or drive below 0, and in a run for a drive that the machine has not.
 
     >>> import rapkm_lite as rk
     >>> rk.DeadDrive(drive=1, time=0.5)
@@ -111,6 +115,7 @@ class EncoderDropout(Fault):
 
     At the first sample of a run it reads once.  Its rate is that of the repeated reading: zero where rates are ideal
     and at the first sample, else what the velocity filter makes of it.
+    Raises ValueError unless 0 <= start < stop; for the drive see `DeadDrive`.
 
     >>> import rapkm_lite as rk
     >>> rk.EncoderDropout(drive=0, start=0.5, stop=0.7)
@@ -134,6 +139,8 @@ class EncoderDropout(Fault):
 @dataclass(frozen=True, eq=False, repr=False)
 class OffsetJump(Fault):
     """From `time` in s on the offset of a drive (0-based) is larger by `jump` in rad (a slip); then the encoder rounds.
+
+    Errors: see `DeadDrive`.
 
     >>> import rapkm_lite as rk
     >>> rk.OffsetJump(drive=2, time=0.5, jump=5e-3)

@@ -93,7 +93,7 @@ def _show(text: str):
 def progress(items) -> Iterator:
     """The items one by one, with the bar of `sweep`, for studies of your own that no sweep can make.
 
-    items : a list, tuple, array, dict or range.
+    items : a list, tuple, array, dict or range; ValueError for what has no length, such as a generator.
     The bar is seen in a notebook or a terminal and leaves nothing behind.
 
     >>> import rapkm_lite as rk

@@ -27,6 +27,8 @@ _ORDER = {"image": 0.0, "bar": 1.0, "polygon": 1.0, "line": 2.0}
 class Palette:
     """Classes of a map: one colour between each two neighbouring `levels`, for white paper and for a dark theme.
 
+    Raises ValueError for levels that do not rise, and unless there is one colour less than levels.
+
     >>> Palette((0.0, 1.0, 2.0), ("#888888", "#EEEEEE"), ("#777777", "#333333")).classes
     2
     """

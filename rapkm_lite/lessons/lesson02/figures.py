@@ -82,7 +82,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
 
 
 def plot_prestress_maps(robot, axes=None, n: int = 161):
-    """Share |eta_i| of each drive in the null vector of A^T, from singular vectors, under the curves of the pairs.
+    """Share |eta_i| of each of three drives in the null vector of A^T, by singular vectors, and the pairs' curves.
 
     >>> import rapkm_lite as rk; ax = plot_prestress_maps(rk.load(), n=21)
     """

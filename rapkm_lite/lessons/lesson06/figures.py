@@ -70,7 +70,7 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
 
 
 def plot_bands(samples: dict, ax=None):
-    """Distribution functions of energies in J with their means; `samples` maps a label to (k,).
+    """Distribution functions of energies in J with their means; `samples` maps one or two labels to (k,).
 
     >>> ax = plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
     """

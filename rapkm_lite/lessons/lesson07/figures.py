@@ -71,7 +71,7 @@ def plot_spacing(spacing, gap, marked=None, ax=None):
 def plot_demand(part, demand, points: dict, ax=None):
     """|eta^T q_a''| (k,) in rad along an edge, at the shares `part` (k,) of the way, and via points as ticks on it.
 
-    points : dict of label -> shares of the way between 0 and 1.
+    points : one or two, of label -> shares of the way between 0 and 1.
 
     >>> ax = plot_demand([0.0, 0.5, 1.0], [0.1, 0.05, 0.1], {"equal distances": [0.25, 0.5, 0.75]})
     """

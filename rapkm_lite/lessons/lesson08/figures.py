@@ -19,7 +19,8 @@ _LOOKS = ({"color": BEFORE, "marker": "o"}, {"color": ALARM, "marker": "^"}, {"c
 def plot_places(robot, groups, axes=None):
     """Groups of places, name -> (k, 2) in m, in the plane, and beside it their null vectors of A^T.
 
-    Three drives.  A null vector is shown by its components of drives 1 and 2: of unit length, it has no others.
+    Up to three groups, three drives.  A null vector is shown by its components of drives 1 and 2: of unit length, it
+    has no others.
     Returns both axes.
 
     >>> import rapkm_lite as rk
@@ -115,7 +116,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
 
 
 def plot_bias(residual, bias, names, ax=None):
-    """Errors of offsets (m, k) in rad over the residuals (m, k) in rad that they leave, m groups called `names`.
+    """Errors of offsets (m, k) in rad over the residuals (m, k) in rad that they leave, m <= 3 groups called `names`.
 
     >>> import numpy as np
     >>> ax = plot_bias(np.array([[1e-5, 2e-5]]), np.array([[1e-3, 2e-3]]), ["a"])

@@ -19,7 +19,7 @@ def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
     """Norm of the rest torques of PD drives over the workspace, without weight, one map for each wrong model.
 
     models : dict of title -> Manipulator, which demands the angles.  K_P : one gain of all drives in N m/rad.
-    Returns the axes.
+    Returns the axes.  Raises ValueError where a wrong model leads to an input singularity, as with two arms.
 
     >>> import rapkm_lite as rk; robot = rk.load()
     >>> ax = plot_geometry_maps(robot, {"longer": robot.replace(lengths=0.2002)}, 7.05, n=21)
@@ -91,7 +91,7 @@ def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
 
 
 def plot_saturation(limit, shifts, ax=None):
-    """Largest shift (k,) in m that a torque limit (k,) in N m causes; shifts: dict of label -> (k,).
+    """Largest shift (k,) in m that a torque limit (k,) in N m causes; shifts: up to three, of label -> (k,).
 
     >>> ax = plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
     """

@@ -95,7 +95,7 @@ def plot_effective_gain(trajectory, K, ax=None):
 
 
 def plot_step_response(t, measured: dict, predicted: dict, ax=None):
-    """Simulated lines and predicted points (every 25th sample) of a deviation (k,) in m, by label.
+    """Simulated lines and predicted points (every 25th sample) of a deviation (k,) in m, each up to three by label.
 
     >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1e-3, 4e-4, 1e-4]}, {"theory": [1e-3, 4e-4, 1e-4]})
     """

@@ -64,7 +64,7 @@ def plot_apex(angle, sigma, pose, axes=None):
 def plot_length_choice(lengths, conditions: dict, special, ax=None):
     """Condition number of A over the length (k,) in m that makes radians comparable with metres.
 
-    conditions : dict of label -> (k,).  special : a length in m to point at, as (words, number).
+    conditions : up to three, of label -> (k,).  special : a length in m to point at, as (words, number).
 
     >>> ax = plot_length_choice([0.1, 1.0], {"centre": [1.0, 7.0]}, ("platform", 0.14))
     """
