@@ -24,6 +24,9 @@ READY = "() => document.querySelectorAll('mjx-container').length >= document.que
 LOOK = r"""() => {
   const wrong = [], all = (what) => [...document.querySelectorAll(what)], words = document.body.cloneNode(true);
   if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
+  // The theme lets what lies in a page scroll on a narrow screen, all of it.
+  const content = document.querySelector('.content');
+  if (content?.scrollWidth > content?.clientWidth + 1) wrong.push(`${content.scrollWidth} px of content`);
   if (all('img').some((i) => !i.alt.trim())) wrong.push('picture without words');
   if (all('img').some((i) => i.complete && !i.naturalWidth)) wrong.push('broken picture');
   if (all('mjx-merror, [data-mjx-error]').length) wrong.push('formula with an error');
@@ -133,6 +136,9 @@ def search(context, base: str) -> list[str]:
         page.click("ul.search li a >> nth=0")
         page.wait_for_selector("article h1")
         page.goto(f"{base}/search.html?q=(27)")
+        page.wait_for_function("document.getElementById('search-results').textContent.includes('did not match')")
+        if "did not match" in page.inner_text("article"):
+            wrong.append("(27) is found and not found")
         page.click("h1 + p a")
         page.wait_for_selector("#eq-27:target", state="attached")
     except Exception as error:

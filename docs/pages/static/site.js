@@ -10,12 +10,15 @@ function names() {
   for (const fold of document.querySelectorAll("summary[aria-label]")) fold.removeAttribute("aria-label");
   // A search looks for words, not for numbers.
   const found = document.getElementById("search-results"), make = (tag) => document.createElement(tag);
-  const number = /^\W*(?:eq\w*\W*)?([1-9]|[12]\d|3[0-5])\b/i.exec(new URLSearchParams(location.search).get("q"))?.[1];
+  const [, number, words] =
+    /^\W*(?:eq\w*\W*)?([1-9]|[12]\d|3[0-5])\b(.*)/i.exec(new URLSearchParams(location.search).get("q")) ?? [];
   const href = "lessons/equations.html" + (number ? "#eq-" + number : "");
   const index = Object.assign(make("a"), { href, textContent: "the equation index" });
   const start = number ? `Equation (${number}) stands in ` : "By its number an equation is found in ";
   const way = Object.assign(make("p"), { textContent: start });
   way.append(index, ".");
+  // Where the number is all that was asked for, no page is missing.
+  found?.classList.toggle("by-number", Boolean(number) && !/\w/.test(words));
   found?.before(Object.assign(make("h1"), { textContent: "Search" }), way);
 }
 
@@ -45,7 +48,14 @@ function drawers() {
 
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
 function reach() {
-  const wide = "pre, table, .table-wrapper, .wide-picture, .formula, .math-wrapper, mjx-container[display=true]";
+  // A formula in a line that is longer than the line becomes such a box: it moves, and not the page with it.
+  for (const formula of document.querySelectorAll("article mjx-container:not([display])")) {
+    let place = formula.parentElement;
+    while (getComputedStyle(place).display === "inline") place = place.parentElement;
+    const width = formula.firstElementChild?.getBoundingClientRect().width;
+    formula.classList.toggle("long", place.clientWidth > 0 && width > place.clientWidth - 8);
+  }
+  const wide = "pre, table, .table-wrapper, .wide-picture, .formula, .math-wrapper, mjx-container";
   for (const box of document.querySelectorAll(`article :is(${wide})`))
     if (box.clientWidth && box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
