@@ -162,6 +162,14 @@ def test_odd_answers_crash_nothing(name, capsys, monkeypatch):
         assert len(said) < 700
 
 
+@pytest.mark.parametrize("answer", [np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0]), [1.0, np.ma.masked, 2.0]])
+def test_what_is_masked_is_called_so(answer, capsys, monkeypatch):
+    """A masked entry is no number, and neither NaN nor infinity."""
+    monkeypatch.delenv("RAPKM_LITE_STRICT", raising=False)
+    check("04.filtered_torques", lambda A, c: answer)
+    assert "the answer is masked in some entries" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("name", sorted(n for n, e in exercises().items() if not e.judge))
 def test_arithmetic_in_place_changes_nothing_outside(name, monkeypatch):
     monkeypatch.delenv("RAPKM_LITE_STRICT", raising=False)

@@ -373,6 +373,48 @@ def test_what_goes_to_a_file_is_not_run(tmp_path):
     assert graded_alone(tmp_path, "%%writefile helper.py\none = 1.0\n") == "wrong"
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["%run helper.py", "%run 'helper.py' 1", "%run helper", "two = 2.0\n%run -i other.py", "from helper import one"],
+)
+def test_a_file_beside_the_notebook_is_run_as_in_a_notebook(tmp_path, words):
+    """IPython's %run: what the file binds is there afterwards, and with -i the file sees what the notebook has."""
+    (tmp_path / "helper.py").write_text(
+        "half = 0.5\n\n\ndef one_of(half):\n    return 2 * half\n\n\none = one_of(half)\n"
+    )
+    (tmp_path / "other.py").write_text("one = two / 2\n")
+    assert graded_alone(tmp_path, words) == "ok"
+    assert {path.name for path in tmp_path.iterdir()} == {"helper.py", "other.py", "04_x.ipynb"}
+
+
+def test_a_file_that_a_cell_has_written_is_run(tmp_path):
+    assert graded_alone(tmp_path, "%%writefile helper.py\none = 1.0\n", "%run helper.py") == "ok"
+
+
+def test_an_answer_from_a_file_that_is_run_replaces_the_blank_one(tmp_path):
+    (tmp_path / "helper.py").write_text(f"import numpy as np\n\n{TORQUES}")
+    blank = "def filtered_torques(A, c):\n    raise NotImplementedError\n"
+    write(tmp_path / "04_x.ipynb", [SETUP, blank, "%run helper.py", CHECKS[0]])
+    write(tmp_path / "04_y.ipynb", [SETUP, blank, f"%%writefile own.py\n{TORQUES}", "%run -i own.py", CHECKS[0]])
+    for name in ("04_x.ipynb", "04_y.ipynb"):
+        grades = {one.exercise: one for one in grade_one(Submission("ada", tmp_path / name, "04"), 15.0)}
+        assert grades[NAMES[0]].verdict == "ok"
+
+
+@pytest.mark.parametrize("words", ["%run helper.py", "%run -m helper", "%run 00_x.ipynb", "%run"])
+def test_a_file_that_cannot_be_run_is_named(tmp_path, words):
+    (tmp_path / "00_x.ipynb").write_text("{}")
+    body = TORQUES.replace("return A", "return one * A")
+    write(tmp_path / "ada" / "04_x.ipynb", [SETUP, words, body + CHECKS[0]])
+    said = {one.exercise: one for one in grade(tmp_path)}[NAMES[0]]
+    assert f"{words} is not carried out" in said.sentence and said.mistake == "an earlier cell stops"
+
+
+@pytest.mark.parametrize("text", ["x = (1,\n  2", "x = 1\nreturn 1"])
+def test_a_cell_that_is_not_read_is_named_by_the_number_that_a_reader_counts(text):
+    assert re.search(r"\(cell 2, line [12]\)", statements(["", text])[1][1])
+
+
 @pytest.mark.parametrize("first", ["import no_such_package\n" + SETUP, "import no_such_package\nimport numpy as np"])
 def test_a_missing_package_is_named_where_its_cell_binds_what_an_answer_needs(tmp_path, first):
     second = "import rapkm_lite as rk\nfrom rapkm_lite.checks import check"
@@ -565,7 +607,7 @@ def wrong(A, c):
 
 @pytest.fixture
 def bench(tmp_path):
-    return Bench("04", tmp_path / "log", set())
+    return Bench("04", tmp_path / "log", set(), tmp_path)
 
 
 def test_without_a_check_the_last_answer_counts(bench):

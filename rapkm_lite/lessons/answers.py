@@ -42,6 +42,10 @@ class NotYet(np.ndarray):
     """NaN in place of numbers that are secret and that the student does not have yet."""
 
 
+class Masked(np.ndarray):
+    """NaN in place of entries that are masked."""
+
+
 def copied(value: Any) -> Any:
     """A copy of what could be changed in place; machines, paths and laws cannot, and stay."""
     if isinstance(value, np.ndarray):
@@ -190,8 +194,10 @@ def returned(got: Any) -> Any:
 
 
 def _array(got: Any) -> np.ndarray:
-    if isinstance(got, np.ma.MaskedArray):
-        got = np.ma.filled(got.astype(float), np.nan)
+    parts = got if isinstance(got, list | tuple) else [got]
+    if any(np.ma.is_masked(part) for part in parts):
+        filled = [np.ma.filled(np.ma.asarray(part).astype(float), np.nan) for part in parts]
+        return np.asarray(filled if parts is got else filled[0]).view(Masked)
     array = np.asarray(got)
     if array.dtype.kind == "O":
         array = array.astype(complex if any(isinstance(v, complex) for v in array.flat) else float)
@@ -216,7 +222,7 @@ def numbers(got: Any) -> np.ndarray:
     if array.dtype.kind not in "iuf":
         of = f" of {array.dtype.name}" * isinstance(got, np.ndarray)
         raise Ended("wrong", f"the answer is not numeric but of type {type(got).__name__}{of}", "not numeric")
-    return np.array(array, dtype=float)
+    return np.array(array, dtype=float, subok=isinstance(array, Masked))
 
 
 def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -230,6 +236,8 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         flat, other = "; a flat array is wanted", "; their number is right, the rows and columns are not"
         extra = (flat if len(shape) == 1 else other) * (got.size == int(np.prod(shape)) and got.size > 1)
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
+    if isinstance(got, Masked):
+        raise Ended("wrong", "the answer is masked in some entries; numbers are wanted", "masked")
     if not np.all(np.isfinite(got)):
         raise Ended("wrong", "the answer holds NaN or infinity", "NaN or infinity")
     if np.abs(got).max(initial=0.0) > 1e100:

@@ -49,7 +49,8 @@ function drawers() {
 // A box wider than its place is moved by arrow keys once the keyboard comes to it.
 function reach() {
   // A formula in a line that is longer than the line becomes such a box: it moves, and not the page with it.
-  for (const formula of document.querySelectorAll("article mjx-container:not([display])")) {
+  // In a table the whole table moves.
+  for (const formula of document.querySelectorAll("article mjx-container:not([display], table *)")) {
     let place = formula.parentElement;
     while (getComputedStyle(place).display === "inline") place = place.parentElement;
     const width = formula.firstElementChild?.getBoundingClientRect().width;

@@ -115,8 +115,9 @@ def statements(texts: list[str]) -> tuple[list[Statement], dict[int, str]]:
     read, broken = [], {}
     for cell, text in enumerate(texts):
         try:
-            body = ast.parse(text).body
-            compile(text, f"<cell {cell}>", "exec", **RULES)  # finds what parsing does not: a return outside a function
+            name = f"cell {cell + 1}"  # as the sentence counts
+            body = ast.parse(text, name).body
+            compile(text, name, "exec", **RULES)  # finds what parsing does not: a return outside a function
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             broken[cell] = f"{type(error).__name__}: {error}"
             continue
@@ -195,11 +196,22 @@ def _asks(node: ast.stmt) -> bool:
 
 
 def hides_check(all_of_them: list[Statement]) -> bool:
-    """True when `check` stands elsewhere than in a plain call: what calls it then, `needed` cannot tell."""
+    """True when `check` stands elsewhere than in a plain call, or in a file that is run: `needed` cannot tell."""
     for statement in (s for s in all_of_them if not _plain_check(s.node)):
         fields = (value for part in ast.walk(statement.node) for _, value in ast.iter_fields(part))
         if any(isinstance(value, str) and re.search(r"\bcheck\b", value) for value in fields):
             return True
+        if _commands(statement.node, "run_line_magic"):
+            return True
+    return False
+
+
+def _commands(node: ast.stmt, *names: str) -> bool:
+    """True where a command for the notebook is carried out: a cell that is written to a file, a file that is run."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Call) and isinstance(part.func, ast.Attribute) and part.func.attr in names:
+            if part.args and getattr(part.args[0], "value", None) in ("writefile", "run"):
+                return True
     return False
 
 
@@ -212,7 +224,7 @@ def _plain_check(node: ast.stmt) -> bool:
 
 
 def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
-    """The statements on which the wanted names and all calls of `check` depend, in their order; imports always.
+    """The statements on which the wanted names and all calls of `check` depend, in order; imports and files always.
 
     Read from the end: a statement counts when something after it uses what it binds or changes.  What a function uses
     counts from where the function is called, for it may be bound after the function.
@@ -227,7 +239,8 @@ def needed(all_of_them: list[Statement], wanted: set[str]) -> list[Statement]:
         node = statement.node
         shown = isinstance(node, ast.Expr) and _base(node.value) in ("plotting", "explore", "display")
         changed = set() if shown else _changes(node) - (outside if _only_calls(node) else set())
-        if isinstance(node, ast.Import | ast.ImportFrom) or _asks(node) or changed & names:
+        always = isinstance(node, ast.Import | ast.ImportFrom) or _commands(node, "run_line_magic", "run_cell_magic")
+        if always or _asks(node) or changed & names:
             kept.append(statement)
             if isinstance(node, ast.Assign):  # what the name held before does not matter
                 names -= {target.id for target in node.targets if isinstance(target, ast.Name)}

@@ -24,6 +24,8 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from threading import Thread
 from types import CodeType
@@ -38,7 +40,8 @@ from rapkm_lite.lessons.grading.submission import RULES, Statement, called, hide
 class Bench:
     """Runs the statements of one notebook and judges what they answer."""
 
-    def __init__(self, lesson: str, log: Path, skip: set[str]):
+    def __init__(self, lesson: str, log: Path, skip: set[str], folder: Path):
+        self.folder = folder
         self.exercises = {n: e for n, e in checker.exercises().items() if n.startswith(f"{lesson}.")}
         self.log, self.skip = log.open("a", encoding="utf-8"), skip
         self.judge, self.going_on = checker.judge, checker.going_on
@@ -76,7 +79,7 @@ class Bench:
     def run(self, chosen: list[Statement], texts: list[str]) -> None:
         """Run statements in a fresh module; after an error the rest of its cell is left out, as in a notebook."""
         space: dict[str, Any] = {"__name__": "__main__", "display": lambda *shown, **named: None}
-        space["get_ipython"] = NoNotebook
+        space["get_ipython"] = partial(NoNotebook, space, self.folder)
         for cell, text in enumerate(texts):
             linecache.cache[f"<cell {cell}>"] = (len(text), None, text.splitlines(keepends=True), f"<cell {cell}>")
         names = {called(name, exercise): name for name, exercise in self.exercises.items()}
@@ -113,7 +116,9 @@ class Bench:
         """A name that is not defined, with what stopped the cell that was to define it."""
         if missing := re.search(r"NameError: name '(\w+)'", result.sentence):
             for cell, sentence in sorted(self.failed.items()):
-                if sentence not in result.sentence and re.search(rf"\b{missing[1]}\b", texts[cell]):
+                # What a file binds that is run, its cell does not tell.
+                binds = "run_line_magic('run'" in texts[cell] or re.search(rf"\b{missing[1]}\b", texts[cell])
+                if sentence not in result.sentence and binds:
                     words = f"{result.sentence}; earlier, cell {cell + 1}: {sentence}"
                     return result._replace(sentence=words, mistake="an earlier cell stops")
         return result
@@ -142,7 +147,13 @@ def awaited(code: CodeType, space: dict[str, Any]) -> None:
 
 
 class NoNotebook:
-    """Stands in for the notebook itself: commands for it (%, !, ?) do nothing, but that a cell is written to a file."""
+    """Stands in for the notebook itself: commands for it (%, !, ?) do nothing.
+
+    But a cell is written to a file, and a file in Python is run: one that a cell has written, or beside the notebook.
+    """
+
+    def __init__(self, space: dict[str, Any], folder: Path):
+        self.space, self.folder = space, folder
 
     def run_cell_magic(self, magic: str, line: str, cell: str) -> None:
         if magic == "writefile":
@@ -150,6 +161,25 @@ class NoNotebook:
             with open(name, "a" if "-a" in options or "--append" in options else "w", encoding="utf-8") as file:
                 file.write(cell)
             importlib.invalidate_caches()
+
+    def run_line_magic(self, magic: str, line: str) -> None:
+        """%run FILE: in names of its own, or with -i in those of the notebook, which then has what the file binds."""
+        if magic != "run":
+            return
+        words = shlex.split(line)
+        options = {*takewhile(lambda word: word[0] == "-", words)}
+        name = next((word for word in words if word not in options), "")
+        places = [Path(folder, name + end) for folder in (Path(), self.folder) for end in ("", ".py")]
+        path = next((place for place in places if place.is_file()), None)
+        if path is None or path.suffix != ".py" or "-m" in options:
+            raise ValueError(f"%run {line} is not carried out; only a Python file beside the notebook is")
+        sys.argv = [str(path), *words[words.index(name) + 1 :]]
+        own = {"__name__": "__main__", "__file__": str(path)}
+        names = self.space if "-i" in options else own
+        try:
+            exec(compile(path.read_text(encoding="utf-8"), str(path), "exec", dont_inherit=True), names)
+        finally:
+            self.space.update({key: value for key, value in names.items() if key[:2] != "__"})
 
     def __getattr__(self, name):
         return lambda *arguments, **named: None
@@ -194,7 +224,10 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--skip", action="append", default=[])
     given = parser.parse_args(arguments)
     Thread(target=end_with, args=(os.getppid(),), daemon=True).start()
-    bench = Bench(given.lesson, given.log, set(given.skip))
+    # A module beside the notebook is found, as in a notebook, after those that are installed; nothing is written there.
+    sys.path.append(str(given.notebook.parent))
+    sys.dont_write_bytecode = True
+    bench = Bench(given.lesson, given.log, set(given.skip), given.notebook.parent)
     texts = sources(given.notebook)
     read, broken = statements(texts)
     bench.failed |= {cell: f"cannot be read, {sentence}" for cell, sentence in broken.items()}
