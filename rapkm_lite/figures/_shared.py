@@ -1,12 +1,16 @@
-"""What pictures of several lessons share, and nobody else calls: frames, and looks that can be told apart."""
+"""What pictures of several lessons share, and nobody else calls: frames, axes, and looks that can be told apart."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ..machine.manipulator import crossings, load
+
+# Angles in mrad, and places in mm on a machine of 1 m, that differ by less are rounding.
+LEAST = 1e-6
 
 
 def workspace_box(robot) -> np.ndarray:
@@ -46,6 +50,34 @@ def scaled_frame(robot, left: float, right: float, low: float, high: float, *, d
         corners[1] = np.maximum(corners[1], robot.base.max(axis=0) + room)
     x, y = corners.round(12).T.tolist()
     return {"xlim": tuple(x), "ylim": tuple(y)}
+
+
+def least_torque(robot) -> float:
+    """The torque in N m that gives the heaviest arm 1e-6 rad/s^2: less is rounding, for gains that 1 kHz can have.
+
+    >>> import rapkm_lite as rk
+    >>> f"{least_torque(rk.load()):.1e} N m"
+    '7.1e-09 N m'
+    """
+    return 1e-6 * float(robot.arm_inertias.max())
+
+
+def no_finer(ax: Axes, least: float) -> None:
+    """Show what varies by less than 2 `least`, in the unit of the vertical axis, or by 1e-6 of itself, as a flat line.
+
+    Without, rounding fills the axis like a signal.
+
+    >>> from matplotlib.figure import Figure; ax = Figure().add_subplot()
+    >>> line = ax.plot([0.0, 1.0, 2.0], [1e-16, -3e-16, 2e-16])
+    >>> no_finer(ax, 1e-6); ax.dataLim.intervaly.tolist()
+    [-1e-06, 1e-06]
+    """
+    low, high = ax.dataLim.intervaly
+    size = max(abs(low), abs(high))
+    if np.isfinite(size) and high - low < max(2 * least, 1e-6 * size):
+        middle, room = (low + high) / 2 if size > least else 0.0, max(least, 0.05 * size)
+        ax.update_datalim([(0.0, middle - room), (0.0, middle + room)], updatex=False)
+        ax.autoscale_view(scalex=False)
 
 
 def with_looks(name: str, entries: dict, looks) -> Iterator[tuple]:

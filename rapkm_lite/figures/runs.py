@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from matplotlib.axes import Axes
 
+from ._shared import LEAST, least_torque, no_finer
 from .style import arm_line, axes_or_new
 
 
@@ -15,7 +18,7 @@ def plot_torques(run, ax=None, title: str = "", milli: bool = True):
     >>> ax = plot_torques(run)
     """
     scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
-    return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title)
+    return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title, scale * least_torque(run.robot))
 
 
 def plot_errors(run, ax=None, title: str = ""):
@@ -25,11 +28,13 @@ def plot_errors(run, ax=None, title: str = ""):
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
     >>> ax = plot_errors(run)
     """
-    return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title)
+    return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title, LEAST)
 
 
-def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str):
+def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least: float = 0.0):
     """One line per drive; the margin keeps the legend off the curves, also on shared axes.
+
+    least : in the unit of `ylabel`; the axis shows no less, so that rounding is a flat line.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> run, ax = rk.simulate(path.robot, rk.PD(7.05, 0.225), path), axes_or_new()
@@ -39,7 +44,10 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str):
     ax = axes_or_new(ax)
     for i, line in enumerate(values.T):
         ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))
-    ax.margins(y=0.18)
+    N = run.robot.n_arms
+    rows = math.ceil(N / max(1, int(ax.get_window_extent().width / ax.figure.dpi / 1.04)))  # inches for one entry
+    ax.margins(y=0.18 * rows)
     ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]))
-    ax.legend(ncols=run.robot.n_arms, loc="upper right")
+    no_finer(ax, least)
+    ax.legend(ncols=math.ceil(N / rows), loc="upper right")
     return ax

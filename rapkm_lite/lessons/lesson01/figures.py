@@ -10,8 +10,9 @@ from matplotlib.ticker import MultipleLocator
 
 from ...figures._shared import scaled_frame
 from ...figures.film import film
-from ...figures.machine import plot_machine
-from ...figures.maps import mode_name, pair_line
+from ...figures.machine import arm_points, plot_machine
+from ...figures.maps import grid_points, mode_name, pair_line
+from ...figures.marks.plane import roomiest
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, STYLE, arm_colour, arm_text_colour, axes_or_new
 from ...machine.arguments import exact_array, positive_number
 from ...mechanics.dynamics import orthogonal_complement
@@ -24,27 +25,36 @@ def plot_joint_angles(robot, q, ax=None):
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> ax = plot_joint_angles(robot, q)
     """
-    ax = plot_machine(robot, q, ax, labels=False)
     N, size = robot.n_arms, 0.28 * robot.lengths.max()
+    ax = plot_machine(robot, q, axes_or_new(ax, figsize=2 * [max(4.2, N + 0.2)]), labels=False)
+    chains = arm_points(robot, q)
+    links = chains[:, :2, None] + np.linspace(0, 1, 12)[:, None] * np.diff(chains, axis=1)[:, :, None]
+    taken = [*links.reshape(-1, 2)]
     for i in range(N):
         base, elbow = float(q[i]), float(q[N + i])
         at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
-        _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_text_colour(i))
-        _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_colour(i))
+        _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_text_colour(i), taken)
+        _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_colour(i), taken)
     return ax
 
 
-def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: str) -> None:
-    """An arc with a head from the dotted direction `start` to the direction `stop`, and its name."""
+def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: str, taken: list) -> None:
+    """An arc with a head from the dotted direction `start` to `stop`, and its name, which keeps off points `taken`."""
     arc = at + size * unit_vector(np.linspace(start, stop, 40))
     ax.plot(*np.stack([at, at + 1.35 * size * unit_vector(start)]).T, ":", color=NEUTRAL, lw=1.1, zorder=2)
     ax.plot(*arc.T, color=colour, lw=1.1, zorder=2)
     ax.annotate("", arc[-1], arc[-4], arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.1}, zorder=2)
     # The name of a narrow angle stands on the other side of its dotted line.
     half = (stop - start) / 2
-    middle = at + 1.55 * size * unit_vector(np.asarray(start + (half if abs(half) > 0.4 else -np.copysign(0.3, half))))
+    side = half if abs(half) > 0.4 else -np.copysign(0.3, half)
+    ways = start + side + np.array([0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2])
+    spots = at + size * np.concatenate([far * unit_vector(ways) for far in (1.55, 1.9)])
+    names = spots[:, None] + size * np.array([[-0.3, 0.0], [0.0, 0.0], [0.3, 0.0]])
+    room = np.linalg.norm(names[:, :, None] - taken, axis=-1).min(axis=(1, 2))
+    k = np.argmax(np.minimum(room, 0.45 * size))  # the first that has enough
+    taken.extend(names[k])
     paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
-    ax.text(*middle, text, color=colour, ha="center", va="center", fontsize=11, zorder=6, bbox=paper)
+    ax.text(*spots[k], text, color=colour, ha="center", va="center", fontsize=11, zorder=6, bbox=paper)
 
 
 def plot_cut_tree(robot, q, ax=None, title: str = ""):
@@ -99,9 +109,10 @@ def plot_topology(robot, ax=None):
 def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
     """Base angles (n, rays, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi.
 
-    The workspace is taken to be star-shaped about the mean of the base points.
+    ValueError where a circle that an arm cannot fold into hides a part of the workspace from `_sheet_centre`.
     """
-    centre = robot.base.mean(axis=0)
+    centre = _sheet_centre(robot)
+    _all_seen(robot, centre)
     # At a corner on a base point one point of the plane is a whole edge of the sheet: rays crowd there.
     corners = np.arctan2(*(robot.base - centre).T[::-1])
     crowd = np.concatenate([[0], np.logspace(-7, -1.5, 8), -np.logspace(-7, -1.5, 8)])
@@ -118,9 +129,26 @@ def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
     return on_sheet(robot, q[..., : robot.n_arms])
 
 
+def _sheet_centre(robot) -> np.ndarray:
+    """The mean of the base points (2,) in m, or, where that is out of reach, the place with the most room."""
+    centre = robot.base.mean(axis=0)
+    return centre if reachable(robot, centre) else roomiest(robot)
+
+
+def _all_seen(robot, centre) -> None:
+    way = grid_points(robot, 101)[3] - centre
+    for base, inner in zip(robot.base - centre, np.abs(robot.lengths[:, 0] - robot.lengths[:, 1]), strict=True):
+        part = np.clip(way @ base / np.maximum(np.sum(way**2, axis=-1), 1e-300), 0.0, 1.0)
+        if np.any(np.linalg.norm(part[:, None] * way - base, axis=-1) < (1 - 1e-9) * inner):
+            raise ValueError(
+                "robot has a workspace with holes, bays or several parts, which no one sheet shows; "
+                "allowed: one that is seen as a whole from one place, as with two equal links in each arm"
+            )
+
+
 def on_sheet(robot, q_a) -> np.ndarray:
     """Base angles (..., N) in rad on the turn that `configuration_sheet` shows."""
-    start = np.arctan2(*(robot.base.mean(axis=0) - robot.base).T[::-1])
+    start = np.arctan2(*(_sheet_centre(robot) - robot.base).T[::-1])
     return start + wrap(q_a - start)
 
 
@@ -148,7 +176,8 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
         rims.append(sheet[-1])
     if len(rims) == 2:
         seam = np.where((np.abs(rims[0] - rims[1]) < 0.1).all(axis=-1, keepdims=True), rims[0], np.nan)
-        ax.plot(*seam[:, :3].T, color=ALARM, lw=2.5, label="common rim", zorder=8)
+        if np.isfinite(seam).any():
+            ax.plot(*seam[:, :3].T, color=ALARM, lw=2.5, label="common rim", zorder=8)
     if trajectory is not None:
         ax.plot(*np.rad2deg(on_sheet(robot, trajectory.q_a)[:, :3]).T, color="black", lw=1.6, label="path", zorder=8)
     if q is not None:

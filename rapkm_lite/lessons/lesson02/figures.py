@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle
 
-from ...figures._shared import scaled_frame
+from ...figures._shared import least_torque, no_finer, scaled_frame
 from ...figures.film import film
 from ...figures.machine import arm_points, plot_machine, plot_path, plot_workspace
 from ...figures.maps import (
@@ -240,6 +240,7 @@ def plot_torque_choices(trajectory, choices: dict, axes=None):
         for i, torque in enumerate(1e3 * np.asarray(torques).T):
             ax.plot(trajectory.t, torque, label=f"drive {i + 1}", **arm_line(i))
         ax.set(title=title, xlabel="time in s", ylabel="torque in mN m", xlim=(trajectory.t[0], trajectory.t[-1]))
+        no_finer(ax, 1e3 * least_torque(trajectory.robot))
         ax.label_outer()
     axes[0].legend(loc="upper right")
     return axes

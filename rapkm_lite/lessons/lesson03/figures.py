@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures._shared import with_looks
+from ...figures._shared import LEAST, no_finer, with_looks
 from ...figures.film import film
 from ...figures.machine import plane_axes, plot_path
 from ...figures.maps import grid_points, on_grid, plot_map
@@ -122,7 +122,9 @@ def plot_log(log, axes=None):
         axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))
     axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=log.t[[0, -1]])
     axes[1].set(xlabel="time in s", ylabel="torque in mN m")
-    axes[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    for ax in axes:  # no machine is known here: the least torque, 1e-9 N m, is that of `plot_torque_norms`
+        no_finer(ax, LEAST)
+    axes[0].legend(ncols=min(log.c.shape[1], 6), loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     return axes
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures._shared import with_looks
+from ...figures._shared import least_torque, no_finer, with_looks
 from ...figures.film import film
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
@@ -134,7 +134,9 @@ def plot_antagonism(run, ax=None, title: str = ""):
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_antagonism(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
     """
-    return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title)
+    # Beside the torques: a millionth of them is the least that is seen.
+    least = 1e3 * max(least_torque(run.robot), 1e-6 * np.abs(run.c).max())
+    return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title, least)
 
 
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
@@ -154,6 +156,8 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
     ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, end), yscale="log" if log else "linear")
     if log:
         ax.set_ylim(1e-9, max(1e-8, ax.get_ylim()[1]))
+    else:
+        no_finer(ax, 1e3 * max(max(least_torque(run.robot), 1e-6 * np.abs(run.c).max()) for run in runs.values()))
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return ax
 
@@ -197,7 +201,7 @@ def plot_filter_share(run, share: float, axes=None):
     c = 1e3 * (run.c - share * fight)
     for i in range(run.robot.n_arms):
         axes[0].plot(run.t[::10], c[::10, i], label=f"drive {i + 1}", **arm_line(i))
-    reach = 1.45e3 * np.abs(run.c).max()
+    reach = 1.45e3 * max(np.abs(run.c).max(), least_torque(run.robot))
     axes[0].set(xlabel="time in s", ylabel="torque in mN m", xlim=(0, run.t[-1]), ylim=(-reach, reach))
     axes[0].set_title(f"filter {100 * share:.0f} %")
     axes[0].legend(ncols=run.robot.n_arms, loc="upper right")
@@ -206,9 +210,10 @@ def plot_filter_share(run, share: float, axes=None):
     axes[1].plot(along, moving, "o", color="#DDDDDD", ms=4)
     axes[1].plot((1 - share) * along, moving, ".", color=AFTER, ms=5)
     axes[1].axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
-    wide, high = 1.1 * max(np.abs(along).max(), 10.0), 1.15 * moving.max()
-    low = min(-10.0, 1.1 * along.min())
-    axes[1].set(xlim=(low, max(10.0, 1.1 * along.max())), ylim=(0, max(high, 0.5 * wide)))
+    least = min(10.0, 0.2 * reach)
+    wide, high = 1.1 * max(np.abs(along).max(), least), 1.15 * moving.max()
+    low = min(-least, 1.1 * along.min())
+    axes[1].set(xlim=(low, max(least, 1.1 * along.max())), ylim=(0, max(high, 0.5 * wide)))
     axes[1].set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, in mN m")
     return axes
 

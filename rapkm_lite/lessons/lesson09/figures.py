@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
 
+from ...figures._shared import LEAST, no_finer
 from ...figures.machine import plot_path
 from ...figures.maps import grid_points, on_grid, pair_line, pair_name, plot_pair_curves
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_line, axes_or_new
@@ -38,6 +39,7 @@ def plot_clipping(free, clipped, limit, axes=None):
         error = np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         axes[1].plot(run.t, 1e3 * error, color=colour, label=label)
     axes[1].set(xlabel="time in s", ylabel="error in mm", title="what becomes of the path")
+    no_finer(axes[1], LEAST * free.robot.lengths.max())
     axes[1].legend(loc="upper right")
     return axes
 

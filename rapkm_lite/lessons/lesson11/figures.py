@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...control.stability import effective_gain
-from ...figures._shared import with_looks
+from ...figures._shared import LEAST, no_finer, with_looks
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.dynamics import orthogonal_complement
 
@@ -73,6 +73,7 @@ def plot_slow_error(t, error, predicted, ax=None):
         ax.plot(t, 1e3 * predicted[:, axis], color=colour, ls="--", lw=1.2, label=f"theory, {word}")
     ax.axhline(0, color="#BBBBBB", lw=0.8)
     ax.set(xlabel="time in s", ylabel="true − wanted place in mm", xlim=(t[0], t[-1]))
+    no_finer(ax, LEAST)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4)
     return ax
 
@@ -108,5 +109,6 @@ def plot_step_response(t, measured: dict, predicted: dict, ax=None):
         ax.plot(t[::25], 1e3 * np.asarray(y[::25]), marker, label=f"predicted, {label}", **look)
     ax.axhline(0.0, color=NEUTRAL, lw=0.8)
     ax.set(xlabel="time in s", ylabel="deviation in mm", xlim=(0, t[-1]))
+    no_finer(ax, LEAST)
     ax.legend(loc="upper right")
     return ax
