@@ -565,3 +565,109 @@ def test_names_of_six_arms_keep_apart():
         assert all(box.x1 < right[word] for word, box in words if word in right)
     finally:
         plt.close("all")
+
+
+def idle(robot, x=(0.0, 0.0)):
+    """A run in which nothing happens: no offset, no motion, no weight."""
+    return rk.simulate(robot, rk.PD(7.05, 0.225), rk.hold(robot, x, 0.05))
+
+
+def test_rounding_is_a_flat_line(world):
+    """What has no cause in the model is zero; its curves take less than a thousandth of the axis."""
+    robot, path = world["robot"], rk.circle(world["robot"], 0.03, 0.5)
+    still, filtered = idle(robot), rk.simulate(robot, rk.AntagonismFilter(rk.PD(7.05, 0.225)), path)
+    zero = {"limit": 0.1, "t": still.t, "nothing": np.full((len(still), 2), 1e-17)}
+    drawn_axes = [
+        plotting.plot_torques(still),
+        plotting.plot_torques(still, milli=False),
+        plotting.plot_errors(still),
+        plotting.plot_antagonism(filtered),
+        plotting.plot_rest_torques(still, np.zeros(3)),
+        plotting.plot_torque_norms({"idle": still}),
+        plotting.plot_torque_norms({"filter": filtered}, antagonism=True),
+        plotting.plot_torque_choices(still.trajectory, {"idle": still.c})[0],
+        plotting.plot_filter_share(still, 0.5)[0],
+        plotting.plot_clipping(still, still, zero["limit"])[1],
+        *plotting.plot_log(still.log()),
+        plotting.plot_slow_error(still.t, zero["nothing"], zero["nothing"]),
+    ]
+    for ax in drawn_axes:
+        values = np.concatenate([line.get_ydata() for line in ax.lines if len(line.get_ydata()) > 2])
+        assert np.ptp(values) < 1e-3 * np.ptp(ax.get_ylim()), ax.get_ylabel()
+
+
+@pytest.mark.parametrize("times", [5e-3, 1.0, 50.0])
+def test_what_is_flat_is_asked_of_the_machine(times):
+    """Scaled by s at equal density, torques over the same angles go with s^5: the same picture at every size."""
+    robot = rk.load().replace(friction=0.0, rotor_inertia=0.0)
+    scaled = robot.replace(base=times * robot.base, lengths=times * robot.lengths, masses=times**3 * robot.masses)
+    path = rk.circle(scaled, 0.05 * times, 0.5)
+    run = rk.simulate(scaled, rk.PD(7.05 * times**5, 0.225 * times**5), path, OFFSET)
+    for ax in (plotting.plot_torques(run), plotting.plot_antagonism(run), *plotting.plot_log(run.log())):
+        values = np.concatenate([line.get_ydata() for line in ax.lines])
+        assert np.ptp(values) > 0.5 * np.ptp(ax.get_ylim())
+    ax = plotting.plot_torque_norms({"run": run}, log=True)
+    low, high = ax.get_ylim()
+    assert low < ax.lines[0].get_ydata().min() and ax.lines[0].get_ydata().max() < high
+
+
+def test_pairs_of_nine_drives_are_told_apart():
+    arms = [plotting.arm_line(i) for i in range(36)]
+    assert len({(line["color"], str(line["linestyle"])) for line in arms}) == 36
+
+
+def ring(N):
+    angle = np.pi / 2 + 2 * np.pi * np.arange(N) / N
+    base = 0.23 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return rk.Manipulator(base=base, lengths=0.2, masses=0.1)
+
+
+@pytest.mark.parametrize("N", [3, 5, 6])
+def test_names_of_angles_hide_no_other_name_and_no_drive(N):
+    robot = ring(N)
+    ax = plotting.plot_joint_angles(robot, rk.inverse_kinematics(robot, [0.02, 0.05]))
+    ax.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_text()]
+    assert len(boxes) == 2 * N
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    drives = ax.transData.transform(robot.base)
+    assert not any(box.contains(*drive) for box in boxes for drive in drives)
+
+
+def test_a_legend_of_many_drives_stays_on_its_axes():
+    run = idle(ring(7))
+    ax = plotting.plot_torques(run)
+    ax.figure.canvas.draw()
+    legend, room = ax.get_legend().get_window_extent(), ax.get_window_extent()
+    assert room.x0 <= legend.x0 and legend.x1 <= room.x1 + 1.0
+
+
+def test_a_sheet_about_a_middle_that_no_arm_reaches_is_whole():
+    """Without folding limits the workspace is convex: any place in it sees all of it, and the sheet has no jump."""
+    robot = rk.load().replace(lengths=[[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
+    assert not rk.reachable(robot, robot.base.mean(axis=0))
+    ax = plotting.plot_configuration_space(robot, [(1, 1, 1)])
+    rim = np.stack(ax.lines[0].get_data_3d(), axis=-1)
+    assert np.abs(np.diff(rim, axis=0)).max() < 180.0  # a jump would be a turn
+    folded = rk.load().replace(lengths=[[0.4, 0.15]] * 3)
+    with pytest.raises(ValueError, match=r"robot has a workspace with holes, .*allowed"):
+        plotting.plot_configuration_space(folded, [(1, 1, 1)])
+
+
+def test_readings_below_zero_are_inside():
+    t = np.linspace(0.0, 1.0, 50)
+    ax = plotting.plot_counted(t, -1e-3 * np.rint(5 * t + 2), -1e-3 * (5 * t + 2))[0]
+    assert ax.get_ylim()[1] > -2.0
+
+
+def test_a_short_run_is_drawn_to_its_end(world):
+    run = idle(world["robot"])
+    assert plotting.plot_filter_share(run, 0.5)[0].lines[0].get_xdata()[-1] == run.t[-1]
+    assert len(plotting.plot_torque_plane({"idle": run}).lines[0].get_xdata()) == len(run)
+
+
+def test_bars_of_any_size_have_their_numbers():
+    for size, words in ((1e-11, "1e−11"), (1.5, "1.50"), (2e15, "2e+15")):
+        ax = plotting.plot_energies({"a": [size, size / 2]})
+        assert ax.texts[0].get_text() == words and ax.get_ylim()[1] > size
+    assert plotting.plot_energies({"a": [-1.0, -2.0]}).get_ylim()[1] > 0.0

@@ -80,6 +80,16 @@ def no_finer(ax: Axes, least: float) -> None:
         ax.autoscale_view(scalex=False)
 
 
+def step_of(run, most: int) -> int:
+    """Every how many samples of a run are drawn: `most`, or fewer where this would leave less than 200.
+
+    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> step_of(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 20)
+    2
+    """
+    return min(most, max(1, len(run) // 200))
+
+
 def with_looks(name: str, entries: dict, looks) -> Iterator[tuple]:
     """((label, value), look) for each entry; ValueError where there is none, or more than looks to tell them apart.
 

@@ -57,13 +57,20 @@ def _angle(ax, at, start: float, stop: float, size: float, text: str, colour: st
     ax.text(*spots[k], text, color=colour, ha="center", va="center", fontsize=11, zorder=6, bbox=paper)
 
 
+def _with_legend(robot, ax):
+    """Axes, and where their legend stands: in the corner, or, where a fourth arm would be under it, outside."""
+    few = robot.n_arms < 4
+    return axes_or_new(ax, figsize=(4.2 if few else 6.4, 4.2)), (0.0 if few else 1.0, 1.0)
+
+
 def plot_cut_tree(robot, q, ax=None, title: str = ""):
     """Fig. 2: the tree of N free arms at any q (2N,), and the gaps h_i from the tip of arm 2 to the other tips.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> ax = plot_cut_tree(robot, q + [0.1, 0.2, 0, 0, 0, 0])
     """
-    ax = plot_machine(robot, q, ax, labels=False)
+    ax, corner = _with_legend(robot, ax)
+    plot_machine(robot, q, ax, labels=False)
     p = tips(robot, q)
     for i in range(robot.n_arms):
         gap = np.hypot(*(p[i] - p[1]))
@@ -72,7 +79,7 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
             ax.annotate("", p[i], p[1], arrowprops=arrow, zorder=7)
         if i != 1:
             ax.plot([], [], color=ALARM, label=f"arm 2 to arm {i + 1}: {1e3 * gap:.1f} mm")
-    ax.legend(loc="upper left", handlelength=0, handletextpad=0, title="gaps")
+    ax.legend(loc="upper left", bbox_to_anchor=corner, handlelength=0, handletextpad=0, title="gaps")
     ax.set_title(title)
     return ax
 
@@ -107,18 +114,14 @@ def plot_topology(robot, ax=None):
 
 
 def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
-    """Base angles (n, rays, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi.
-
-    ValueError where a circle that an arm cannot fold into hides a part of the workspace from `_sheet_centre`.
-    """
+    """Base angles (n, rays, N) in rad over a polar grid of the workspace in one working mode, without jumps of 2 pi."""
     centre = _sheet_centre(robot)
-    _all_seen(robot, centre)
     # At a corner on a base point one point of the plane is a whole edge of the sheet: rays crowd there.
     corners = np.arctan2(*(robot.base - centre).T[::-1])
     crowd = np.concatenate([[0], np.logspace(-7, -1.5, 8), -np.logspace(-7, -1.5, 8)])
     rays = np.concatenate([np.linspace(0, 2 * np.pi, 4 * n + 1), np.ravel(corners[:, None] + crowd) % (2 * np.pi)])
     way = unit_vector(np.sort(rays))
-    low, high = np.zeros(len(way)), np.full(len(way), robot.lengths.sum(axis=1).max())
+    low, high = np.zeros(len(way)), np.full(len(way), 2 * robot.lengths.sum(axis=1).max())
     for _ in range(50):
         middle = (low + high) / 2
         inside = reachable(robot, centre + middle[:, None] * way)
@@ -130,20 +133,18 @@ def configuration_sheet(robot, mode, n: int = 32) -> np.ndarray:
 
 
 def _sheet_centre(robot) -> np.ndarray:
-    """The mean of the base points (2,) in m, or, where that is out of reach, the place with the most room."""
-    centre = robot.base.mean(axis=0)
-    return centre if reachable(robot, centre) else roomiest(robot)
+    """The mean of the base points (2,) in m, or, where that is out of reach, the place with the most room.
 
-
-def _all_seen(robot, centre) -> None:
+    ValueError where a circle that an arm cannot fold into hides a part of the workspace from there.
+    """
+    centre = robot.base.mean(axis=0) if reachable(robot, robot.base.mean(axis=0)) else roomiest(robot)
     way = grid_points(robot, 101)[3] - centre
     for base, inner in zip(robot.base - centre, np.abs(robot.lengths[:, 0] - robot.lengths[:, 1]), strict=True):
         part = np.clip(way @ base / np.maximum(np.sum(way**2, axis=-1), 1e-300), 0.0, 1.0)
         if np.any(np.linalg.norm(part[:, None] * way - base, axis=-1) < (1 - 1e-9) * inner):
-            raise ValueError(
-                "robot has a workspace with holes, bays or several parts, which no one sheet shows; "
-                "allowed: one that is seen as a whole from one place, as with two equal links in each arm"
-            )
+            parts = "allowed: one seen as a whole from one place, as with two equal links in each arm"
+            raise ValueError(f"robot has a workspace with holes, bays or several parts, which no sheet shows; {parts}")
+    return centre
 
 
 def on_sheet(robot, q_a) -> np.ndarray:
@@ -243,13 +244,14 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
     """
     scale = positive_number("newton_per_metre", newton_per_metre)
     forces = exact_array("forces", forces, robot.n_arms, 2)
-    ax = plot_machine(robot, q, ax, labels=False, alpha=0.35)
+    ax, corner = _with_legend(robot, ax)
+    plot_machine(robot, q, ax, labels=False, alpha=0.35)
     x = forward_kinematics(robot, q)
     for i, force in enumerate(forces):
         arrow = {"arrowstyle": "-|>", "color": arm_colour(i), "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", tuple(x + force / scale), tuple(x), zorder=7, arrowprops=arrow)
         ax.plot([], [], color=arm_colour(i), lw=2.4, label=f"on arm {i + 1}: {np.hypot(*force):.2f} N")
-    ax.legend(loc="upper left")
+    ax.legend(loc="upper left", bbox_to_anchor=corner)
     ax.set_title(title)
     return ax
 

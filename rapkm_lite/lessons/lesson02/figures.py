@@ -65,8 +65,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
         place = {"xytext": (10, 10 * np.sign(robot.base[i, 1])), "textcoords": "offset points", "va": "center"}
         look = {"color": arm_text_colour(i), "fontweight": "bold", "fontsize": 9}
         axes[0].annotate(f"drive {i + 1}", robot.base[i], **place, **look)
-    _, d = arm_vectors(robot, q)
-    axes[0].axline(x, np.add(x, d[pair[0]]), color=ALARM, lw=1.0, ls=":", zorder=2)
+    axes[0].axline(x, np.add(x, arm_vectors(robot, q)[1][pair[0]]), color=ALARM, lw=1.0, ls=":", zorder=2)
     plot_workspace(robot, axes[1])
     plot_path(trajectory, axes[1])
     plot_pair_curves(robot, axes[1])

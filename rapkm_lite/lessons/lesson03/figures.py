@@ -49,7 +49,7 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     ax.plot(*rest, "s", mfc="white", mec=NEUTRAL, mew=1.8, ms=8, zorder=6)
     ax.set(xlabel="x − desired x in mm", ylabel="y − desired y in mm", title=title, aspect="equal")
     ax.set(xlim=centre[0] + half * np.array([-1, 1]), ylim=centre[1] + half * np.array([-1, 1]))
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=1)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=1 if len(A) < 4 else 2)
     return ax
 
 
@@ -122,9 +122,10 @@ def plot_log(log, axes=None):
         axes[1].plot(log.t, 1e3 * log.c[:, i], **arm_line(i))
     axes[0].set(ylabel="measured − desired\nangle in mrad", xlim=log.t[[0, -1]])
     axes[1].set(xlabel="time in s", ylabel="torque in mN m")
-    for ax in axes:  # no machine is known here: the least torque, 1e-9 N m, is that of `plot_torque_norms`
-        no_finer(ax, LEAST)
-    axes[0].legend(ncols=min(log.c.shape[1], 6), loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    no_finer(axes[0], LEAST)
+    no_finer(axes[1], 1e-9)  # in mN m, of any machine: a log does not know its own
+    N = log.c.shape[1]
+    axes[0].legend(ncols=-(-N // -(-N // 6)), loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     return axes
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures._shared import least_torque, no_finer, with_looks
+from ...figures._shared import LEAST, least_torque, no_finer, step_of, with_looks
 from ...figures.film import film
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
@@ -21,12 +21,11 @@ from ...mechanics.kinematics import forward_kinematics, inverse_kinematics
 from ...simulation.energy import antagonistic_torque
 
 
-def _pair_poses(robot, q_a, guess) -> dict:
+def _pair_poses(robot, q_a, guess, pairs) -> dict:
     """What each equivalent five-bar (fig. 3) makes of measured base angles q_a (N,) in rad, by pair of drives.
 
     Each value is the configuration (4,) in rad of ``robot.with_arms(pair)``, found from the point `guess` (2,) in m.
     """
-    pairs = drive_pairs(robot)
     return {pair: estimate_pose(robot.with_arms(pair), np.asarray(q_a)[list(pair)], guess) for pair in pairs}
 
 
@@ -43,8 +42,8 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
     true = inverse_kinematics(robot, x)[: robot.n_arms]
-    shown = _pair_poses(robot, true + magnify * offset, x)
-    for pair, face in zip(((0, 1), (1, 2))[: robot.n_arms - 1], ("white", ALARM), strict=False):
+    shown = _pair_poses(robot, true + magnify * offset, x, ((0, 1), (1, 2))[: robot.n_arms - 1])
+    for pair, face in zip(shown, ("white", ALARM), strict=False):
         five_bar = robot.with_arms(pair)
         for i, points in zip(pair, arm_points(five_bar, shown[pair]), strict=True):
             axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
@@ -54,12 +53,13 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
         axes[0].plot(*points[2], "s", mfc=face, mec=NEUTRAL, mew=1.8, ms=9, zorder=5, label=label)
     axes[0].plot(*x, "+", color=AFTER, ms=14, mew=1.6, zorder=6, label="true end-effector")
     plane_axes(robot, axes[0])
-    long = robot.lengths.max()
-    low, high = robot.base.min(axis=0) - 0.55 * long, robot.base.max(axis=0) + np.array([0.4, 1.05]) * long
+    long, drawn = robot.lengths.max(), [line.get_xydata() for line in axes[0].lines]
+    low = np.vstack([robot.base - 0.55 * long, *(points - 0.1 * long for points in drawn)]).min(axis=0)
+    high = np.vstack([robot.base + np.array([0.4, 1.05]) * long, *(p + [0, 0.6 * long] for p in drawn)]).max(axis=0)
     axes[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=f"offsets magnified {magnify:g} times")
     axes[0].legend(loc="upper left")
 
-    seen = _pair_poses(robot, true + offset, x)
+    seen = _pair_poses(robot, true + offset, x, drive_pairs(robot))
     points = {pair: forward_kinematics(robot.with_arms(pair), q) for pair, q in seen.items()}
     _plot_beliefs(robot, x, points, forward_kinematics(robot, estimate_pose(robot, true + offset, x)), axes[1])
     return axes
@@ -70,18 +70,22 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     corners = 1e3 * (np.array([*points.values()]) - x)
     words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9.5}
     centred = words | {"ha": "center", "va": "center"}
+    apart = len(corners) == 1 or np.ptp(corners, axis=0).max() > LEAST
     if len(corners) == 3:
         ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
     for (j, k), corner in zip(points, corners, strict=True):
         ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
-        side = np.sign(corner[1] - corners[:, 1].mean())  # the name stands outside the triangle
-        ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), **centred)
+        if apart and len(corners) <= 6:
+            side = 1 if corner[1] >= corners[:, 1].mean() else -1  # the name stands outside the triangle
+            ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), **centred)
     ax.plot(*(1e3 * (estimate - x)), "D", color=NEUTRAL, ms=7)
-    ax.annotate("least squares", 1e3 * (estimate - x), xytext=(0, -13), **centred)
+    ax.annotate("least squares" if apart else "all drives agree", 1e3 * (estimate - x), xytext=(0, -13), **centred)
     ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
     ax.annotate("true", (0, 0), xytext=(10, -4), **words)
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.35)
+    shown = np.vstack([corners, 1e3 * (estimate - x), [0.0, 0.0]])
+    ends = np.array([[-0.85], [0.85]]) * max(np.ptp(shown, axis=0).max(), 2 * LEAST)  # room for the names
+    left_right, low_high = ((shown.min(axis=0) + shown.max(axis=0)) / 2 + ends).T
+    ax.set(aspect="equal", xlim=left_right, ylim=low_high)
     ax.set(xlabel="x − true x in mm", ylabel="y − true y in mm", title="the same, true size, close up")
 
 
@@ -134,28 +138,30 @@ def plot_antagonism(run, ax=None, title: str = ""):
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_antagonism(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
     """
-    # Beside the torques: a millionth of them is the least that is seen.
-    least = 1e3 * max(least_torque(run.robot), 1e-6 * np.abs(run.c).max())
+    least = 1e3 * max(least_torque(run.robot), 1e-6 * np.abs(run.c).max())  # beside the torques themselves
     return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title, least)
 
 
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
     """Norm of the drive torques over time, one line per run; `runs` maps a label to one of up to five runs.
 
-    antagonism : show only the part that moves nothing.  log : logarithmic axis, which ends at 1e-9 N m.
+    antagonism : show only the part that moves nothing.  log : logarithmic axis; what lies below its end, on the
+    testbed 1e-9 N m, is drawn there.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(9.8, 3.3))
+    low, high = min(1e-9, *(least_torque(run.robot) for run in runs.values())), 0.0
     for (label, run), line in with_looks("runs", runs, _RUN_LINES):
         size = np.linalg.norm(antagonistic_torque(run) if antagonism else run.c, axis=-1)
-        ax.plot(run.t, np.maximum(size, 1e-30) if log else 1e3 * size, label=label, **line)
+        ax.plot(run.t, np.maximum(size, low) if log else 1e3 * size, label=label, **line)
+        high = max(high, size.max())
     words = f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}"
     end = max(run.t[-1] for run in runs.values())
     ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, end), yscale="log" if log else "linear")
     if log:
-        ax.set_ylim(1e-9, max(1e-8, ax.get_ylim()[1]))
+        ax.set_ylim(low, max(10 * low, 2 * high))
     else:
         no_finer(ax, 1e3 * max(max(least_torque(run.robot), 1e-6 * np.abs(run.c).max()) for run in runs.values()))
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
@@ -178,10 +184,13 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
             raise ValueError(f"runs[{label!r}] has drives of {short(price.tolist())} W/(N m)²; allowed: equal drives")
         along = np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)
         moving = np.linalg.norm(run.c - antagonistic_torque(run), axis=-1)
-        ax.plot(1e3 * along[::20], 1e3 * moving[::20], marker, color=colour, ms=4, label=label)
+        points = np.stack([along, moving])[:, :: step_of(run, 20)]
+        ax.plot(*(1e3 * points), marker, color=colour, ms=4, label=label)
     ax.set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, ‖c_eff‖, in mN m", title=title)
-    ax.set_aspect("equal")
-    ax.set_ylim(0, 1.25 * ax.get_ylim()[1])
+    no_finer(ax, 1e3 * max(least_torque(run.robot) for run in runs.values()))
+    (left, right), top = ax.get_xlim(), 1.25 * ax.get_ylim()[1]
+    wide = max(right - left, 0.8 * top)  # equal scales would leave a run without antagonism a strip
+    ax.set(xlim=((left + right - wide) / 2, (left + right + wide) / 2), ylim=(0, top), aspect="equal")
     ax.axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
     ax.legend(loc="upper left", ncols=2)
     return ax
@@ -199,14 +208,15 @@ def plot_filter_share(run, share: float, axes=None):
     axes = plt.subplots(1, 2, figsize=(8.0, 3.2))[1] if axes is None else axes
     fight = antagonistic_torque(run)
     c = 1e3 * (run.c - share * fight)
+    few, fewer = step_of(run, 10), step_of(run, 25)
     for i in range(run.robot.n_arms):
-        axes[0].plot(run.t[::10], c[::10, i], label=f"drive {i + 1}", **arm_line(i))
+        axes[0].plot(run.t[::few], c[::few, i], label=f"drive {i + 1}", **arm_line(i))
     reach = 1.45e3 * max(np.abs(run.c).max(), least_torque(run.robot))
-    axes[0].set(xlabel="time in s", ylabel="torque in mN m", xlim=(0, run.t[-1]), ylim=(-reach, reach))
-    axes[0].set_title(f"filter {100 * share:.0f} %")
+    axes[0].set(xlabel="time in s", ylabel="torque in mN m", title=f"filter {100 * share:.0f} %")
+    axes[0].set(xlim=(0, run.t[-1]), ylim=(-reach, reach))
     axes[0].legend(ncols=run.robot.n_arms, loc="upper right")
-    along = 1e3 * np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)[::25]
-    moving = 1e3 * np.linalg.norm(run.c - fight, axis=-1)[::25]
+    along = 1e3 * np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)[::fewer]
+    moving = 1e3 * np.linalg.norm(run.c - fight, axis=-1)[::fewer]
     axes[1].plot(along, moving, "o", color="#DDDDDD", ms=4)
     axes[1].plot((1 - share) * along, moving, ".", color=AFTER, ms=5)
     axes[1].axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
@@ -219,9 +229,7 @@ def plot_filter_share(run, share: float, axes=None):
 
 
 def film_filter(run, frames: int = 18):
-    """A film of `plot_filter_share`: the torque points of a log land on the axis while the filter is turned on.
-
-    For three arms.
+    """A film of `plot_filter_share`, for three arms: points of a log land on the axis while the filter is turned on.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
@@ -245,18 +253,20 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
     >>> ax = plot_energies({"no filter": [1.3, 1.5, 1.7], "filter": [0.5, 0.7, 1.0]})
     """
     ax = axes_or_new(ax)
-    count = len(rows)
-    width = 0.8 / count
+    low, high = min(np.min(e) for e in rows.values()), max(np.max(e) for e in rows.values())
+    count, size = len(rows), max(high, -low, 1e-18)  # below is rounding, with mg and mm, too
+    width, digits = 0.8 / count, "z.2f" if 0.1 <= size < 1e4 else "z.2g"
+    words: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 9 if count < 3 else 8}
     fills = [{"alpha": 1.0}, {"alpha": 0.45}, {"alpha": 1.0, "hatch": "///"}, {"alpha": 0.45, "hatch": "///"}]
     for k, (label, energies) in enumerate(rows.items()):
         for i, energy in enumerate(energies):
             at = i + (k - (count - 1) / 2) * width
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
-            ax.text(at, max(energy, 0.0), f"{energy:.2f}", ha="center", va="bottom", fontsize=9 if count < 3 else 8)
+            ax.text(at, max(energy, 0.0), f"{energy:{digits}}".replace("-", "−"), **words)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
     ax.set_xticks(range(len(energies)), [f"drive {i + 1}" for i in range(len(energies))])
     ax.set(ylabel="electric energy in J", title=title)
-    ax.set_ylim(min(0.0, 1.25 * min(np.min(e) for e in rows.values())), 1.3 * max(np.max(e) for e in rows.values()))
+    ax.set_ylim(min(0.0, 1.25 * low), max(1.3 * high, 0.1 * size))
     ax.grid(axis="x", visible=False)
     ax.legend(ncols=2, loc="upper left")
     return ax

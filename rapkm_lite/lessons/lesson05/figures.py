@@ -122,6 +122,8 @@ def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
 def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
     """True end-effector paths of several runs and the curve of a pair: the workspace, and the box `zoom` (4,) in m.
 
+    Default of `zoom`: the testbed's corner, as large as the machine, or, where no run gets there, about the runs.
+
     runs : label -> run; a cross marks where a run shorter than the longest one ends.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
@@ -138,7 +140,12 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(longest.robot, ax)
-    axes[1].set(**_box(longest.robot, zoom, -0.13, 0.14, -0.105, -0.045), aspect="auto", title="enlarged, axes unequal")
+    box, seen = _box(longest.robot, zoom, -0.13, 0.14, -0.105, -0.045), np.concatenate([run.x for run in runs.values()])
+    (left, right), (low, high) = box.values()
+    if zoom is None and not np.any(np.all((seen > [left, low]) & (seen < [right, high]), axis=-1)):
+        room = 0.2 * np.ptp(seen, axis=0).max() + 0.05 * longest.robot.lengths.max()
+        box = dict(zip(box, zip(seen.min(axis=0) - room, seen.max(axis=0) + room, strict=True), strict=True))
+    axes[1].set(**box, aspect="auto", title="enlarged, axes unequal")
     axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
     return axes
 

@@ -77,7 +77,7 @@ def plot_demand(part, demand, points: dict, ax=None):
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.2))
     ax.plot(part, demand, color=AFTER)
-    top = np.max(demand)
+    top = max(np.max(demand), 1e-9)  # less is rounding
     for row, ((label, shares), colour) in enumerate(with_looks("points", points, (BEFORE, ALARM))):
         level = -(row + 1) * 0.13 * top
         ax.plot(shares, np.full(len(shares), level), "o", ms=6, color=colour, label=label)

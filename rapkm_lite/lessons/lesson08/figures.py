@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ...figures._shared import with_looks
+from ...figures._shared import LEAST, no_finer, with_looks
 from ...figures.machine import plane_axes, plot_workspace
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
 from ...mechanics.antagonism import null_vector
@@ -64,7 +64,9 @@ def plot_counted(t, gap, exact, axes=None):
     middle, width = t[len(t) // 5], 0.007 * (t[-1] - t[0])
     axes[1].set(xlim=(middle - width, middle + width), title="a moment of it")
     top = 1e3 * np.max(gap)
-    axes[0].set_ylim(top=1.25 * top)
+    no_finer(axes[0], LEAST)
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(top=max(1.25 * top, high + 0.15 * (high - low)))  # room for the legend, also below zero
     axes[0].legend(loc="upper center", ncols=2, markerscale=4)
     return axes
 

@@ -40,6 +40,7 @@ def plot_clipping(free, clipped, limit, axes=None):
         axes[1].plot(run.t, 1e3 * error, color=colour, label=label)
     axes[1].set(xlabel="time in s", ylabel="error in mm", title="what becomes of the path")
     no_finer(axes[1], LEAST * free.robot.lengths.max())
+    axes[1].margins(y=0.25)  # room for the legend
     axes[1].legend(loc="upper right")
     return axes
 
@@ -113,12 +114,14 @@ def plot_accelerations(robot, places, limit: float, axes=None):
             look = pair_line(robot, pair) | {"lw": 1.2, "label": f"pair {pair_name(pair)}"}
             ax.plot(*accelerations(force_polygon(A[list(pair)], limit)), **look)
         size = max(size, 1.1 * np.abs(whole).max())
-        ax.set_title(f"at ({1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}) mm".replace("-", "−"))
+        left, up = np.round(1e3 * x, 3)
+        ax.set_title(f"at ({left:zg}, {up:zg}) mm".replace("-", "−"))
         ax.set(xlabel="acceleration in x in m/s²", aspect="equal")
     for ax in axes:
         ax.set(xlim=(-size, size), ylim=(-size, size))
     axes[0].set_ylabel("acceleration in y in m/s²")
-    axes[0].figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center")
+    handles, words = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, words, loc="outside right center", ncols=math.ceil(len(words) / 14))
     return axes
 
 
