@@ -57,7 +57,7 @@ def least_torque(robot) -> float:
 
     >>> import rapkm_lite as rk
     >>> f"{least_torque(rk.load()):.1e} N m"
-    '7.1e-09 N m'
+    '7.2e-09 N m'
     """
     return 1e-6 * float(robot.arm_inertias.max())
 
@@ -81,13 +81,13 @@ def no_finer(ax: Axes, least: float) -> None:
 
 
 def step_of(run, most: int) -> int:
-    """Every how many samples of a run are drawn: `most`, or fewer where this would leave less than 200.
+    """Every how many samples of a run are drawn: `most`, or fewer where this would leave less than 40.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> step_of(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 20)
-    2
+    12
     """
-    return min(most, max(1, len(run) // 200))
+    return min(most, max(1, len(run) // 40))
 
 
 def with_looks(name: str, entries: dict, looks) -> Iterator[tuple]:
