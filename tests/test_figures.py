@@ -671,3 +671,20 @@ def test_bars_of_any_size_have_their_numbers():
         ax = plotting.plot_energies({"a": [size, size / 2]})
         assert ax.texts[0].get_text() == words and ax.get_ylim()[1] > size
     assert plotting.plot_energies({"a": [-1.0, -2.0]}).get_ylim()[1] > 0.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_run_of_one_sample_is_seen(world):
+    def law(t, q_a, qd_a, desired):
+        if t > 0.0:
+            raise ValueError("no more")
+        return np.array([0.1, 0.0, -0.1])
+
+    with pytest.raises(rk.SimulationError) as caught:
+        rk.simulate(world["robot"], law, world["path"])
+    one = caught.value.partial
+    assert len(one) == 1
+    for ax in (plotting.plot_torques(one), plotting.plot_errors(one), plotting.plot_antagonism(one)):
+        assert {line.get_marker() for line in ax.lines} == {"o"} and ax.get_xlim() == (0.0, one.dt)
+    plotting.plot_torque_norms({"lost": one})
+    plotting.plot_filter_share(one, 0.5)

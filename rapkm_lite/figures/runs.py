@@ -43,11 +43,11 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least
     """
     ax = axes_or_new(ax)
     for i, line in enumerate(values.T):
-        ax.plot(run.t, line, label=f"drive {i + 1}", **arm_line(i))
+        ax.plot(run.t, line, label=f"drive {i + 1}", marker="o" if len(run) == 1 else None, **arm_line(i))
     N = run.robot.n_arms
     rows = math.ceil(N / max(1, int(ax.get_window_extent().width / ax.figure.dpi / 1.04)))  # inches for one entry
     ax.margins(y=0.18 * rows)
-    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, run.t[-1]))
+    ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, max(run.t[-1], run.dt)))
     no_finer(ax, least)
     ax.legend(ncols=math.ceil(N / rows), loc="upper right")
     return ax

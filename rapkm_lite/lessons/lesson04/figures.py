@@ -158,7 +158,7 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
         ax.plot(run.t, np.maximum(size, low) if log else 1e3 * size, label=label, **line)
         high = max(high, size.max())
     words = f"norm of the {'antagonism' if antagonism else 'torques'} in {'N m' if log else 'mN m'}"
-    end = max(run.t[-1] for run in runs.values())
+    end = max(max(run.t[-1], run.dt) for run in runs.values())
     ax.set(xlabel="time in s", ylabel=words, title=title, xlim=(0, end), yscale="log" if log else "linear")
     if log:
         ax.set_ylim(low, max(10 * low, 2 * high))
@@ -213,7 +213,7 @@ def plot_filter_share(run, share: float, axes=None):
         axes[0].plot(run.t[::few], c[::few, i], label=f"drive {i + 1}", **arm_line(i))
     reach = 1.45e3 * max(np.abs(run.c).max(), least_torque(run.robot))
     axes[0].set(xlabel="time in s", ylabel="torque in mN m", title=f"filter {100 * share:.0f} %")
-    axes[0].set(xlim=(0, run.t[-1]), ylim=(-reach, reach))
+    axes[0].set(xlim=(0, max(run.t[-1], run.dt)), ylim=(-reach, reach))
     axes[0].legend(ncols=run.robot.n_arms, loc="upper right")
     along = 1e3 * np.sum(null_vector(run.robot, run.q) * run.c, axis=-1)[::fewer]
     moving = 1e3 * np.linalg.norm(run.c - fight, axis=-1)[::fewer]
