@@ -220,6 +220,27 @@ def test_pose_near_a_singularity_is_as_exact_as_its_angles():
     assert_allclose(found[:, :2], q[near, :2], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("distance", [1e-3, 2e-7, 1e-9, 1e-11])
+def test_pose_is_found_where_an_arm_of_equal_links_reaches_its_own_base(distance):
+    """Its angles are those of the inverse kinematics, which puts the end-effector where it was."""
+    x = TESTBED.base[0] + distance * np.stack([np.cos(a := np.linspace(0.2, 0.8, 9)), np.sin(a)], axis=-1)
+    q = rk.estimate_pose(TESTBED, rk.inverse_kinematics(TESTBED, x)[:, :3], x)
+    assert_allclose(rk.tips(TESTBED, q), np.repeat(x[:, None], 3, axis=1), rtol=0, atol=4e-15)
+
+
+@pytest.mark.parametrize("contradiction", [1e-12, 1e-10, 1e-8])
+def test_pose_near_a_singularity_is_found_for_angles_that_contradict_each_other(contradiction):
+    """Rounding moves x by 1e-16 over sigma there, too; at the least squares A^+ leaves nothing of the residuals."""
+    robot = TESTBED.replace(mode=[1, 1, -1])
+    away = 3e-4 * np.stack([np.cos(a := np.arange(24) * np.pi / 12 + 0.1), np.sin(a)], axis=-1)
+    x = TESTBED.base[:2].mean(axis=0) + away
+    q_a = rk.inverse_kinematics(robot, x)[:, :3] + contradiction * np.random.default_rng(2).normal(size=(24, 3))
+    found = np.array([rk.estimate_pose(robot, angles, place) for angles, place in zip(q_a, x, strict=True)])
+    A = rk.control_matrix(robot, found)
+    left = np.linalg.pinv(A, rcond=0.0) @ (q_a - found[:, :3])[..., None]
+    assert np.abs(left).max() < 1e-15 * np.linalg.cond(A).max()
+
+
 def test_pose_fails_loudly():
     with pytest.raises(rk.ConvergenceError, match=r"at the rim of the workspace, the residuals are \[.*\] rad"):
         rk.estimate_pose(TESTBED, [0.0, 0.0, 0.0], [0.0, 0.0])

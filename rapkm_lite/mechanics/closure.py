@@ -77,8 +77,9 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
     return H
 
 
-def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Newton's step in x, (..., 2) in m, to the least squares; that of A^+ where the Hessian is not well positive.
+    And how far, (...,) in m/rad, the rounding of the angles moves it.
 
     Where the residuals are large, A^+ alone makes steps that shrink slowly, or not at all.  A^T A and the Hessian
     square the singular values of A: whether they are regular is asked of A, and nothing is solved with their rounding.
@@ -92,16 +93,18 @@ def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.nd
         raise ValueError("A has lost rank (an input singularity); allowed: another pose")
     regular = (hessian[..., 0, 0] > 0.0) & (det > 1e-3 * whole) & (det > 1e-14 * size)
     hessian = np.where(regular[..., None, None], hessian, np.eye(2))
-    newton = np.linalg.solve(hessian, matvec(A.mT, residual)[..., None])[..., 0]
-    return np.where(regular[..., None], newton, matvec(over.mT, residual) / whole[..., None])
+    newton = np.linalg.solve(hessian, np.concatenate([matvec(A.mT, residual)[..., None], A.mT], axis=-1))
+    gauss = np.concatenate([matvec(over.mT, residual)[..., None], over.mT], axis=-1) / whole[..., None, None]
+    step = np.where(regular[..., None, None], newton, gauss)
+    return step[..., 0], np.abs(step[..., 1:]).sum(axis=-1).max(axis=-1)
 
 
 def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q at x, the residuals of the base angles q_a there, and the sum of their squares, infinite out of reach."""
-    q, cosine = cores.joint_angles(robot, x, robot.mode)
+    q, _ = cores.joint_angles(robot, x, robot.mode)
     residual = wrap(q_a - q[..., : robot.n_arms])
-    # Where an arm is as good as stretched or folded, A has no bounds.
-    out = (np.abs(cosine) > 1.0 - 1e-12).any(axis=-1)
+    # Where an arm is as good as stretched or folded, A has no bounds; a cosine would say so 1e-6 rad away.
+    out = (np.abs(np.sin(q[..., robot.n_arms :])) < 2e-12).any(axis=-1)
     return q, residual, np.where(out, np.inf, np.vecdot(residual, residual))
 
 
@@ -139,11 +142,12 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
         if np.isinf(square).any():
             break
         A = at(robot, q).A
-        step = _pose_step(robot, q, A, residual)
+        step, lever = _pose_step(robot, q, A, residual)
         size = np.abs(step).max(axis=-1, keepdims=True)
-        # Near an input singularity the rounding of angles that fit moves x further.
-        fits = np.abs(residual).max(axis=-1) < 4e-15 * (1.0 + np.abs(q_a).max(axis=-1))
-        if np.all(size[..., 0] < np.where(fits, 1e3, 1.0) * limit):
+        # Near an input singularity the rounding of angles moves x further, also of those that fit.
+        rounding = 1e-15 * (1.0 + np.abs(q_a).max(axis=-1))
+        uncertain = np.where(np.abs(residual).max(axis=-1) < 4.0 * rounding, np.inf, rounding * lever)
+        if np.all(size[..., 0] < limit + np.minimum(uncertain, 1e3 * limit)):
             return on_the_turn_of(q_a, q)
         # A tenth of the longest proximal link at most, and halved where it leaves the workspace or the residuals grow.
         step = step * np.minimum(1.0, 0.1 * robot.lengths[:, 0].max() / np.maximum(size, 1e-300))
