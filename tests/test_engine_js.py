@@ -147,3 +147,16 @@ def test_a_nearly_folded_arm_keeps_its_digits_on_the_page(distance):
     x, y = ((robot.base[0] + away) - robot.base[0]).T  # as rounded
     expected = np.arctan2(y, x) - np.arccos(np.hypot(x, y) / (2 * robot.lengths[0, 0]))
     assert np.allclose([page["angle"][0] for page in answers([case])[0]], expected, rtol=0, atol=2e-15)
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8])
+def test_the_filter_on_the_page_keeps_its_digits_near_an_input_singularity(distance):
+    """R c = c - n n^T c, n in closed form; rounding turns n by that of d_j x d_k, and so by A's condition."""
+    robot = MACHINES["testbed"].replace(mode=[1, -1, 1])
+    place = robot.base[::2].mean(axis=0) + distance * np.array([0.6, 0.8])
+    c = [1e-3, -4e-4, 3e-4]
+    case = {"robot": values(robot), "points": [place.tolist()], "K_P": 7.05, "offset": c}
+    q = rk.inverse_kinematics(robot, place)
+    n, A = rk.null_vector(robot, q), rk.control_matrix(robot, q)
+    assert np.linalg.cond(A) > 0.1 / distance
+    assert np.allclose(answers([case])[0][0]["moving"], c - n * (n @ c), rtol=0, atol=1e-18 * np.linalg.cond(A))

@@ -76,13 +76,12 @@ export class Pose {
   }
   /** Filter (15)-(16): overwrite torques by R c, their part that moves the end-effector. */
   filter(c) {
-    let m11 = 0, m12 = 0, m22 = 0, fx = 0, fy = 0;
-    for (let i = 0; i < c.length; i++) {
-      const bx = this.bx[i], by = this.by[i];
-      m11 += bx * bx, m12 += bx * by, m22 += by * by, fx += bx * c[i], fy += by * c[i];
-    }
-    const det = m11 * m22 - m12 * m12, gx = (m22 * fx - m12 * fy) / det, gy = (m11 * fy - m12 * fx) / det;
-    for (let i = 0; i < c.length; i++) c[i] = this.bx[i] * gx + this.by[i] * gy;
+    // By orthonormal columns u, v of the span of A: A^T A would square the condition number of A.
+    const dot = (p, q) => p.reduce((sum, value, i) => sum + value * q[i], 0);
+    const unit = (p, size = Math.sqrt(dot(p, p))) => p.map((value) => value / size);
+    const u = unit(this.bx), both = dot(u, this.by), v = unit(this.by.map((y, i) => y - both * u[i]));
+    const along = dot(u, c), aside = dot(v, c);
+    for (let i = 0; i < c.length; i++) c[i] = along * u[i] + aside * v[i];
     return c;
   }
   /** The direction of torques that move nothing, of length one, for three arms: the cross product of A's columns. */
