@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -777,6 +778,37 @@ def test_weights_that_differ_too_much_are_no_input_singularity_of_the_pose(call)
     with pytest.raises(ValueError, match=r"weighted|K A has") as caught:
         call(A, np.array([1e-30, 1e-30, 1.0]))
     assert str(caught.value).endswith("and gains or weights that differ less")
+
+
+def exactly(A, V):
+    """V A (A^T V A)^-1 for A (m, 2) and V = W^-1 (m,), both rational: (11)."""
+    AtVA = A.T @ (V[:, None] * A)
+    (a, b), (_, d) = AtVA
+    return V[:, None] * A @ np.array([[d, -b], [-b, a]]) / (a * d - b * b)
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e12, 1e20])
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+def test_weights_and_gains_of_very_different_drives_cost_no_digits(name, ratio):
+    """Of every torque and angle as many digits as of A, whichever drives are the heavy or the stiff ones."""
+    robot, rng, rational = MACHINES[name], np.random.default_rng(3), np.vectorize(Fraction, otypes=[object])
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, [0.02, 0.05]))
+    offset, force = rng.normal(size=len(A)), rng.normal(size=2)
+    A_, o, f, one = map(rational, (A, offset, force, np.eye(len(A))))
+    near = lambda c, exact: assert_allclose(c, exact.astype(float), rtol=1e-11, atol=0.0)  # noqa: E731
+    for pattern in itertools.product([1.0, ratio], repeat=len(A)):
+        W = np.array(pattern)
+        K = rational(W)
+        pinv, springs = exactly(A_, 1 / K), exactly(A_, K)
+        near(rk.weighted_pseudoinverse(A, W), pinv)
+        near(rk.prestress_projector(A, W), one - pinv @ A_.T)
+        near(rk.allocate_torques(A, force, 1e30, W=W), pinv @ f)
+        # Springs of the stiffness K share a force as weights 1 / K do.
+        c = springs @ (A_.T @ (K * o) + f) - K * o
+        near(rk.steady_state_torque(A, W, offset, force), c)
+        near(rk.steady_state_error(A, W, offset, force), -c / K - o)
+        R = rk.command_filter(A, np.sqrt(W))
+        assert_allclose(R, (springs @ A_.T).astype(float) * np.sqrt(W / W[:, None]), rtol=0.0, atol=1e-14)
 
 
 def near_the_curve(distance):

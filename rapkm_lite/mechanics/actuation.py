@@ -164,7 +164,8 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
         return cores.right_inverse("A", A) if inverses is None else inverses
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    return np.linalg.solve(L.mT, cores.right_inverse("A weighted with W", np.linalg.solve(L, A), cores.UNEVEN))
+    Q, R, _ = cores.uneven_rank("A weighted with W", np.linalg.solve(L, A))
+    return np.linalg.solve(L.mT, np.linalg.solve(R, Q.mT).mT)
 
 
 def prestress_projector(A, W=None) -> np.ndarray:
@@ -177,15 +178,14 @@ def prestress_projector(A, W=None) -> np.ndarray:
     1
     """
     A = tall_matrix("A", A)
-    one = np.eye(A.shape[-2])
     # The pseudoinverse times A^T would err by the condition number of A: torques that move something.
     if W is None:
         Q, _ = cores.full_rank("A", A)
-        return one - product(Q, Q.mT)
+        return np.eye(A.shape[-2]) - product(Q, Q.mT)
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
-    Q, _ = cores.full_rank("A weighted with W", np.linalg.solve(L, A), cores.UNEVEN)
-    return one - np.linalg.solve(L.mT, product(Q, Q.mT, L.mT))
+    n = cores.uneven_rank("A weighted with W", np.linalg.solve(L, A))[-1]
+    return np.linalg.solve(L.mT, product(n, n.mT, L.mT))
 
 
 def inverse_dynamics(robot: Manipulator, q, qd, qdd, W=None, prestress=None) -> np.ndarray:

@@ -23,6 +23,7 @@ from .actuation import control_matrix, required_wrench
 from .at import at
 from .kinematics import cross
 from .linalg import product
+from .redundancy import most_even
 
 
 def antagonism_filter(A) -> np.ndarray:
@@ -53,7 +54,7 @@ def command_filter(A, K) -> np.ndarray:
     A = tall_matrix("A", A)
     K = positive_definite("K", K, A.shape[-2])
     check_leading(A=A.shape[:-2], K=K.shape[:-2])
-    Q, _ = cores.full_rank("K A", K @ A, cores.UNEVEN)
+    Q, _, _ = cores.uneven_rank("K A", K @ A)
     return product(Q, Q.mT)
 
 
@@ -145,22 +146,8 @@ def common_sign(A) -> np.ndarray:
         return gaps.max(axis=-1) < np.pi - 1e-12  # opposite rows leave a half turn, rounded
     # Rows of equal length: no sign changes, and none of the n_i is small merely because of its units.
     basis = cores.null_space(A / np.where(size > 0.0, size, 1.0))
-    least = np.array([_most_even(basis[index]) for index in np.ndindex(A.shape[:-2])])
+    least = np.array([most_even(basis[index]) for index in np.ndindex(A.shape[:-2])])
     return (least > 1e-12).reshape(A.shape[:-2])[()]
-
-
-def _most_even(basis: np.ndarray) -> float:
-    """The largest possible smallest component of a combination n of null vectors, columns of (m, k), with n_i <= 1."""
-    m, k = basis.shape
-    if k < 2:
-        return max((float(n.min()) for n in (*basis.T, *-basis.T)), default=0.0)
-    from scipy.optimize import linprog
-
-    # Unknowns: the coefficients of the basis, and a lower bound of all components.
-    rows = np.block([[basis, np.zeros((m, 1))], [-basis, np.ones((m, 1))]])
-    limits = np.append(np.ones(m), np.zeros(m))
-    found = linprog(np.append(np.zeros(k), -1.0), rows, limits, bounds=(None, None))
-    return float((basis @ found.x[:k]).min()) if found.status == 0 else 0.0
 
 
 def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
@@ -177,17 +164,8 @@ def steady_state_error(A, K_P, offset, wrench=None) -> np.ndarray:
     >>> rk.steady_state_error(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(5)
     array([-0.00341,  0.00109,  0.00091])
     """
-    A = tall_matrix("A", A)
-    cores.full_rank("A", A)
-    offset = real_array("offset", offset, A.shape[-2])
-    K = positive_definite("K_P", K_P, A.shape[-2])
-    wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
-    check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
-    L = np.linalg.cholesky(K)  # A^T K_P A itself would square the condition number of A
-    Q, R = cores.full_rank("A weighted with K_P", L.mT @ A, cores.UNEVEN)
-    carried = np.linalg.solve(R.mT, wrench[..., None])[..., 0]
-    shared = matvec(Q, matvec(Q.mT, matvec(L.mT, offset)) + carried)
-    return -np.linalg.solve(L.mT, shared[..., None])[..., 0]
+    L, Q, _, sprung, carried = _springs(A, K_P, offset, wrench)
+    return -np.linalg.solve(L.mT, matvec(Q, matvec(Q.mT, sprung) + carried)[..., None])[..., 0]
 
 
 def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
@@ -199,8 +177,22 @@ def steady_state_torque(A, K_P, offset, wrench=None) -> np.ndarray:
     >>> rk.steady_state_torque(rk.control_matrix(robot, q), 7.05, [4e-3, 0.0, 0.0]).round(4)
     array([-0.0042, -0.0077, -0.0064])
     """
-    e_a = steady_state_error(A, K_P, offset, wrench)
-    return -matvec(positive_definite("K_P", K_P, e_a.shape[-1]), e_a + np.asarray(offset, dtype=float))
+    L, Q, n, sprung, carried = _springs(A, K_P, offset, wrench)
+    # K_P (e_a + offset) itself would cancel where one drive is much stiffer than the others.
+    return matvec(L, matvec(Q, carried) - matvec(n, matvec(n.mT, sprung)))
+
+
+def _springs(A, K_P, offset, wrench) -> tuple[np.ndarray, ...]:
+    """L of K_P = L L^T, orthonormal Q and n of the range of L^T A and of its complement, L^T offset, wrench along Q."""
+    A = tall_matrix("A", A)
+    cores.full_rank("A", A)
+    offset = real_array("offset", offset, A.shape[-2])
+    K = positive_definite("K_P", K_P, A.shape[-2])
+    wrench = real_array("wrench", np.zeros(A.shape[-1]) if wrench is None else wrench, A.shape[-1])
+    check_leading(A=A.shape[:-2], offset=offset.shape[:-1], K_P=K.shape[:-2], wrench=wrench.shape[:-1])
+    L = np.linalg.cholesky(K)  # A^T K_P A itself would square the condition number of A
+    Q, R, n = cores.uneven_rank("A weighted with K_P", L.mT @ A)
+    return L, Q, n, matvec(L.mT, offset), np.linalg.solve(R.mT, wrench[..., None])[..., 0]
 
 
 def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: float) -> bool:
@@ -245,7 +237,7 @@ def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:
     counts - ideal = (1 - S K) r - S p with S = A (A^T K A)^-1 A^T: soft drives are carried far by the others' friction.
     """
     L = np.linalg.cholesky(K)
-    half = np.linalg.solve(L.T, cores.full_rank("A weighted with K_P", L.T @ A, cores.UNEVEN)[0])
+    half = np.linalg.solve(L.T, cores.uneven_rank("A weighted with K_P", L.T @ A)[0])
     S = half @ half.T
     reach = np.abs(np.eye(len(A)) - S @ K).sum(axis=-1) / 2 + ratio * np.abs(S).sum(axis=-1)
     if np.prod(np.sort(2 * reach + 1)[:2]) > 1e6:

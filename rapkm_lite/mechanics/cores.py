@@ -10,13 +10,13 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import by_minors, least_singular_value, linear, minors, orthogonal, pairs, product, solve
+from .linalg import by_minors, least_singular_value, linear, minors, orthogonal, pairs, product, solve, uneven
 
 _INPUT_SINGULARITY = (
     "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
     "actuation"
 )
-UNEVEN = (
+_UNEVEN = (
     "an input singularity, or gains or weights that differ too much; allowed: poses with the full degree of actuation, "
     "and gains or weights that differ less"
 )
@@ -234,10 +234,20 @@ def redundant(N, N_dot, G, C, Q):
 def full_rank(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> tuple[np.ndarray, np.ndarray]:
     """Q and R of A (..., m, k); raises ValueError where A has lost rank."""
     Q, R = orthogonal(A)
-    measure = least_singular_value(R)[1]
-    if measure < 1e-12:
-        raise ValueError(f"{name} has lost rank (relative sigma_min {measure:.3g}): {where}")
+    _check_rank(name, R, where)
     return Q, R
+
+
+def uneven_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Q, R, no triangle, and orthonormal complement of Q, where gains or weights make rows differ by powers of ten."""
+    Q, R, V = uneven(A)
+    _check_rank(name, R, _UNEVEN)
+    return Q[..., : R.shape[-1]], product(R, V.mT), Q[..., R.shape[-1] :]
+
+
+def _check_rank(name: str, R: np.ndarray, where: str) -> None:
+    if (measure := least_singular_value(R)[1]) < 1e-12:
+        raise ValueError(f"{name} has lost rank (relative sigma_min {measure:.3g}): {where}")
 
 
 def right_inverse(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> np.ndarray:

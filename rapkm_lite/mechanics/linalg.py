@@ -58,6 +58,19 @@ def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.nd
     return generate(packed, scales, overwrite_a=1)[0], R
 
 
+def uneven(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Q (..., m, m), R (..., k, k) and V of A = Q[..., :k] R V^T for a tall A whose rows differ by powers of ten.
+
+    Householder's reflections keep the digits of the small rows where the large ones come first, and where the first
+    column holds what is largest (Powell and Reid, Cox and Higham): rows by size, columns turned to the first of them.
+    """
+    order = np.argsort(-np.abs(A).max(axis=-1), axis=-1)[..., None]
+    ordered = np.take_along_axis(A, order, axis=-2)
+    V, _ = orthogonal(ordered[..., : A.shape[-1], :].mT)
+    Q, R = orthogonal(product(ordered, V), complete=True)
+    return np.take_along_axis(Q, np.argsort(order, axis=-2), axis=-2), R, V
+
+
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solution of matrix @ X = right for a regular matrix, such as R or R^T of `orthogonal`.
 

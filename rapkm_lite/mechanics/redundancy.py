@@ -148,6 +148,20 @@ def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[n
     return share * limit * unit / scale, float(np.abs(share).max() * unit / scale)
 
 
+def most_even(basis: np.ndarray) -> float:
+    """The largest possible smallest component of a combination n of null vectors, columns of (m, k), with n_i <= 1."""
+    m, k = basis.shape
+    if k < 2:
+        return max((float(n.min()) for n in (*basis.T, *-basis.T)), default=0.0)
+    from scipy.optimize import linprog
+
+    # Unknowns: the coefficients of the basis, and a lower bound of all components.
+    rows = np.block([[basis, np.zeros((m, 1))], [-basis, np.ones((m, 1))]])
+    limits = np.append(np.ones(m), np.zeros(m))
+    found = linprog(np.append(np.zeros(k), -1.0), rows, limits, bounds=(None, None))
+    return float((basis @ found.x[:k]).min()) if found.status == 0 else 0.0
+
+
 def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
     """Stiffness (..., 2, 2) in N/m of PD drives at rest: K_x = A^T K_P A - sum_i c_i d2 q_i / dx2 + d2 V / dx2.
 
