@@ -326,6 +326,19 @@ def test_d_equals_the_projector_wherever_the_degree_of_actuation_is_two(name):
     assert norm(D - rk.nullspace_projector(robot, q)).max() < 1e-11
 
 
+@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_d_equals_the_projector_close_to_an_input_singularity_too(distance):
+    """J is regular there, and so N_J exact; rounding turns the span of A~ by its condition, not by its square."""
+    robot = rk.load().replace(mode=[1, -1, 1])
+    place = robot.base[::2].mean(axis=0) + distance * np.array([[0.6, 0.8], [-0.6, -0.8]])
+    q = rk.inverse_kinematics(robot, place)
+    A_tilde, N_J = rk.redundant_control_matrix(robot, q), rk.nullspace_projector(robot, q)
+    sigma = np.linalg.svd(A_tilde, compute_uv=False)
+    assert np.all(sigma[:, 1] < 20 * distance) and np.linalg.cond(rk.constraint_jacobian(robot, q)).max() < 10
+    assert_allclose(rk.closed_loop_projector(A_tilde), N_J, rtol=0, atol=1e-15 * (sigma[:, 0] / sigma[:, 1]).max())
+    assert_allclose(rk.closed_loop_projector(A_tilde[0]), N_J[0], rtol=0, atol=1e-15 * sigma[0, 0] / sigma[0, 1])
+
+
 @pytest.mark.parametrize(("m", "n", "delta"), [(2, 4, 1), (4, 9, 3), (6, 7, 2), (5, 5, 4), (3, 8, 3)])
 def test_d_of_any_mechanism_is_the_projector_of_numpys_pseudoinverse(m, n, delta):
     rng = np.random.default_rng(m * n + delta)

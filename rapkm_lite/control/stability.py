@@ -39,7 +39,10 @@ def closed_loop_projector(A_tilde, delta: int = 2) -> np.ndarray:
     A_tilde = wide_matrix("A_tilde", A_tilde)
     rows = select_independent(A_tilde, delta=delta)
     try:
-        return A_tilde.mT @ explicit_pseudoinverse(A_tilde, rows)
+        explicit_pseudoinverse(A_tilde, rows)  # raises where `rows` do not span all of them
+        # The product with it would square the condition number of A~; the chosen rows have the same span.
+        Q, _ = full_rank("A_tilde", np.take_along_axis(A_tilde, rows[..., None], axis=-2).mT)
+        return product(Q, Q.mT)
     except ValueError:
         rank = np.linalg.matrix_rank(A_tilde, rtol=1e-12)
         other = rank[rank != rows.shape[-1]]
