@@ -811,6 +811,31 @@ def test_weights_and_gains_of_very_different_drives_cost_no_digits(name, ratio):
         assert_allclose(R, (springs @ A_.T).astype(float) * np.sqrt(W / W[:, None]), rtol=0.0, atol=1e-14)
 
 
+def test_the_switching_map_keeps_its_digits_at_the_rim_of_the_workspace():
+    """A~ from J, which is regular there, against the map along a line between regions, where merits differ by 1e-8."""
+    robot = TESTBED.replace(mode=[-1, -1, -1])
+    centre = math.atan2(*-robot.base[1][::-1])
+
+    def at_rim(angle):
+        x = robot.base[1] + (0.4 - 4.5e-10) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return x, rk.redundant_control_matrix(robot, rk.inverse_kinematics(robot, x))
+
+    angles = np.linspace(centre - 0.5, centre + 0.5, 500)
+    best = rk.select_independent(at_rim(angles)[1], "printed")
+    k = np.flatnonzero(np.diff(best, axis=0).any(axis=-1))[0]
+
+    def ahead(angle):
+        """By how much, of itself, the merit of the pair before the line exceeds that of the pair behind it."""
+        one, other = (PARTITION_RULES["printed"](at_rim(angle)[1][pair]) for pair in best[k : k + 2])
+        return float((one - other) / np.abs(one))
+
+    for angle in brentq(ahead, angles[k], angles[k + 1], xtol=1e-15) + np.linspace(-2e-8, 2e-8, 100):
+        if abs(lead := ahead(angle)) > 1.1e-9:  # less counts as equal
+            u, v = at_rim(angle)[0]
+            index = rk.switching_map(robot, "printed", n=2, box=(u - 1e-3, u, v - 1e-3, v))[2].data[1, 1]
+            assert PAIRS[index] == tuple(best[k] if lead > 0.0 else best[k + 1]), lead
+
+
 def near_the_curve(distance):
     """A pose at this distance in m from where the drives 0 and 1 are no coordinates."""
 

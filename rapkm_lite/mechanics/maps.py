@@ -106,9 +106,9 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     if rule == "cross":
         merit = np.abs(distal_cross_products(robot, q))
     else:
-        # A~ = A (F^T F)^-1 F^T, without a decomposition of J.
-        F = at(robot, q).F
-        A_tilde = F[..., : robot.n_arms, :] @ np.linalg.inv(F.mT @ F) @ F.mT
+        # A~ = Q_a Q^T with the columns of F made orthonormal in Q, without a decomposition of J.
+        Q = np.linalg.qr(at(robot, q).F).Q
+        A_tilde = Q[..., : robot.n_arms, :] @ Q.mT
         merit = np.stack([PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)], axis=-1)
     return x, y, _on_grid(first_best(merit), inside, limit=np.inf)
 
