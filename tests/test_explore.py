@@ -17,6 +17,7 @@ import matplotlib
 import nbformat
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 import rapkm_lite as rk
@@ -609,6 +610,52 @@ def test_a_style_that_cannot_be_drawn_is_refused_where_it_is_written(mark, words
     with pytest.raises(ValueError, match=words):
         mark(picture)
     assert not picture.marks
+
+
+LOOKS = {
+    "plain line": ("line", {}),
+    "line": ("line", {"color": "r", "linewidth": 2.0, "alpha": 0.5, "zorder": 5, "solid_capstyle": "round"}),
+    "dashed": ("line", {"linestyle": "--"}),
+    "dotted": ("line", {"linestyle": ":"}),
+    "dash-dot": ("line", {"linestyle": "-."}),
+    "own dashes": ("line", {"linestyle": (0, (5, 1.2))}),
+    "markers": ("line", {"linestyle": "none", "marker": "s", "color": "g", "markersize": 4, "markeredgewidth": 2.0}),
+    "hollow markers": ("line", {"marker": "o", "color": "g", "markerfacecolor": "white"}),
+    "plain polygon": ("polygon", {}),
+    "outline": ("polygon", {"fill": False, "facecolor": "r", "edgecolor": "b", "linestyle": "--", "linewidth": 2.0}),
+    "both": ("polygon", {"facecolor": "y", "edgecolor": "b", "zorder": -1}),
+    "plain words": ("text", {}),
+    "words": ("text", {"color": "g", "fontsize": 8, "fontweight": "bold", "ha": "right", "va": "top"}),
+    "thin words": ("text", {"color": "g", "fontweight": "normal", "ha": "center", "va": "center"}),
+}
+
+
+@pytest.mark.parametrize(("kind", "style"), LOOKS.values(), ids=LOOKS)
+def test_the_canvas_is_told_what_matplotlib_makes_of_a_style(kind, style):
+    """Both paint the same picture; dashes, sizes and who covers whom are Matplotlib's own where a mark says nothing."""
+    picture = explore.Picture({"a": {}})
+    given = {"line": ([0, 1], [0, 1]), "polygon": ([[0, 0], [1, 0], [0, 1]],), "text": (0.5, 0.5, "here")}[kind]
+    getattr(picture, kind)("a", *given, **style)
+    (told,) = encode(picture, picture.marks, {})[0]["styles"].values()
+    ax = figure(picture).axes[0]
+    (drawn,) = {"line": ax.lines, "polygon": ax.patches, "text": ax.texts}[kind]
+    assert told["z"] == drawn.get_zorder() and told["alpha"] == (drawn.get_alpha() or 1.0)
+    if kind != "text":
+        assert tuple(told["dash"]) == tuple(drawn._unscaled_dash_pattern[1] or ())
+    if kind == "line":
+        assert told["color"] == to_hex(drawn.get_color()) and told["face"] == to_hex(drawn.get_markerfacecolor())
+        assert told["width"] == (drawn.get_linewidth() if drawn.get_linestyle() != "None" else 0.0)
+        assert (told["size"], told["edge"]) == (drawn.get_markersize(), drawn.get_markeredgewidth())
+        assert (told["marker"] or "None") == drawn.get_marker()
+        assert told["cap"] == style.get("solid_capstyle", "butt")
+    elif kind == "polygon":
+        face, edge = drawn.get_facecolor(), drawn.get_edgecolor()
+        assert told["face"] == (to_hex(face) if face[3] else None)
+        assert told["color"] == (to_hex(edge) if edge[3] else None) and told["width"] == drawn.get_linewidth()
+    else:
+        assert told["color"] == to_hex(style.get("color", "#222222")) and told["size"] == drawn.get_fontsize()
+        assert told["bold"] == (drawn.get_fontweight() == "bold")
+        assert (told["ha"], told["va"]) == (drawn.get_ha(), drawn.get_va())
 
 
 def test_a_truth_value_is_no_number_of_a_style_though_it_equals_one():

@@ -17,6 +17,8 @@ WORDS = {"color", "fontsize", "fontweight", "ha", "va", "alpha", "zorder"}
 STYLES = {"line": LINE, "bar": PATCH, "polygon": PATCH, "label": WORDS, "words": WORDS, "title": WORDS - {"ha", "va"}}
 STYLES |= {"image": {"zorder"}}
 _SIZES = {"linewidth", "alpha", "zorder", "markersize", "markeredgewidth", "fontsize"}
+INK = "#222222"
+"""Colour of a mark that is given none, on the canvas and in the stored picture."""
 MARKERS = ("o", "s", "D", "x", "+")
 _DASHES = {"-": (), "solid": (), "--": (3.7, 1.6), ":": (1.0, 1.65), "-.": (6.4, 1.6, 1.0, 1.6), "none": None, "": None}
 _PLACES = {"ha": ("left", "center", "right"), "va": ("baseline", "bottom", "center", "top")}
@@ -101,18 +103,18 @@ def canvas_style(kind: str, items: tuple) -> dict:
     line = style.get("linestyle", "-")
     dash = line[1] if isinstance(line, tuple) else _DASHES[line]
     if kind == "line":
-        colour = to_hex(style.get("color", "#222222"))
+        colour = to_hex(style.get("color", INK))
         out |= {"color": colour, "width": 0.0 if dash is None else style.get("linewidth", 1.7), "dash": dash or ()}
         out |= {"cap": style.get("solid_capstyle", "butt"), "marker": style.get("marker")}
         face = style.get("markerfacecolor", colour)
         out |= {"face": to_hex(face), "edge": style.get("markeredgewidth", 1.0), "size": style.get("markersize", 6.0)}
     elif kind in ("bar", "polygon"):
-        face = style.get("facecolor", "#222222") if style.get("fill", True) else "none"
+        face = style.get("facecolor", INK) if style.get("fill", True) else "none"
         edge = style.get("edgecolor", "none")
         out |= {"face": None if face == "none" else to_hex(face), "color": None if edge == "none" else to_hex(edge)}
         out |= {"width": style.get("linewidth", 1.0), "dash": dash or ()}
     elif kind != "image":
-        out |= {"color": to_hex(style.get("color", "#222222")), "size": style.get("fontsize", 10.5)}
+        out |= {"color": to_hex(style.get("color", INK)), "size": style.get("fontsize", 10.5)}
         out |= {"bold": style.get("fontweight") == "bold"}
         out |= {"ha": style.get("ha", "left"), "va": style.get("va", "baseline")}
     return out

@@ -22,6 +22,7 @@ from matplotlib.transforms import ScaledTranslation
 from PIL import Image, features
 
 from ..style import ALARM, STYLE
+from .palette import INK
 from .picture import Mark, Picture
 
 # Where no kernel runs the stored picture stands alone, without the line that says that a widget is missing.
@@ -96,7 +97,7 @@ def bundle(picture: bytes, sentence: str) -> dict:
 
 
 def _line(ax, mark: Mark) -> None:
-    ax.add_line(Line2D(*mark.data.T, **mark.style))
+    ax.add_line(Line2D(*mark.data.T, **{"color": INK, **mark.style}))
 
 
 def _path(points: np.ndarray) -> Path:
@@ -107,7 +108,7 @@ def _path(points: np.ndarray) -> Path:
 
 
 def _patch(ax, mark: Mark) -> None:
-    ax.add_patch(PathPatch(_path(mark.data), **{"edgecolor": "none", **mark.style}))
+    ax.add_patch(PathPatch(_path(mark.data), **{"facecolor": INK, "edgecolor": "none", **mark.style}))
 
 
 def _words(ax, mark: Mark) -> None:
@@ -134,7 +135,7 @@ def _image(ax, mark: Mark) -> None:
 
 
 def _legend(ax, mark: Mark) -> None:
-    entries = [(Line2D([], [], **style), mathtext(words)) for words, style in mark.words]
+    entries = [(Line2D([], [], **{"color": INK, **style}), mathtext(words)) for words, style in mark.words]
     look = {"handlelength": 1.7, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
     look |= {"loc": "lower right", "bbox_to_anchor": (1, 1)}
     count = len(entries)
