@@ -256,13 +256,15 @@ def test_switching_waits_for_the_factor_of_its_hysteresis(hysteresis):
 
 
 def test_switched_torques_along_a_path_are_those_of_the_pair_in_use():
-    path, law = rk.triangle(FRICTIONLESS, dt=5e-3), rk.SwitchedCTC(400, 40)
+    path, law, offset = rk.triangle(FRICTIONLESS, dt=5e-3), rk.SwitchedCTC(400, 40), np.array([4e-3, -2e-3, 5e-3])
     q = path.q + 1e-4
-    c = torque(law, FRICTIONLESS, q, path.qd, path)
+    c = torque(law, FRICTIONLESS, q, path.qd, path, offset)
     for k in range(0, len(path), 50):
         pair = law.pairs(FRICTIONLESS, q[: k + 1])[-1]
-        assert_allclose(c[k], torque(law.fixed(pair), FRICTIONLESS, q[k], path.qd[k], path[k]), atol=1e-14)
-    assert_allclose(torque(law, FRICTIONLESS, q[0], path.qd[0], path[0]), c[0], atol=1e-14)
+        assert_allclose(c[k], torque(law.fixed(pair), FRICTIONLESS, q[k], path.qd[k], path[k], offset), atol=1e-14)
+    assert_allclose(torque(law, FRICTIONLESS, q[0], path.qd[0], path[0], offset), c[0], atol=1e-14)
+    for pose in ("measured", "true"):
+        assert rk.SwitchedCTC(400, 40, pose=pose).fixed((0, 2)) == rk.CTC(400, 40, (0, 2), pose=pose)
 
 
 def test_a_switched_torque_at_one_pose_is_that_of_its_best_pair():
@@ -510,6 +512,7 @@ def test_torques_do_not_depend_on_the_partition_rule():
         c = [torque(law(400.0, 40.0, rule=rule), ROBOT, q, qd, desired) for rule in rules]
         assert (norm(c[1] - c[0]) / norm(c[0])).max() < 1e-11
         assert (norm(c[2] - c[0]) / norm(c[0])).max() < 1e-6  # the printed rule picks nearly singular partitions
+        assert np.any(c[2] != c[0])  # other rows round otherwise
 
 
 # The controller in a sampled loop.

@@ -134,6 +134,17 @@ def test_pid_with_anti_windup():
     )
 
 
+@pytest.mark.parametrize("free", itertools.product([False, True], repeat=3))
+def test_the_integral_of_a_drive_at_its_limit_stands_still_and_those_of_others_go_on(free):
+    """K_I e dt = 5e-3 N m a sample; a limit of zero is always met."""
+    law, d = rk.PID(7.0, 50.0, 0.2, limit=np.where(free, np.inf, 0.0)), PATH[0]
+    controller = rk.Controller(law, ROBOT, dt=1e-2)
+    for k in (1, 2, 3):
+        c = controller(0.0, d.q_a + 0.01, d.qd_a, d)
+        assert_allclose(controller.memory, np.where(free, 5e-3 * k, 0.0), rtol=0, atol=1e-13)
+        assert_allclose(c, np.where(free, -(0.07 + 5e-3 * k), 0.0), rtol=0, atol=1e-13)
+
+
 @pytest.mark.parametrize("times", [1.0, np.eye(3)], ids=["compiled", "in Python"])
 def test_an_integral_grows_with_the_sampling_time_of_its_path(times):
     gains, path = {"K_P": 7.05, "K_I": 90.0, "K_D": 0.2}, rk.circle(ROBOT, radius=0.05, duration=0.3, dt=2e-3)

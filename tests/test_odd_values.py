@@ -204,6 +204,8 @@ class Exchanged(rk.Law):
         (Turned(), "start takes (dt, model)"),
         (Exchanged(), "step takes (sample, memory)"),
         (lambda t, qd_a, q_a, desired: 0.0 * q_a, "law takes (t, qd_a, q_a, desired)"),
+        (lambda q_a, rates, wanted, t: 0.0 * rates, "law takes (q_a, rates, wanted, t)"),
+        (lambda q_a, rates, wanted, time: 0.0 * rates, "law takes (q_a, rates, wanted, time)"),
         (rk.compiled(lambda t, q_a, qd_a, d, memory, at: 0.0 * q_a, at="true", memory=1), "d, memory, at)"),
     ],
 )
