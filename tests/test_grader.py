@@ -1,6 +1,7 @@
 """A class with everything that goes wrong in one: each student gets the points of what is right, and a sentence."""
 
 import csv
+import itertools
 import json
 import os
 import re
@@ -9,6 +10,7 @@ import sys
 import time
 import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,6 +176,17 @@ def test_of_two_notebooks_with_as_many_points_the_newer_one_counts(names, tmp_pa
         grader, "grade_one", lambda one, *_: [Grade(one.student, NAMES[0], "ok", 1.0, 1.0, "", "", str(one.path))]
     )
     assert [Path(one.file).name for one in grade(tmp_path)] == [names[0]]
+
+
+def test_of_two_notebooks_the_one_with_more_points_counts_though_it_is_older(tmp_path, monkeypatch):
+    for name, age in (("04_a.ipynb", 1e9), ("04_b.ipynb", 2e9)):
+        write(tmp_path / "ada" / name, [SETUP])
+        os.utime(tmp_path / "ada" / name, (age, age))
+    points = {"04_a.ipynb": 2.0, "04_b.ipynb": 1.0}
+    monkeypatch.setattr(
+        grader, "grade_one", lambda one, *_: [Grade("ada", NAMES[0], "ok", points[one.path.name], 2.0, "", "")]
+    )
+    assert [one.points for one in grade(tmp_path)] == [2.0]
 
 
 @pytest.mark.parametrize(("word", "share"), [("ok", 1), ("close", 1), ("wrong", 0), ("todo", 0)])
@@ -680,6 +693,70 @@ def test_the_limit_of_a_statement_is_the_one_that_the_help_says(tmp_path, monkey
         main(["grade", "--help"])
     told = re.search(r"limit of a statement or a\s+check \((\d+)\)", capsys.readouterr().out)
     assert told and asked == [(float(told[1]), None), (5.0, 2)]
+
+
+class Acted:
+    """A clock that moves when the grader waits, and workers that say what is written for their time, s from the start.
+
+    script : from the keys to skip to lines at their times; None for a line is the end of the process.
+    """
+
+    def __init__(self, monkeypatch, script):
+        self.now, self.script, self.starts, self.ends = 0.0, script, [], []
+        monkeypatch.setattr(grader, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self.sleep))
+        monkeypatch.setattr(grader.subprocess, "Popen", self.start)
+        monkeypatch.setattr(grader, "_end", lambda worker: self.ends.append(self.now - self.begun))
+
+    def start(self, command, **_):
+        self.starts.append([key for word, key in itertools.pairwise(command) if word == "--skip"])
+        self.log, self.begun, self.gone = Path(command[5]), self.now, False
+        self.lines = iter(self.script(self.starts[-1]))
+        self.next = next(self.lines, None)
+        return SimpleNamespace(poll=lambda: 0 if self.gone else None)
+
+    def sleep(self, seconds):
+        self.now += seconds
+        while self.next and self.now - self.begun >= self.next[0]:
+            if self.next[1] is None:
+                self.gone = True
+            else:
+                with self.log.open("a") as log:
+                    log.write(json.dumps(self.next[1]) + "\n")
+            self.next = next(self.lines, None)
+
+
+def results(seconds=30.0):
+    one = Submission("ada", Path("04_x.ipynb"), "04")
+    return grader._results(one, seconds, grader.Event(), whole=False)[0]
+
+
+DONE = [{"result": [NAMES[0], "ok", "right", ""]}, {"done": True}]
+
+
+def test_statements_that_keep_to_their_limit_are_run_to_the_end(monkeypatch):
+    """`seconds` is the limit of each statement; what all of them take is another one, and so is the start."""
+    lines = [(45.0, {"hidden": False}), *((45.0 + 29.0 * k, {"begin": f"1.{k}"}) for k in range(6))]
+    acted = Acted(monkeypatch, lambda skip: [*lines, *((215.0, event) for event in DONE)])
+    assert results() == {NAMES[0]: ("ok", "right", "")} and acted.starts == [[]]
+
+
+def test_a_statement_that_hangs_is_ended_at_its_limit_and_left_out_of_the_next_start(monkeypatch):
+    first = [(2.0, {"hidden": False}), (2.0, {"begin": "1.0"}), (10.0, {"begin": "1.1"})]
+    acted = Acted(monkeypatch, lambda skip: [(1.0, event) for event in DONE] if skip else first)
+    assert results() == {NAMES[0]: ("ok", "right", "")}
+    assert acted.starts == [[], ["1.1"]] and acted.ends[0] == pytest.approx(40.0, abs=0.1)
+
+
+def test_a_notebook_gets_ten_times_the_limit_of_a_statement(monkeypatch):
+    """Statements without end, none of which takes too long."""
+    acted = Acted(monkeypatch, lambda skip: ((20.0 * k, {"begin": f"1.{k}"}) for k in range(1, 999)))
+    assert results() == {} and acted.starts == [[]] and acted.ends == [pytest.approx(300.0, abs=0.1)]
+
+
+def test_a_notebook_all_of_whose_statements_hang_is_started_as_often_as_its_time_allows(monkeypatch):
+    acted = Acted(monkeypatch, lambda skip: [(0.0, {"begin": f"1.{len(skip)}"})])
+    assert results(60.0) == {} and acted.starts[-1] == [f"1.{k}" for k in range(len(acted.starts) - 1)]
+    assert 3 < len(acted.starts) <= 10 and acted.ends == pytest.approx([60.0] * len(acted.starts), abs=0.1)
 
 
 def test_a_grader_that_is_interrupted_ends_what_runs_and_begins_nothing_more(tmp_path, monkeypatch):
