@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import subprocess
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +68,47 @@ def test_encoding_goes_round(name):
             assert (kind, panel) == (mark.kind, mark.panel)
             np.testing.assert_array_equal(numbers, mark.data.astype(np.float32))
             assert style is not None or kind in ("legend", "scale")
+
+
+def test_a_map_goes_round_with_its_place_and_without_what_is_masked():
+    palette = explore.Palette((0, 3, 9), ("#888888", "#777777"), ("#444444", "#333333"))
+    values = np.ma.masked_equal(np.arange(6.0).reshape(2, 3), 4.0)
+    picture = explore.Picture({"a": {}})
+    picture.image("a", values, (-1, 2, 3, 5), palette)
+    header, (_, sent) = encode(picture, picture.marks, {})
+    number, look = header["marks"][0][4]
+    assert header["images"] == {number: [2, 3, -1.0, 2.0, 3.0, 5.0]}
+    np.testing.assert_array_equal(np.frombuffer(sent, "<f4").reshape(2, 3), values.filled(np.nan).astype(np.float32))
+    assert look == {"levels": (0, 3, 9), "light": palette.light, "dark": palette.dark}
+
+
+def test_a_map_that_was_told_is_kept_so_that_no_other_has_its_number():
+    """An array that is gone leaves its place in memory, by which a map is known, to the next one."""
+    palette, told = explore.Palette((0, 9), ("#888888",), ("#444444",)), {}
+    picture, values = explore.Picture({"a": {}}), np.zeros((2, 3))
+    picture.image("a", values, (0, 1, 0, 1), palette)
+    encode(picture, picture.marks, told)
+    alive = weakref.ref(values)
+    del values
+    picture.begin()
+    assert alive() is not None
+    picture.image("a", np.ones((2, 3)), (0, 1, 0, 1), palette)
+    assert len(encode(picture, picture.marks, told)[0]["images"]) == 1
+
+
+def test_words_and_handles_go_round():
+    """A handle sets value = a x + b y + c, c may be missing; one that only goes sideways has no height."""
+    picture, along = explore.Picture({"a": {}}), np.linspace([0.1, 0.0], [0.2, 1.0], 4) / 3
+    picture.text("a", 0.5, 0.5, "in data")
+    picture.text("a", 0.5, 0.5, "in the panel", inside=True)
+    picture.title("a", "above")
+    picture.handle("a", 0.5, None, gain=(2.0, 3.0), damping=(1.0, 0.0, -4.0))
+    picture.handle("a", 0.1, 0.2, along=along, grip=[[0, 0], [1, 2]], time=[0, 1, 2, 3])
+    header, _ = encode(picture, picture.marks, {})
+    assert [mark[4] for mark in header["marks"]] == ["in data", "in the panel", "above"]
+    assert header["handles"][0] == {
+        "panel": "a", "at": [0.5, None], "set": {"gain": [2.0, 3.0, 0.0], "damping": [1.0, 0.0, -4.0]}
+    }  # fmt: skip
+    curve = header["handles"][1]
+    assert curve["at"] == [0.1, 0.2] and curve["set"] == {"time": [0, 1, 2, 3]} and curve["grip"] == [[0, 0], [1, 2]]
+    np.testing.assert_allclose(np.reshape(curve["along"], (4, 2)), along, rtol=0, atol=5e-7)
