@@ -134,7 +134,7 @@ def test_pid_with_anti_windup():
     )
 
 
-@pytest.mark.parametrize("free", itertools.product([False, True], repeat=3))
+@pytest.mark.parametrize("free", list(itertools.product([False, True], repeat=3)))
 def test_the_integral_of_a_drive_at_its_limit_stands_still_and_those_of_others_go_on(free):
     """K_I e dt = 5e-3 N m a sample; a limit of zero is always met."""
     law, d = rk.PID(7.0, 50.0, 0.2, limit=np.where(free, np.inf, 0.0)), PATH[0]
@@ -678,3 +678,17 @@ class Shifts(rk.Law):
 def test_no_law_can_shift_what_was_measured_for_a_filter_around_it():
     with pytest.raises(AttributeError, match="q_a of a Sample cannot be set"):
         rk.simulate(ROBOT, rk.AntagonismFilter(Shifts()), PATH)
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_where_a_controller_looks_for_the_pose_first(smooth):
+    """On a parabola through the last three places, whose third difference is zero; else where it was last."""
+    path, k = rk.hold(ROBOT, [0.02, 0.03], 0.01), np.arange(7.0)[:, None]
+    places, guesses = path.x[0] + k * [1e-4, -2e-4] + k**2 * [3e-5, 1e-5], []
+    controller = rk.Controller(rk.AntagonismFilter(PD), ROBOT)
+    controller.smooth = smooth
+    controller.nearest = lambda q_a, guess: guesses.append(guess) or tuple(places[len(guesses) - 1].tolist())
+    for t in path.t[: len(places)]:
+        controller(t, path.q_a[0], path.qd_a[0], path[0])
+    assert_allclose(guesses[0], path.x[0], rtol=0, atol=0)
+    assert_allclose(guesses[3:], places[3:] if smooth else places[2:-1], rtol=0, atol=1e-15)
