@@ -692,3 +692,20 @@ def test_where_a_controller_looks_for_the_pose_first(smooth):
         controller(t, path.q_a[0], path.qd_a[0], path[0])
     assert_allclose(guesses[0], path.x[0], rtol=0, atol=0)
     assert_allclose(guesses[3:], places[3:] if smooth else places[2:-1], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("beside", [0.0, 3e-10, 1e-8, 1e-7, 1e-5])
+def test_a_measured_pose_is_refused_where_the_singular_values_of_a_have_a_ratio_below_3e_8(beside):
+    """As in the engine (`solve_regular`): in a mixed mode A has rank one in the middle of a base side."""
+    robot = ROBOT.replace(mode=[1, 1, -1])
+    x = robot.base[:2].mean(axis=0) + [0.0, beside]
+    q, controller = rk.inverse_kinematics(robot, x), rk.Controller(Watch(), robot)
+    controller.nearest = lambda q_a, guess: tuple(x.tolist())
+    large, small = np.linalg.svd(rk.control_matrix(robot, q), compute_uv=False)
+    given = 0.0, q[:3], np.zeros(3), rk.Desired(3, x, np.zeros(2), np.zeros(2), q, np.zeros(6), np.zeros(6))
+    if small < 3e-8 * large:
+        with pytest.raises(ValueError, match=r"A has lost rank \(an input singularity\) at the measured pose"):
+            controller(*given)
+    else:
+        controller(*given)
+    assert (small < 3e-8 * large) == (beside < 1e-9)
