@@ -642,20 +642,27 @@ def test_the_canvas_is_told_what_matplotlib_makes_of_a_style(kind, style):
     assert told["z"] == drawn.get_zorder() and told["alpha"] == (drawn.get_alpha() or 1.0)
     if kind != "text":
         assert tuple(told["dash"]) == tuple(drawn._unscaled_dash_pattern[1] or ())
-    if kind == "line":
-        assert told["color"] == to_hex(drawn.get_color()) and told["face"] == to_hex(drawn.get_markerfacecolor())
-        assert told["width"] == (drawn.get_linewidth() if drawn.get_linestyle() != "None" else 0.0)
-        assert (told["size"], told["edge"]) == (drawn.get_markersize(), drawn.get_markeredgewidth())
-        assert (told["marker"] or "None") == drawn.get_marker()
-        assert told["cap"] == style.get("solid_capstyle", "butt")
-    elif kind == "polygon":
-        face, edge = drawn.get_facecolor(), drawn.get_edgecolor()
-        assert told["face"] == (to_hex(face) if face[3] else None)
-        assert told["color"] == (to_hex(edge) if edge[3] else None) and told["width"] == drawn.get_linewidth()
-    else:
-        assert told["color"] == to_hex(style.get("color", "#222222")) and told["size"] == drawn.get_fontsize()
-        assert told["bold"] == (drawn.get_fontweight() == "bold")
-        assert (told["ha"], told["va"]) == (drawn.get_ha(), drawn.get_va())
+    {"line": _line_as_drawn, "polygon": _area_as_drawn, "text": _words_as_drawn}[kind](told, drawn, style)
+
+
+def _line_as_drawn(told, line, style):
+    assert told["color"] == to_hex(line.get_color()) and told["face"] == to_hex(line.get_markerfacecolor())
+    assert told["width"] == (line.get_linewidth() if line.get_linestyle() != "None" else 0.0)
+    assert (told["size"], told["edge"]) == (line.get_markersize(), line.get_markeredgewidth())
+    assert (told["marker"] or "None") == line.get_marker()
+    assert told["cap"] == style.get("solid_capstyle", "butt")
+
+
+def _area_as_drawn(told, area, style):
+    face, edge = area.get_facecolor(), area.get_edgecolor()
+    assert told["face"] == (to_hex(face) if face[3] else None)
+    assert told["color"] == (to_hex(edge) if edge[3] else None) and told["width"] == area.get_linewidth()
+
+
+def _words_as_drawn(told, words, style):
+    assert told["color"] == to_hex(style.get("color", "#222222")) and told["size"] == words.get_fontsize()
+    assert told["bold"] == (words.get_fontweight() == "bold")
+    assert (told["ha"], told["va"]) == (words.get_ha(), words.get_va())
 
 
 def test_a_truth_value_is_no_number_of_a_style_though_it_equals_one():

@@ -34,7 +34,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
 
     Left: both five-bars as their measured angles say, offsets times `magnify`.  Right: in mm about x, the end-effector
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
-    Raises ValueError where the five-bar of a pair is singular, and ConvergenceError for larger offsets than fit any pose.
+    Raises ValueError where the five-bar of a pair is singular, ConvergenceError for larger offsets than fit any pose.
 
     >>> import rapkm_lite as rk; ax = plot_synchronization(rk.load(), [0.0, 0.0], [4e-3, -2e-3, 5e-3])
     """
@@ -144,7 +144,7 @@ def plot_antagonism(run, ax=None, title: str = ""):
 def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool = False, log: bool = False):
     """Norm of the drive torques over time, one line per run; `runs` maps a label to one of up to five runs.
 
-    antagonism : show only the part that moves nothing.  log : logarithmic axis; what is less than its end is drawn there.
+    antagonism : show only the part that moves nothing.  log : logarithmic axis; what is less stands at its end.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
@@ -169,7 +169,7 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
 def plot_torque_plane(runs: dict, ax=None, title: str = ""):
     """Every sample of a run as a point: torque that moves over torque along the null vector of A^T.
 
-    The squared distance from the origin times R_el / k_t^2 is the copper loss in W.  For one or two runs, three arms, equal drives.
+    The squared distance from the origin times R_el / k_t^2 is the copper loss in W.  One or two runs of equal drives.
 
     >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
     >>> ax = plot_torque_plane({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
