@@ -13,8 +13,8 @@ STYLE = Path(__file__).with_name("rapkm.mplstyle")
 ARM_COLOURS = ("#004488", "#BB5566", "#948A00", "#3997BF", "#8A3FC0", "#4D2020")
 ARM_TEXT_COLOURS = ("#004488", "#BB5566", "#7D7400", "#237C9E", "#8A3FC0", "#4D2020")
 # One more than there are colours, all different: 42 lines can be told apart, more than the 36 pairs of nine drives.
-ARM_LINES: tuple = ("-", (0, (5, 1.2)), (0, (4, 1.2, 1, 1.2)), (0, (1.5, 1.2)))
-ARM_LINES += ((0, (6, 1.2, 1, 1.2, 1, 1.2)), (0, (4, 3)), (0, (10, 3)))
+_DASHES = ((5, 1.2), (4, 1.2, 1, 1.2), (1.5, 1.2), (6, 1.2, 1, 1.2, 1, 1.2), (4, 3), (10, 3))
+ARM_LINES = ("-", *((0, dashes) for dashes in _DASHES))
 # Without / with filter, wrong / right, and what belongs to no arm.
 BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
 
