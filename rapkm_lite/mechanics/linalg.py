@@ -58,13 +58,17 @@ def orthogonal(M: np.ndarray, complete: bool = False) -> tuple[np.ndarray, np.nd
     return generate(packed, scales, overwrite_a=1)[0], R
 
 
-def uneven(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def uneven(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Q (..., m, m), R (..., k, k) and V of A = Q[..., :k] R V^T for a tall A whose rows differ by powers of ten.
 
     Householder's reflections keep the digits of the small rows where the large ones come first, and where the first
     column holds what is largest (Powell and Reid, Cox and Higham): rows by size, columns turned to the first of them.
+    Rows that differ by less than 30 lose nothing as they are; then V is None, for the identity.
     """
-    order = np.argsort(-np.abs(A).max(axis=-1), axis=-1)[..., None]
+    size = np.abs(A).max(axis=-1)
+    if np.all(30.0 * size.min(axis=-1) > size.max(axis=-1)):
+        return *orthogonal(A, complete=True), None
+    order = np.argsort(-size, axis=-1)[..., None]
     ordered = np.take_along_axis(A, order, axis=-2)
     V, _ = orthogonal(ordered[..., : A.shape[-1], :].mT)
     Q, R = orthogonal(product(ordered, V), complete=True)
