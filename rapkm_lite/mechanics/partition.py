@@ -10,7 +10,7 @@ import numpy as np
 from ..machine.arguments import joint_indices, one_of, real_array, whole_number, wide_matrix
 from ..machine.values import frozen
 from . import cores
-from .linalg import product, singular_values
+from .linalg import product, singular_values, squares
 
 
 def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
@@ -44,8 +44,8 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
 
 def _spans(A_tilde: np.ndarray, A1T_pinv: np.ndarray, left: np.ndarray) -> bool:
     """Do the chosen rows make the others, but for `left`: to 1e-6, near an input singularity to the rounding of B?"""
-    # Each matrix by itself, whatever the size of the others; for one of them two products mostly decide.
-    if left.ndim == 2 and A_tilde.size * np.vdot(left, left) <= 1e-12 * np.vdot(A_tilde, A_tilde):
+    # Each matrix by itself, whatever the size of the others; sums of squares, which are quick, mostly decide.
+    if np.all(A_tilde.shape[-2] * A_tilde.shape[-1] * squares(left) <= 1e-12 * squares(A_tilde)):
         return True
     size, inverse = np.abs(A_tilde).max(axis=(-2, -1)), np.abs(A1T_pinv).max(axis=(-2, -1))
     limit = np.maximum(1e-6, 1e-14 * size * inverse) * size
