@@ -17,9 +17,9 @@ def product(first: np.ndarray, *others: np.ndarray) -> np.ndarray:
     return first
 
 
-def squares(M: np.ndarray) -> np.ndarray:
+def squares(M: np.ndarray) -> np.ndarray | float:
     """Sum of the squared entries (...,) of matrices (..., m, n)."""
-    return np.vdot(M, M) if M.ndim == 2 else np.einsum("...ij,...ij->...", M, M)
+    return float(np.vdot(M, M)) if M.ndim == 2 else np.einsum("...ij,...ij->...", M, M)
 
 
 def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
