@@ -99,7 +99,11 @@ def poses(robot: Manipulator, angles: np.ndarray, guess=None) -> np.ndarray:
     try:
         return estimate_pose(robot, angles, starts[best, np.arange(len(angles))])
     except ValueError as error:
-        raise ValueError(f"log holds angles that fit no pose of {robot!r}: {error}") from None
+        found = str(error).partition("; allowed: ")[0]
+        raise ValueError(
+            f"log holds angles that fit no pose of {robot!r}: {found}; allowed: base angles in rad, counter-clockwise "
+            "from the x axis, in the order of the arms"
+        ) from None
 
 
 def certain(robot: Manipulator, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..machine.arguments import bounded, matvec
+from ..machine.arguments import bounded, matvec, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from . import cores
@@ -153,6 +153,16 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
             )
     K_P = bounded("K_P", K_P, 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
+    try:
+        poses(robot, angles)
+    except ValueError:
+        far = np.abs(angles - stand.desired).max()
+        why = f" ({'; '.join(notes)})" if notes else ""
+        raise ValueError(
+            f"use = 'torques' with K_P = {short(K_P.tolist())} places the encoders up to {far:.3g} rad from the "
+            f"desired angles, where no pose fits{why}; allowed: torques in N m and their gain in N m/rad, or "
+            "use = 'angles'"
+        ) from None
     notes += one_sided(stand, K_P)
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     spread = spread if spread > 1e-12 else 0.0  # the rounding of means
