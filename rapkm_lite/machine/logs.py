@@ -69,6 +69,7 @@ def read_log(source: str | Path) -> Log:
     The header is ``t in s, q1 measured in rad, ..., q1 desired in rad, ..., c1 in N m, ...``; a line is a record.
     Raises ValueError with file, line and column for a file of another form, also where a number is missing or not
     finite, where time does not increase, or where a step in time is over 1.5 times the usual one.
+    What a file of another form holds, read with NumPy and turned into rad, s and N m, makes a `Log`; it may have gaps.
 
     >>> import rapkm_lite as rk
     >>> rk.read_log(rk.data_path("mystery_runs/gain.csv"))
@@ -135,7 +136,10 @@ def _check_times(path: Path, t: np.ndarray) -> None:
 def _names(path: Path, header: list[str]) -> list[str]:
     """The names of the columns; raises ValueError for others."""
     if len(header) == 1 and set(";\t") & set(header[0]):
-        raise ValueError(f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them")
+        raise ValueError(
+            f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them, with decimal "
+            "points (of a file in another form, make a Log)"
+        )
     names = [name.strip(" \t") for name in header]
     drives = max(sum(name.endswith(end) for name in names) for end in ("measured in rad", "desired in rad", "in N m"))
     wanted = columns(drives or max((len(header) - 1) // 3, 1))
