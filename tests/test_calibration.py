@@ -649,6 +649,23 @@ def test_torques_of_the_opposite_sign_are_said_to_be_so():
         rk.calibrate(FRICTIONLESS, turned, use="torques")
 
 
+def test_torques_in_another_unit_are_not_said_to_be_angles_that_fit_no_pose():
+    """The angles of this log fit: a thousand times the gain, which the rests show, is the cause."""
+    log = log_behind_friction([0.0])
+    milli = rk.Log("milli", log.t, log.q_a, log.q_a_desired, 1e3 * log.c)
+    with pytest.raises(
+        ValueError, match=r"use = 'torques' with K_P = .* no pose fits .*rests show K_P = 7\.05e\+03"
+    ) as said:
+        rk.calibrate(FRICTIONLESS, milli, use="torques", K_P=7.05)
+    assert "torques in N m" in str(said.value) and "log holds angles" not in str(said.value)
+
+
+def test_angles_in_degrees_are_refused_with_the_unit_that_is_wanted():
+    with pytest.raises(ValueError, match=r"fit no pose of .*; allowed: base angles in rad") as said:
+        rk.calibrate(TESTBED, np.degrees(readings(TESTBED)))
+    assert "guess" not in str(said.value)  # calibrate takes none
+
+
 def test_rests_without_noise_have_no_steps():
     found = rk.calibrate(FRICTIONLESS, log_behind_friction([0.0]), use="torques")
     assert "the steps of the readings" not in found.note
@@ -751,7 +768,10 @@ HEADER = ",".join(
     [
         ("", "line 1, column 1 holds ''|line 1, column 1 holds nothing"),
         ("a,b\n1,2\n", "line 1, column 1 holds 'a'"),
-        (HEADER.replace(",", ";") + "\n", "line 1 has no commas; allowed: values with commas between them"),
+        (
+            HEADER.replace(",", ";") + "\n",
+            "line 1 has no commas; allowed: values with commas .* decimal points .* a Log",
+        ),
         (HEADER.replace("c1 in N m", "c1 in mN m") + "\n", "line 1, column 8 holds 'c1 in mN m'"),
         (HEADER + "\n", "has no record"),
         (HEADER + "\n0,1,2,3\n", "line 2 has 4 columns; allowed: 10"),

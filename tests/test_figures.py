@@ -336,6 +336,16 @@ def test_workspace_grid_keeps_off_the_boundary():
     assert points[7].tolist() == [x[j], y[i]]
 
 
+def test_a_wrong_call_of_a_picture_names_the_picture_as_python_does():
+    for call, sentence in (
+        (lambda: plotting.plot_ee_paths({}, ax=None), "plot_ee_paths() got an unexpected keyword argument 'ax'"),
+        (lambda: plotting.plot_torques(), "plot_torques() missing a required argument: 'run'"),
+    ):
+        with pytest.raises(TypeError) as said:
+            call()
+        assert str(said.value) == sentence
+
+
 def test_arguments_are_looked_at_before_a_picture_is_drawn(world):
     """What Matplotlib would have drawn, left out or turned into something else."""
     robot, q = world["robot"], world["q"]

@@ -49,7 +49,10 @@ def _guard(picture: Callable) -> Callable:
 
     @functools.wraps(picture)
     def checked(*args, **named):
-        bound = signature.bind(*args, **named)
+        try:
+            bound = signature.bind(*args, **named)
+        except TypeError as error:  # as Python says it, with the name of the function
+            raise TypeError(f"{picture.__name__}() {error}") from None
         bound.apply_defaults()  # a pair that the machine of the call has not
         given = bound.arguments
         parameters = [signature.parameters[name] for name in given]
