@@ -652,6 +652,23 @@ def test_a_legend_of_many_drives_stays_on_its_axes():
     assert room.x0 <= legend.x0 and legend.x1 <= room.x1 + 1.0
 
 
+@pytest.mark.parametrize("name", ["testbed", "four_arms"])
+@pytest.mark.parametrize(
+    ("size", "shape"), [((12, 7), (2, 3)), ((10, 6), (2, 2)), ((8, 3), (1, 2)), ((6.4, 4.8), (2, 1))]
+)
+def test_a_legend_lies_on_no_curve_on_axes_of_any_shape(name, size, shape):
+    robot = rk.load(name)
+    run = rk.simulate(robot, rk.PD(7.05, 0.225), rk.circle(robot, 0.05, 1.0))
+    figure, axes = plt.subplots(*shape, figsize=size)
+    ax = plotting.plot_torques(run, np.ravel(axes)[0])
+    figure.canvas.draw()
+    legend = ax.get_legend().get_window_extent()
+    for line in ax.get_lines():
+        points = ax.transData.transform(line.get_xydata())
+        assert not np.any(np.all((points > legend.min + 1.0) & (points < legend.max), axis=-1))  # a pixel
+    plt.close(figure)
+
+
 def test_a_sheet_about_a_middle_that_no_arm_reaches_is_whole():
     """Without folding limits the workspace is convex: any place in it sees all of it, and the sheet has no jump."""
     robot = rk.load().replace(lengths=[[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])

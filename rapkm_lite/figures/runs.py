@@ -46,8 +46,11 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least
         ax.plot(run.t, line, label=f"drive {i + 1}", marker="o" if len(run) == 1 else None, **arm_line(i))
     N = run.robot.n_arms
     rows = math.ceil(N / max(1, int(ax.get_window_extent().width / ax.figure.dpi / 1.04)))  # inches for one entry
-    ax.margins(y=0.18 * rows)
     ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, max(run.t[-1], run.dt)))
+    legend = ax.legend(ncols=math.ceil(N / rows), loc="upper right")
+    # Of the height of low axes a legend takes a larger share; beyond a third the curves would be too flat.
+    gap = legend.borderaxespad * legend.get_texts()[0].get_fontsize() * ax.figure.dpi / 72
+    share = min((legend.get_window_extent().height + gap) / ax.get_window_extent().height, 0.35)
+    ax.margins(y=max(0.18 * rows, share / (1.0 - 2.0 * share)))
     no_finer(ax, least)
-    ax.legend(ncols=math.ceil(N / rows), loc="upper right")
     return ax
