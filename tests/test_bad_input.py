@@ -315,6 +315,19 @@ def test_a_delta_that_is_not_the_rank_is_named(rank, delta):
             rk.closed_loop_projector(A_tilde, delta)
 
 
+def test_rows_that_are_dependent_just_below_the_bound_are_named_where_all_of_them_are_just_above():
+    """Of singular values 1 and s of A_tilde, near 1e-12, a choice of rows has a smaller ratio: no index is missing."""
+    draw, dependent = np.random.default_rng(0), 0
+    for s in np.geomspace(5e-13, 2e-12, 60):
+        (U, _), (V, _) = np.linalg.qr(draw.normal(size=(3, 2))), np.linalg.qr(draw.normal(size=(6, 2)))
+        try:
+            assert rk.closed_loop_projector(U * [1.0, s] @ V.T).shape == (6, 6)
+        except ValueError as error:
+            assert re.match("delta = 2, but A_tilde has rank 1|A~_1, the chosen rows .*, has lost rank", str(error))
+            dependent += str(error).startswith("A~_1")
+    assert dependent > 0
+
+
 def test_rank_loss_is_named():
     flat = np.ones((3, 2))
     for f in (rk.weighted_pseudoinverse, rk.antagonism_filter, rk.prestress_projector):

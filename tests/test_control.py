@@ -747,6 +747,18 @@ def test_the_estimate_of_a_controller_is_not_changed_from_outside():
     assert_allclose(one.x, other.x, rtol=0, atol=0)
 
 
+def test_a_controller_that_lost_its_pose_begins_anew():
+    """`Controller.x` is None where there is no estimate; the next search begins at the desired place, as the first."""
+    path = rk.hold(ROBOT, [0.02, 0.03], 0.1)
+    used, new = (rk.Controller(rk.CTC(400.0, 40.0, None), ROBOT) for _ in range(2))
+    used(0.0, path.q_a[0] + 0.05, path.qd_a[0], path[0])
+    with pytest.raises(rk.ConvergenceError, match="found no pose"):
+        used(1e-3, path.q_a[0] + 2.5 * np.array([1.0, -1.0, 1.0]), path.qd_a[0], path[0])
+    assert used.x is None
+    same = [c(2e-3, path.q_a[0] + 1e-3, path.qd_a[0], path[0]) for c in (used, new)]
+    assert_allclose(*same, rtol=0, atol=0)
+
+
 def test_a_pose_of_a_law_is_measured_or_true():
     plain = rk.PD(7.0, 0.2)
     for kind, given in (

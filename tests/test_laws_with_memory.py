@@ -423,6 +423,13 @@ def test_runs_and_sweeps_are_values():
             array[0] = 1.0
 
 
+def integral(memory):
+    """A PID that is told an integral of its user's, which is (N,)."""
+    controller = rk.Controller(rk.PID(7.0, 1.0, 0.2), ROBOT)
+    controller.memory = memory
+    return controller(0.0, PATH.q_a[0], PATH.qd_a[0], PATH[0])
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -440,6 +447,12 @@ def test_runs_and_sweeps_are_values():
             lambda: rk.simulate(ROBOT, rk.PID(7.0, 1.0, 0.2, [1.0, 2.0]), PATH),
             r"limit has shape \(2,\); allowed: one number or \(3,\)$",
         ),
+        # Also in a loop of one's own, where no compiled one asks.
+        (lambda: rk.PID(7.0, 1.0, [0.2, 0.2]).start(ROBOT, 1e-3), r"K_D has shape \(2,\); allowed: .* \(3,\)"),
+        (lambda: rk.PID(7.0, 1.0, 0.2, [1.0, 2.0]).start(ROBOT, 1e-3), r"limit has shape \(2,\); allowed: .* \(3,\)"),
+        (lambda: integral(np.zeros(2)), r"memory has shape \(2,\); allowed: \(3,\)"),
+        (lambda: integral(0.0), r"memory has shape \(\); allowed: \(3,\)"),
+        (lambda: integral([0.0, np.nan, 0.0]), "memory"),
         (lambda: rk.CommandFilter(rk.PID(7.0, 1.0, 0.2)), "allowed: PD, whose commands are filtered"),
         (lambda: rk.Controller(PD, ROBOT, dt=0.0), "dt = 0; allowed: > 0"),
     ],

@@ -72,6 +72,17 @@ def test_a_run_that_ends_in_a_later_part_ends_where_it_does(monkeypatch):
     assert times[0] == times[1] and times[0][0] > 0.01
 
 
+def test_a_neighbour_that_ends_in_an_early_part_stops_no_run(monkeypatch):
+    """Beside it the others are worth what they are alone and in one part."""
+    path = rk.circle(FRICTIONLESS, 0.05, 0.3)
+    laws = [PD, rk.PD(7.05, 30.0), rk.PD(5.0, 0.2)]
+    alone = rk.sweep(FRICTIONLESS, [laws[0], laws[2]], path, OFFSET)
+    monkeypatch.setattr(compiled, "PART", 70)
+    beside = rk.sweep(FRICTIONLESS, laws, path, OFFSET, failed="mask")
+    assert beside.failed.tolist() == [False, True, False] and beside.failure_time[1] < path.t[140]
+    assert_array_equal(beside.energies[[0, 2]], alone.energies)
+
+
 def test_a_path_in_parts_is_the_same_path(monkeypatch):
     """Base angles go on where the part before ended, also over many turns of a base joint."""
     x = np.array([-0.1, 0.0]) + 0.15 * np.stack([np.cos(t := np.linspace(0.0, 60.0, 3001)), np.sin(t)], axis=-1)

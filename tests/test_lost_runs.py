@@ -9,6 +9,7 @@ import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -190,6 +191,15 @@ def test_an_interrupt_in_the_engine_keeps_what_it_has_done(law, before, rows, mo
     consistent(caught.value, rows)
     for name in ("t", "x", "xd", "q_a", "qd_a", "c", "pairs"):
         assert_array_equal(getattr(caught.value.partial, name), getattr(whole, name)[:rows])
+
+
+def test_an_interrupt_before_the_first_sample_comes_through_as_it_is(monkeypatch):
+    """Nothing is lost, as nothing was done."""
+    stop = KeyboardInterrupt()
+    monkeypatch.setattr(loop, "closed_loops", lambda *arguments: (_ for _ in ()).throw(stop))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, PD, PATH, OFFSET)
+    assert caught.value is stop and vars(stop) == {}
 
 
 def test_an_interrupt_while_the_cause_is_looked_for_loses_no_run(monkeypatch):
@@ -428,9 +438,9 @@ def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
 def test_a_bad_first_answer_is_no_failed_row():
     """Rows that ended otherwise are there, and the run is named."""
     laws = [FailsAt(0.0, boom), pd, lambda *sample: None]
-    for chunk in (1, 64):
+    for chunk, executor in ((1, None), (64, None), (64, pools.Serial())):  # the last one in one chunk
         with pytest.raises(ValueError, match="law returned None") as caught:
-            rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", chunk=chunk)
+            rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", chunk=chunk, executor=executor)
         assert "first sample of run 2" in caught.value.__notes__[-1]
         assert caught.value.partial.failed.tolist() == [True, False, True]
 
@@ -647,6 +657,34 @@ def test_a_failure_of_the_executor_with_nothing_finished_has_no_partial():
     with pytest.raises(OSError, match="no processes left") as caught:
         rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, OSError("no processes left")), chunk=2)
     assert not hasattr(caught.value, "partial") and not hasattr(caught.value, "__notes__")
+
+
+@pytest.mark.parametrize("wrap", [lambda f: f, rk.compiled, lambda f: rk.AntagonismFilter(rk.compiled(f))])
+@pytest.mark.parametrize("file", [None, "script.py"])
+def test_what_a_process_died_of_is_named_where_it_was_written_in_a_notebook(wrap, file, monkeypatch):
+    """Its main module has no file, in which another process could find the function; that of a script has one."""
+
+    def own(t, q_a, qd_a, desired):
+        return pd(t, q_a, qd_a, desired)
+
+    own.__module__, main, job = "__main__", ModuleType("__main__"), Future()
+    job.set_exception(BrokenProcessPool("died"))
+    if file:
+        main.__file__ = file
+    monkeypatch.setitem(sys.modules, "__main__", main)
+    with pytest.raises(BrokenProcessPool) as caught:
+        pools.answer(job, 5, prepare(ROBOT, PATH, rk.Sensors()), [PD, wrap(own), PD], None)
+    notes = getattr(caught.value, "__notes__", [])
+    assert len(notes) == (file is None) and all("law of run 6 = " in note and "a notebook" in note for note in notes)
+
+
+def test_an_executor_that_fails_otherwise_is_not_called_shut_down():
+    class Poor(Executor):
+        def submit(self, *job):
+            raise RuntimeError("can't start new thread")
+
+    with pytest.raises(RuntimeError, match="^can't start new thread"):
+        rk.sweep(ROBOT, PD, PATH, OFFSET, executor=Poor())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")

@@ -215,6 +215,17 @@ def test_arguments_in_another_order_are_refused(law, told):
             rk.simulate(TESTBED, whole, HOLD)
 
 
+def test_what_is_given_by_name_alone_has_no_place_in_an_order():
+    """A run calls (t, q_a, qd_a, desired) by place; after a * follows what it does not give."""
+
+    def law(t, *readings, desired="nothing"):
+        assert desired == "nothing"
+        return -7.0 * (readings[0] - readings[2].q_a)
+
+    run = rk.simulate(TESTBED, law, HOLD, 1e-3)
+    np.testing.assert_allclose(run.c[0], -7e-3, rtol=0, atol=1e-12)
+
+
 def test_a_wrapper_counts_not_what_it_wraps():
     def inner(q_a, qd_a, desired, t):
         return 0.0 * q_a

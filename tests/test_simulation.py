@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.simulation.compiled import Plant
 from rapkm_lite.simulation.energy import root_mean_square_torque
-from rapkm_lite.simulation.setup import friction_steps
+from rapkm_lite.simulation.growth import growth
+from rapkm_lite.simulation.setup import friction_steps, prepare
 
 TESTBED = rk.load()
 ROBOT = TESTBED.replace(friction=0.0)
@@ -318,6 +320,27 @@ def test_pose_of_a_sample_is_on_the_turn_of_what_was_measured_and_found_once():
     np.testing.assert_allclose(q[:3], path.q_a[0] + turns, rtol=0, atol=1e-12)
     np.testing.assert_allclose(sample.pose("true")[0][:3], path.q_a[0], rtol=0, atol=1e-12)
     assert sample.pose("measured")[0] is q
+    for part in (*sample.pose("measured"), *sample.pose("true")):
+        with pytest.raises(ValueError, match="read-only"):
+            part[0] = 0.0
+
+
+def test_a_lap_later_a_loop_is_as_at_its_start_but_for_a_turn_of_each_drive():
+    """Same place, same rest: so is what becomes of a small error, looked at beside the turn of the path there."""
+    setup, last = prepare(ROUND, LAP, rk.Sensors()), len(LAP) - 1
+    assert np.abs(LAP.q_a[last] - LAP.q_a[0]).min() > 6.0
+    plant = Plant(ROUND, LAP)
+    for k in (last, 0, last // 2):
+        q, qd = plant.observe(k, (*LAP.x[k], *LAP.xd[k]))
+        np.testing.assert_allclose(q, LAP.q_a[k], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(qd, LAP.qd_a[k], rtol=0, atol=1e-12)
+    # One that stood still while the path went round is a turn behind: where a sample follows on the last one only.
+    for k in range(len(LAP)):
+        behind, _ = plant.observe(k, (*LAP.x[0], *LAP.xd[0]))
+    np.testing.assert_allclose(behind, LAP.q_a[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(plant.observe(last, (*LAP.x[0], *LAP.xd[0]))[0], LAP.q_a[last], rtol=0, atol=1e-12)
+    for law in (rk.PD(200.0, 20.0), rk.PD(5.0, 0.1)):
+        assert growth(setup, law, last) == pytest.approx(growth(setup, law, 0), rel=1e-8)
 
 
 def test_filter_finds_the_pose_of_drives_that_are_turns_behind():
