@@ -484,6 +484,12 @@ def test_torques_that_only_pause_do_not_swing():
         assert "grew 64-fold" in swung(1e-3 * (-2.0) ** np.arange(12)[:, None], 1e-3)
 
 
+def test_torques_that_begin_to_swing_grew_from_none():
+    """No number tells how many fold; and none is divided by zero."""
+    with np.errstate(all="raise"):
+        assert swung(np.append(np.zeros(6), (-1.0) ** np.arange(6))[:, None], 1e-3) == ""
+
+
 def test_torques_that_turn_twice_in_a_dozen_samples_do_not_swing():
     """A quarter of the signs has to change, which are three of twelve."""
     growing = 2.0 ** np.arange(12)

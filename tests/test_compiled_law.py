@@ -372,6 +372,7 @@ class Table(dict):
         return -7.0 * (q_a - d.q_a)
 
 
+@pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")
 def test_an_object_is_no_function_that_can_be_compiled():
     with pytest.raises(ValueError, match=r"the law Table cannot be compiled \(it is no function but an object\)"):
         rk.simulate(ROBOT, rk.compiled(Table()), PATH)

@@ -11,7 +11,9 @@ import pytest
 from reference import reference
 
 import rapkm_lite as rk
+from rapkm_lite.simulation import compiled
 from rapkm_lite.simulation.compiled import Plant
+from rapkm_lite.simulation.setup import prepare
 
 ANGLES = {2: [200.0, -20.0], 3: [210.0, 330.0, 90.0], 4: [225.0, 315.0, 45.0, 135.0]}
 OFFSET = np.array([4e-3, -2e-3, 5e-3, -3e-3])
@@ -276,6 +278,26 @@ def test_read_only_package_folder(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("gains", [[7.05, 2e-4, 2e-4], [7e-5, 7.05, 3e-5]])
+def test_commands_change_no_force_however_unequal_the_gains(gains):
+    """Commands (18) leave the force of the drives, as (16) does."""
+    robot, pd = machine(3), rk.PD(gains, 0.2)
+    path = rk.circle(robot, 0.03, 0.1, dt=2e-3)
+    run = rk.simulate(robot, rk.CommandFilter(pd, "true"), path, OFFSET[:3])
+    A = rk.control_matrix(robot, run.q)
+    asked = pd.torque(robot, run.q, run.qd, run.q_a + OFFSET[:3], run.qd_a, path)
+    force, wanted = (np.einsum("kij,ki->kj", A, c) for c in (run.c, asked))
+    np.testing.assert_allclose(force, wanted, rtol=0, atol=1e-10 * np.abs(wanted).max())
+
+
+def test_the_engine_leaves_a_law_whose_drive_outweighs_all_others_together():
+    """Then A^T W^-1 A is nearly of rank one; with two heavy drives, or one that weighs nothing, it is not."""
+    setup = prepare(machine(3), rk.hold(machine(3), [0.02, 0.03], 0.01), rk.Sensors())
+    for ease, known in (([1.0, 1.0, 1e-9], True), ([1e9, 1e9, 1.0], True), ([1e9, 1.0, 1.0], False)):
+        law = rk.AntagonismFilter(PD, W=1.0 / np.array(ease))
+        assert (compiled.encode(law, setup) is not None) == known
 
 
 @pytest.mark.parametrize("W", [[1e-12, 1.0, 1.0], [1.0, 1e-9, 1.0], [1e-12, 1e-6, 1.0]])

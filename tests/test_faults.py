@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import InPython
 
 import rapkm_lite as rk
-from rapkm_lite.simulation.faults import Fault, fault_table
+from rapkm_lite.simulation.faults import Fault, begins, fault_table
 from rapkm_lite.simulation.sensors import Sensors
 from rapkm_lite.simulation.setup import prepare
 
@@ -467,9 +467,21 @@ class LateRipple(Ripple):
         table.jump[t > 0.1, self.drive] += 1e-3
 
 
+class Named(Fault):
+    """A fault of a user's that passes on what else it is told."""
+
+    def __init__(self, time=0.1, *more, **named):
+        self._set(time=time)
+
+    def mark(self, table, t):
+        table.jump[t > self.time, 0] += 1e-3
+
+
 @pytest.mark.parametrize(
     ("entries", "fault"),
     [
+        ('kind = "Named"\n', Named()),
+        ('kind = "Named"\ntime = 0.2\n', Named(0.2)),
         ('kind = "LateRipple"\ndrive = 1\n', LateRipple(1)),
         ('kind = "Ripple"\ndrive = 1\n', Ripple(1)),
         ('kind = "Ripple"\ndrive = 1\nfrequency = 3.0\n', Ripple(1, 3.0)),
@@ -600,6 +612,7 @@ def test_a_fault_of_a_users_may_tell_several_times_or_none(time):
         def mark(self, table, t):
             table.jump[t >= 0.005, 0] += 0.3
 
+    assert begins(Slips()) == (0.005 if isinstance(time, tuple) else 0.0)  # the first, or the start of the run
     with pytest.raises(rk.SimulationError, match="left the workspace") as lost:
         rk.simulate(ROBOT, rk.PD(7.05, 30.0), PATH, faults=[Slips()])
     assert len(lost.value.partial) > 5

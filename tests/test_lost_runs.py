@@ -678,12 +678,21 @@ def test_what_a_process_died_of_is_named_where_it_was_written_in_a_notebook(wrap
     assert len(notes) == (file is None) and all("law of run 6 = " in note and "a notebook" in note for note in notes)
 
 
+class Taciturn:
+    def __reduce__(self):
+        raise LookupError
+
+
+def test_what_does_not_travel_without_a_word_is_kept_here_by_the_name_of_its_error():
+    assert pools.kept_here(Taciturn()) == "LookupError" and pools.kept_here(PD) == ""
+
+
 def test_an_executor_that_fails_otherwise_is_not_called_shut_down():
     class Poor(Executor):
         def submit(self, *job):
             raise RuntimeError("can't start new thread")
 
-    with pytest.raises(RuntimeError, match="^can't start new thread"):
+    with pytest.raises(RuntimeError, match="can't start new thread"):
         rk.sweep(ROBOT, PD, PATH, OFFSET, executor=Poor())
 
 

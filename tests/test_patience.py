@@ -114,6 +114,42 @@ def test_progress_counts_the_chunks(terminal, notebook, monkeypatch):
     assert "25 %" in terminal.getvalue() and terminal.getvalue().endswith(" \r")
 
 
+def test_progress_is_written_a_hundred_times_at_most(terminal):
+    with _patience.progress_bar(1000) as advance:
+        for _ in range(1000):
+            advance()
+    shown = terminal.getvalue().split("\r")
+    assert [text.split("] ")[1] for text in shown if text.startswith("runs")] == [f"{k} %" for k in range(1, 101)]
+
+
+def test_what_cannot_be_counted_or_gone_through_is_refused():
+    class Box:
+        def __len__(self):
+            return 3
+
+    for items in (Box(), iter([1, 2]), 3):
+        with pytest.raises(ValueError, match=r"items = .*; allowed: a list, tuple, array, dict or range"):
+            rk.progress(items)
+
+
+def test_without_a_thread_or_an_error_stream_nothing_is_said_and_nothing_lost(terminal, monkeypatch):
+    """No thread is to be had at a limit of processes; a program without a console has no stream."""
+
+    def refused(timer):
+        raise RuntimeError("can't start new thread")
+
+    done = []
+    with monkeypatch.context() as poor:
+        poor.setattr("threading.Timer.start", refused)
+        with _patience.patience("poor", after=0.01):
+            done.append(time.sleep(0.05))
+    assert terminal.getvalue() == ""
+    monkeypatch.setattr(_patience, "sys", types.SimpleNamespace(stderr=None, modules=sys.modules))
+    with _patience.patience("console", after=0.01):
+        done.append(None)
+    assert len(done) == 2 and list(rk.progress([1, 2])) == [1, 2]
+
+
 @pytest.mark.parametrize(
     "shell, found",
     [(None, False), (types.SimpleNamespace(kernel=None), False), (types.SimpleNamespace(kernel=1), True)],

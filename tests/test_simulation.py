@@ -248,6 +248,28 @@ def test_friction_asks_for_a_step_per_time_in_which_creep_decays():
         assert friction_steps(stiff, *x, dt) == max(1, int(np.ceil(dt * rates.sum().real)))
 
 
+def test_friction_asks_for_one_step_on_the_boundary_where_no_hold_follows():
+    """A stretched arm: there is no F, by which creep would decay."""
+    base, reach = TESTBED.base[0], TESTBED.lengths[0].sum()
+    edge = base * (1.0 - reach / np.linalg.norm(base))
+    assert friction_steps(TESTBED.replace(friction=1.0), *edge.tolist(), 1e-3) == 1
+    assert friction_steps(TESTBED.replace(friction=1.0), *(0.99 * edge).tolist(), 1e-3) > 1
+
+
+@pytest.mark.parametrize("name", ["q_a", "qd_a"])
+@pytest.mark.parametrize("velocity_filter", [None, 2e-3])
+def test_what_was_measured_is_read_only_in_a_run(name, velocity_filter):
+    """A law that writes into it would change what the next reading is compared with."""
+
+    class Writes(rk.Law):
+        def step(self, memory, sample):
+            getattr(sample, name)[0] = 0.0
+            return np.zeros(3), memory
+
+    with pytest.raises(ValueError, match="read-only"):
+        rk.simulate(ROBOT, Writes(), rk.hold(ROBOT, [0.02, 0.03], 0.01), velocity_filter=velocity_filter)
+
+
 def test_a_law_without_coordinates_shows_none():
     """`pairs` is -1 then, whoever runs it; a law with coordinates shows them in every sample."""
     path = rk.hold(ROBOT, [0.02, 0.03], 0.01)
