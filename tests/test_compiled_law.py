@@ -273,6 +273,12 @@ def test_values():
         rk.compiled(ctc, memory=-1)
     with pytest.raises(ValueError, match=r"function = compiled\(pid, .*\); allowed: \(t, q_a, qd_a, d"):
         rk.compiled(pid, memory=3)
+    for wrong in ({"at": "nowhere"}, {"memory": 10**7}):  # at once, before there is a function
+        with pytest.raises(ValueError, match=f"{next(iter(wrong))} = .*; allowed"):
+            rk.compiled(**wrong)
+    rk.compiled(max).check()  # a built-in function, which has no signature
+    poses = {source: rk.compiled(ctc, at=source).pose for source in ("desired", "measured", "true", None)}
+    assert poses == {"desired": None, "measured": "measured", "true": "true", None: None}  # what a run has to find
 
 
 table = {"gain": 7.0}
@@ -441,6 +447,16 @@ def test_words_of_the_compiler_that_nobody_foresaw_are_told_without_its_steps():
     assert refusal(helper, ValueError("moon " * 90)) == ("moon " * 90)[:160]
     # What is no function of Python's has no lines.
     assert refusal(len, ValueError('the moon\nFile "test_compiled_law.py", line 3')) == "the moon"
+
+
+def test_the_line_that_is_told_is_the_first_in_the_users_file():
+    """The compiler tells lines of its own, too, and further ones of what the law calls."""
+    here = misspelt.__code__.co_firstlineno
+    told = (("/numba/typeinfer.py", 7), (__file__, here + 1), (__file__, here))
+    text = "the moon\n" + "".join(f'File "{file}", line {line}\n' for file, line in told)
+    line = f"line {here + 1} of test_compiled_law.py: return -7.0 * (q_a - d.qa)"
+    assert refusal(misspelt, ValueError(text)) == f"the moon, {line}"
+    assert refusal(misspelt, ValueError('the moon\nFile "/numba/typeinfer.py", line 7')) == "the moon"
 
 
 @pytest.mark.parametrize(
@@ -626,4 +642,5 @@ sys.stdout.buffer.write(cloudpickle.dumps(soft))"""
     data = subprocess.run([sys.executable, "-c", there], check=True, capture_output=True).stdout
     law = cloudpickle.loads(data)
     assert repr(law) == "compiled(soft, at=None, memory=3)"
+    assert cloudpickle.loads(cloudpickle.dumps(pid)) == pid  # of a module: by its name
     assert rk.simulate(ROBOT, law, PATH).c.shape == (len(PATH), 3)

@@ -90,6 +90,8 @@ def test_a_failed_neighbour_changes_nothing_and_is_not_counted():
     study = rk.sweep(ROBOT, gains, PATH, OFFSETS[0], failed="mask")
     assert study.failed.tolist() == [False, True, False, False]
     assert study.energies.mask[1].all() and not study.energies.mask[[0, 2, 3]].any()
+    # How it ended is not told anew by what becomes of it while others go on.
+    assert study.stopped == (None, "the machine left the workspace", None, None)
     assert 0.0 < study.failure_time[1] < 0.4
     assert all(np.all(np.isfinite(getattr(study, name).data)) for name in COLUMNS)
     same(
