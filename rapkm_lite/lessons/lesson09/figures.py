@@ -40,7 +40,8 @@ def plot_clipping(free, clipped, limit, axes=None):
         axes[1].plot(run.t, 1e3 * error, color=colour, label=label)
     axes[1].set(xlabel="time in s", ylabel="error in mm", title="what becomes of the path")
     no_finer(axes[1], LEAST * free.robot.lengths.max())
-    axes[1].margins(y=0.25)  # room for the legend
+    axes[1].margins(y=0.25)  # room for the legend, above only
+    axes[1].set_ylim(-0.04 * axes[1].get_ylim()[1])
     axes[1].legend(loc="upper right")
     return axes
 
