@@ -242,8 +242,7 @@ def uneven_rank(name: str, A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     """Q, R, no triangle, and orthonormal complement of Q, where gains or weights make rows differ by powers of ten."""
     Q, R, V = uneven(A)
     _check_rank(name, R, _UNEVEN)
-    k = R.shape[-1]
-    return Q[..., :k], R if V is None else product(R, V.mT), Q[..., k:]
+    return Q[..., : R.shape[-1]], R if V is None else product(R, V.mT), Q[..., R.shape[-1] :]
 
 
 def _check_rank(name: str, R: np.ndarray, where: str) -> None:
