@@ -49,7 +49,7 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least
     ax.set(xlabel="time in s", ylabel=ylabel, title=title, xlim=(0, max(run.t[-1], run.dt)))
     legend = ax.legend(ncols=math.ceil(N / rows), loc="upper right")
     # Of the height of low axes a legend takes a larger share; beyond a third the curves would be too flat.
-    gap = legend.borderaxespad * legend.get_texts()[0].get_fontsize() * ax.figure.dpi / 72
+    gap = legend.borderaxespad * legend.prop.get_size_in_points() * ax.figure.dpi / 72
     share = min((legend.get_window_extent().height + gap) / ax.get_window_extent().height, 0.35)
     ax.margins(y=max(0.18 * rows, share / (1.0 - 2.0 * share)))
     no_finer(ax, least)
