@@ -124,7 +124,7 @@ def least_singular_value(R: np.ndarray) -> tuple[float, float]:
     k = R.shape[-1]
     others = (k - 1) ** ((k - 1) / 2) if k > 2 else 1  # the product of the others is at most norm^(k - 1) over this
     if R.ndim == 2:
-        norm = math.sqrt(np.vdot(R, R)) or 1e-300
+        norm = math.hypot(*R.ravel(order="K").tolist()) or 1e-300
         least = others * math.prod([abs(pivot) / norm for pivot in R.diagonal().tolist()])
         if k < 3 or least > 1e-9:
             return least * norm, least
