@@ -76,12 +76,12 @@ export class Pose {
   }
   /** Filter (15)-(16): overwrite torques by R c, their part that moves the end-effector. */
   filter(c) {
-    // By orthonormal columns u, v of the span of A: A^T A would square the condition number of A.
-    const dot = (p, q) => p.reduce((sum, value, i) => sum + value * q[i], 0);
-    const unit = (p, size = Math.sqrt(dot(p, p))) => p.map((value) => value / size);
-    const u = unit(this.bx), both = dot(u, this.by), v = unit(this.by.map((y, i) => y - both * u[i]));
-    const along = dot(u, c), aside = dot(v, c);
-    for (let i = 0; i < c.length; i++) c[i] = along * u[i] + aside * v[i];
+    // By the second column less its share of the first: A^T A would square the condition number of A.
+    let xx = 0, xy = 0, xc = 0, vv = 0, vc = 0;
+    for (let i = 0; i < c.length; i++) xx += this.bx[i] ** 2, xy += this.bx[i] * this.by[i], xc += this.bx[i] * c[i];
+    const share = xy / xx, left = (i) => this.by[i] - share * this.bx[i];
+    for (let i = 0; i < c.length; i++) vv += left(i) ** 2, vc += left(i) * c[i];
+    for (let i = 0; i < c.length; i++) c[i] = this.bx[i] * (xc / xx) + left(i) * (vc / vv);
     return c;
   }
   /** The direction of torques that move nothing, of length one, for three arms: the cross product of A's columns. */
