@@ -3,7 +3,7 @@
     python tests/bench/bench_explorer.py
 
 Prints for each: median time from the key press to the next painted picture, pictures per second while a slider is
-dragged, and, where a picture has a handle, while it is held.
+dragged, and, where a picture has a handle, the same two for a hand that moves it.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ WATCH = """i => {
 }"""
 
 
-def measure(page, url: str, token: str, path: str) -> tuple[list[float], float, float | None]:
-    """Latencies in ms of 25 key presses, pictures per second over a drag of 4 s, and with a handle held for 4 s."""
+def measure(page, url: str, token: str, path: str) -> tuple[list[float], float, list | None]:
+    """Latencies in ms of 25 key presses, pictures per second over a drag of 4 s, and both for a handle that is held."""
     notebook = Notebook(page, url, token, path)
     notebook.run_all()
     notebook.ask(WATCH, 0)
@@ -81,7 +81,7 @@ def measure(page, url: str, token: str, path: str) -> tuple[list[float], float, 
     return latencies[3:], rate, grabbed
 
 
-# A hand that circles for 4 s at the rate of the display.
+# A hand that moves the handle 25 times and waits for the picture, then circles for 4 s at the rate of the display.
 GRAB = """async () => {
   const knob = document.querySelector('.rapkm-knob');
   if (!knob) return null;
@@ -91,6 +91,15 @@ GRAB = """async () => {
     {clientX: px, clientY: py, button: 0, pointerId: 1, pointerType: 'mouse', bubbles: true}));
   panel.setPointerCapture = () => {};
   send('pointerdown', x, y);
+  const latencies = [];
+  for (let k = 0; k < 28; k++) {
+    await new Promise(resolve => setTimeout(resolve, 150));
+    painted.length = 0;
+    const moved = performance.now();
+    send('pointermove', x - 4 * (1 + k % 7), y);
+    while (!painted.length && performance.now() - moved < 2000) await new Promise(resolve => setTimeout(resolve, 2));
+    latencies.push(painted[0] - moved);
+  }
   painted.length = 0;
   const began = performance.now();
   while (performance.now() - began < 4000) {
@@ -100,7 +109,7 @@ GRAB = """async () => {
   }
   const rate = 1000 * painted.length / (performance.now() - began);
   panel.dispatchEvent(new PointerEvent('lostpointercapture', {pointerId: 1}));
-  return rate;
+  return [latencies.slice(3), rate];
 }"""
 
 
@@ -121,7 +130,9 @@ def main(names: list[str]) -> None:
                 spread = f"{min(latencies):.0f} to {max(latencies):.0f}"
                 median = statistics.median(latencies)
                 print(f"{name:20s} key to picture {median:5.0f} ms ({spread}), dragged {rate:4.1f}/s", end="")
-                print(f", held {grabbed:4.1f}/s" if grabbed else "", flush=True)
+                if grabbed:
+                    print(f", held {statistics.median(grabbed[0]):.0f} ms, {grabbed[1]:.1f}/s", end="")
+                print(flush=True)
                 page.close()
             browser.close()
 
