@@ -19,36 +19,26 @@ from ..mechanics.trajectory import polygon
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
 from ..simulation.runs import SimulationError, simulate
+from . import shared
 from .controls import choice, log_slider, offset_sliders, slider, switch
 from .explorer import Explorer, explorer
-from .shared import (
-    curves,
-    fitting_triangle,
-    frictionless,
-    gain_slider,
-    over_time,
-    ready_made,
-    rounded,
-    size,
-    usual_gains,
-)
 
 LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command form (17)": CommandFilter}
 
 
-@ready_made
+@shared.ready_made
 def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1.
 
     >>> decentralized_run().set(filter="force form (16)").numbers["largest torque"]
     '37 mN m'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     N = robot.n_arms
-    damping = usual_gains(robot)[1]
+    damping = shared.usual_gains(robot)[1]
     friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
-    paths, table = {"centred triangle": fitting_triangle(robot)}, None
+    paths, table = {"centred triangle": shared.fitting_triangle(robot)}, None
     if robot.replace(friction=0.0) == load().replace(friction=0.0):
         paths["reading of Table 1"], table = experiment("table1_reading").trajectory, measured_energies()
 
@@ -56,8 +46,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         offset = marks.offset_values(offsets, N)
         run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder or None)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        curves(picture, "torque", run.t, torque, 50.0)
-        curves(picture, "error", run.t, error, 5.0)
+        shared.curves(picture, "torque", run.t, torque, 50.0)
+        shared.curves(picture, "error", run.t, error, 5.0)
         groups = [(energy, {})]
         if table is not None:
             groups.append((table[int(filter != "off")], {"alpha": 0.4}))
@@ -76,14 +66,14 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     wide = {"color": NEUTRAL, "linewidth": 7}
     both = [("this run", wide), ("Table 1", wide | {"alpha": 0.4})][: 1 if table is None else 2]
     panels = {
-        "torque": over_time("torque in mN m", robot=robot),
-        "error": over_time("angle error in mrad", robot=robot),
+        "torque": shared.over_time("torque in mN m", robot=robot),
+        "error": shared.over_time("angle error in mrad", robot=robot),
         "energy": {"ylabel": "electric energy in J", "legend": both, **marks.drive_axis(N)},
     }
     controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
     controls |= {
-        "K_P": gain_slider(robot),
+        "K_P": shared.gain_slider(robot),
         "K_D": log_slider("K_D in N m s/rad", damping / 0.225 * 0.02, damping / 0.225, damping),
         "filter": choice("antagonism filter", LAWS.keys()),
         "friction": switch("friction", True),
@@ -93,22 +83,22 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=[["torque", "energy"], ["error", "energy"]], size=(9.4, 4.6))
 
 
-@ready_made
+@shared.ready_made
 def animation(robot: Manipulator | None = None) -> Explorer:
     """The machine moves along the triangle; arrows are the forces of the drives at the end-effector.
 
     >>> animation().set(filter="force form (16)").numbers["torque that moves nothing"]
     '0.1 mN m'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     N = robot.n_arms
-    path, times = fitting_triangle(robot), size(robot)
+    path, times = shared.fitting_triangle(robot), shared.size(robot)
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     said = ", ".join(f"{v:.0f}" for v in 1e3 * some).replace("-", "−")
 
     @lru_cache(maxsize=8)
     def recorded(filter: str, offsets: bool):
-        run = simulate(robot, LAWS[filter](PD(*usual_gains(robot))), path, offsets * some)
+        run = simulate(robot, LAWS[filter](PD(*shared.usual_gains(robot))), path, offsets * some)
         A = act.control_matrix(robot, run.q)
         return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
 
@@ -118,7 +108,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     with suppress(SimulationError):
         largest = np.linalg.norm(recorded("off", True)[1], axis=-1).max()
     if largest > 4 * unit:
-        unit = 2 * rounded(largest / 4)
+        unit = 2 * shared.rounded(largest / 4)
     scale, wide = 0.1 * times / unit, 0.009 * times
 
     def draw(picture, time, filter, offsets):
@@ -156,8 +146,8 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},
-        "torque": over_time("torque in mN m", robot=robot, title="Torque"),
-        "error": over_time("path error in mm", title="Distance from the wanted place"),
+        "torque": shared.over_time("torque in mN m", robot=robot, title="Torque"),
+        "error": shared.over_time("path error in mm", title="Distance from the wanted place"),
     }
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
@@ -168,7 +158,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 4.8), setup=setup, play="time")
 
 
-@ready_made
+@shared.ready_made
 def via_points(robot: Manipulator | None = None) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
 
@@ -177,9 +167,9 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     >>> via_points().set(filter=True).numbers["largest torque that only presses"]
     '0.0 mN m'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
     # The lower edge of the triangle of `fitting_triangle`, or as much of it as all arms reach.
-    wide = size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
+    wide = shared.size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
     line, middle = wide * np.linspace([-0.12, -0.07], [0.12, -0.07], 49), marks.middle(robot)
     parts = (part for part in np.linspace(1.0, 0.1, 19) if reachable(robot, middle + 1.1 * part * line).all())
     ends = middle + next(parts, 0.1) * line[[0, -1]]
@@ -191,7 +181,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
-        q_a, law = between(legs).copy(), PD(*usual_gains(robot))
+        q_a, law = between(legs).copy(), PD(*shared.usual_gains(robot))
         q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
         done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
         return done, antagonistic_torque(done)
@@ -203,8 +193,8 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         pressing = 1e3 * null
         for values, (_, look) in zip(off.T, axes, strict=True):
             picture.trace("way", way[:there], values, **look)
-        picture.fit("way", off, least=size(robot))
-        curves(picture, "torque", done.t, pressing, 5.0)
+        picture.fit("way", off, least=shared.size(robot))
+        shared.curves(picture, "torque", done.t, pressing, 5.0)
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
         return {
             "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",
@@ -214,11 +204,11 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         }
 
     along = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, edge)}
-    panels = {"way": along | {"legend": axes}, "torque": over_time("torque that only presses in mN m", 3.0, robot)}
+    torque = shared.over_time("torque that only presses in mN m", 3.0, robot)
     counts = [(f"{edge / legs:.4g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
     controls = {
         "legs": choice("distance of the via points", counts, 8),
         "late": slider("drive 1 late in ms", 0, 10, 2, 0),
         "filter": switch("antagonism filter"),
     }
-    return explorer(draw, controls, panels, size=(9.2, 3.8))
+    return explorer(draw, controls, {"way": along | {"legend": axes}, "torque": torque}, size=(9.2, 3.8))
