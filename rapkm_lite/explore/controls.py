@@ -15,6 +15,8 @@ from ..machine.arguments import exact_array, function, having, of_kind, positive
 from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
+# A widget from elsewhere may have ends, too, but no steps of numbers.
+SLIDERS = widgets.IntSlider, widgets.FloatSlider, widgets.FloatLogSlider
 _COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}
 
 
@@ -61,20 +63,11 @@ def choice(label: str, options, value=None) -> widgets.Widget:
     """
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
         raise ValueError(f"options = {short(options)}; allowed: a list of words, or of (word, value) pairs")
-    options = list(options)
-    known = [_meaning(option) for option in options]
-    if value is not None and not any(value is one or (type(value) is type(one) and value == one) for one in known):
-        raise ValueError(f"value = {short(value)}; allowed: {', '.join(map(repr, known))}")
-    return widgets.Dropdown(options=options, value=known[0] if value is None else value, description=label, **_COMMON)
-
-
-def _meaning(option):
-    """The value of an option of a list."""
-    if isinstance(option, tuple) and len(option) == 2:
-        return option[1]
-    if isinstance(option, str) or (isinstance(option, int | float) and math.isfinite(option)):
-        return option
-    raise ValueError(f"options holds {short(option)}; allowed: words, numbers, or pairs (word, value)")
+    widget = widgets.Dropdown(options=list(options), description=label, **_COMMON)
+    if value is not None:
+        check("value", widget, value)
+        widget.value = value
+    return widget
 
 
 def switch(label: str, value: bool = False) -> widgets.Widget:
@@ -106,10 +99,10 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
 
 def _within(low: float, high: float, value: float) -> None:
     """Refuse ends of a slider that are no range, and a value outside."""
-    ends = [float(exact_array(name, v)) for name, v in (("low", low), ("high", high), ("value", value))]
-    if not ends[0] < ends[1]:
+    least, most, first = (float(exact_array(k, v)) for k, v in (("low", low), ("high", high), ("value", value)))
+    if not least < most:
         raise ValueError(f"low = {low!r} and high = {high!r}; allowed: low < high")
-    if not ends[0] <= ends[2] <= ends[1]:
+    if not least <= first <= most:
         raise ValueError(f"value = {value!r}; allowed: low to high, {low!r} to {high!r}")
 
 
@@ -154,11 +147,10 @@ class Player(widgets.HBox):
         self.add_class("rapkm-player")
         self.slider, self._back = slider, -math.inf
 
-    def stop(self, back: bool = False) -> None:
-        """Stop what plays; back : and take no more steps of it, of which some are under way."""
+    def back(self) -> None:
+        """Stop, and take no more steps of what plays, of which some are under way."""
         if self.play.playing:
-            self.play.playing = False
-            self._back = time.monotonic() if back else -math.inf
+            self.play.playing, self._back = False, time.monotonic()
 
     def late(self, slider) -> bool:
         """Is what a slider tells one of those steps?"""
@@ -186,20 +178,15 @@ class Shown(widgets.VBox):
         return "Explorer"
 
 
-def is_slider(widget) -> bool:
-    """One of those with a range and steps of numbers; a widget from elsewhere may have ends, too."""
-    return isinstance(widget, widgets.IntSlider | widgets.FloatSlider | widgets.FloatLogSlider)
-
-
 def check(name: str, widget, value) -> None:
     """Raise ValueError for a value that the control cannot take."""
     if isinstance(widget, widgets.Dropdown):
-        allowed = [option[1] if isinstance(option, tuple) else option for option in widget.options]
+        allowed = [option[1] if isinstance(option, tuple | list) else option for option in widget.options]
         if not isinstance(value, Hashable) or value not in allowed:
             raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
     elif isinstance(widget, widgets.Checkbox):
         truth(name, value)
-    elif is_slider(widget):
+    elif isinstance(widget, SLIDERS):
         number = float(exact_array(name, value))
         if isinstance(widget, widgets.IntSlider) and not number.is_integer():
             raise ValueError(f"{name} = {number:g}; allowed: whole numbers")
@@ -233,7 +220,7 @@ def tidied(value):
 
 def snap(widget, value):
     """The nearest value that a slider has a step for; a control without steps takes the value as it is."""
-    if not is_slider(widget):
+    if not isinstance(widget, SLIDERS):
         return value
     log = isinstance(widget, widgets.FloatLogSlider)
     low, high = _ends(widget)
@@ -251,12 +238,6 @@ def moved(widget, steps: int):
     return snap(widget, widget.value + way if base is None else widget.value * base ** min(max(way, -99), 99))
 
 
-def moving(handles: list[dict], controls: dict) -> None:
-    """Refuse a handle that moves what is no control."""
-    for name in {name for handle in handles for name in handle["set"]} - set(controls):
-        raise KeyError(f"a handle moves {name!r}, which is no control; allowed: {', '.join(controls)}")
-
-
 def follow(handles: list[dict], controls: dict) -> bool:
     """Move the sliders to where their handle was stopped short; did any of them move?"""
     before = [widget.value for widget in controls.values()]
@@ -270,7 +251,7 @@ def follow(handles: list[dict], controls: dict) -> bool:
 
 def ranges(controls: dict) -> dict:
     """The least and the largest value of each slider."""
-    return {name: _ends(widget) for name, widget in controls.items() if is_slider(widget)}
+    return {name: _ends(widget) for name, widget in controls.items() if isinstance(widget, SLIDERS)}
 
 
 def _ends(widget) -> tuple[float, float]:

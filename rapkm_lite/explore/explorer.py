@@ -18,7 +18,7 @@ from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, having, of_kind
 from ..simulation.compiled import COMPILED
 from ..simulation.runs import SimulationError
-from .controls import Player, Shown, alone, follow, moved, moving, parts, put, ranges, snap, tidied, written
+from .controls import Player, Shown, alone, follow, moved, parts, put, ranges, snap, tidied, written
 
 HERE = Path(__file__).parent
 # A slider that is dragged redraws at once as long as a step takes no more seconds than this.
@@ -85,7 +85,6 @@ class Explorer:
         parts(draw, controls, play, live, about)
         of_kind("picture", picture, Picture, "a Picture")
         self.draw, self.controls, self.picture = draw, dict(controls), picture
-        self.numbers: dict[str, str] = {}
         self._alone = threading.RLock()
         # The draw function of a ready-made explorer is local to the function that bears its name.
         told = written(draw)
@@ -93,7 +92,7 @@ class Explorer:
         maker = getattr(sys.modules.get(told.__module__), self.name, told)
         self.about = about or (inspect.getdoc(told) or inspect.getdoc(maker) or "").split("\n")[0]
         self._defaults = self._first = self.values
-        self.made, self.problem, self._told, self._held, self._watched, self._slow = "explorer", "", {}, False, False, 0
+        self.made, self._told, self._held, self._watched, self._slow = "explorer", {}, False, False, 0
         named = {"labels": {name: widget.description for name, widget in controls.items()}, "ranges": ranges(controls)}
         self.canvas = Canvas(scene=scene(picture) | {"name": self.name, "about": self.about, **named})
         self.canvas.on_msg(lambda _, content, buffers: self._message(content))
@@ -162,7 +161,7 @@ class Explorer:
     def reset(self) -> None:
         """Back to the first setting, as it was shown first; what plays stops."""
         if self._player:
-            self._player.stop(back=True)
+            self._player.back()
         self.set(**self._first)
 
     @alone
@@ -172,10 +171,11 @@ class Explorer:
         self.problem, start = "", time.perf_counter()
         try:
             told = self.draw(self.picture, **self.values) or {}
-            self.numbers = having("what draw returns", told, "a dict of name -> text, or None", "items")
+            self.numbers: dict[str, str] = having("what draw returns", told, "a dict of name -> text, or None", "items")
         except (ValueError, SimulationError, ConvergenceError) as error:
             self.problem, self.numbers = f"No result for this setting: {error}", {}
-        moving(self.picture.handles, self.controls)
+        for name in {name for handle in self.picture.handles for name in handle["set"]} - set(self.controls):
+            raise KeyError(f"a handle moves {name!r}, which is no control; allowed: {', '.join(self.controls)}")
         # One slow step may be a cache that fills; from the second in a row on sliders wait for their release.
         self._slow = self._slow + 1 if time.perf_counter() - start > PATIENCE else 0
         if self._slow == 2:
@@ -233,7 +233,7 @@ class Explorer:
             self._post({"kind": "fixed"}, self.picture.fixed)
             self._send()
         elif content.get("kind") == "still" and self._player:
-            self._player.stop()
+            self._player.play.playing = False
         elif content.get("kind") == "grab":
             question = {"from": content.get("from"), "seq": content.get("seq")}
             try:
