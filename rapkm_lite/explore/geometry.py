@@ -59,7 +59,6 @@ def machine(robot: Manipulator | None = None) -> Explorer:
     # Outside, where the map is cut off, the value of the nearest point inside.
     nearest = tuple(np.asarray(distance_transform_edt(~inside, return_distances=False, return_indices=True)))
 
-    @lru_cache(maxsize=8)
     def matrices(mode: str) -> np.ndarray:
         return np.where(np.asarray(modes[mode])[:, None] > 0, one, other)
 

@@ -160,10 +160,8 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
         moving = act.inverse_dynamics(own, path.q, path.qd, path.qdd)
         pressing = -GAIN * matvec(act.prestress_projector(A), offset)
         most = max(400.0, 3e3 * float(np.median(np.abs(moving).max(axis=1))))
-        for panel, torque in (("moving", moving), ("pressing", pressing)):
-            marks.traces(picture, panel, path.t, 1e3 * torque)
-            picture.fit(panel, 1e3 * moving, 1e3 * pressing, least=20.0, most=most)
-            shared.beyond(picture, panel, 1e3 * torque)
+        shared.curves(picture, "moving", path.t, 1e3 * moving, 20.0, most, beside=1e3 * pressing)
+        shared.curves(picture, "pressing", path.t, 1e3 * pressing, 20.0, most, beside=1e3 * moving)
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",

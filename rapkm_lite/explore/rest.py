@@ -47,10 +47,9 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         run = simulate(robot, PD(K_P, K_D), still(*point), offset)
         error, held = 1e3 * run.error, 1e3 * run.c[-1]
         moves = bool(np.abs(error[-1] - error[-100]).max() > 0.02 * np.abs(error).max())
-        shared.curves(picture, "error", run.t, error, 1.0)
+        shared.curves(picture, "error", run.t, error, 1.0, beside=theory)
         for i in range(N):
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
-        picture.fit("error", error, theory, least=1.0)
         marks.bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
         marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".1f")

@@ -158,18 +158,16 @@ def over_time(ylabel: str, end: float = 5.0, robot: Manipulator | None = None, *
     return {"xlabel": "time in s", "ylabel": ylabel, "xlim": (0, end)} | legend | more
 
 
-def curves(picture, panel: str, t, values, least: float, most: float = np.inf) -> None:
-    """A curve for each drive, values (k, N), and limits that hold them; where they go beyond `most`, a word."""
+def curves(picture, panel: str, t, values, least: float, most: float = np.inf, beside=()) -> None:
+    """A curve for each drive, values (k, N), and limits that hold them and what is `beside`, up to `most`.
+
+    Where the curves go on beyond the limits, a word says how far.
+    """
     marks.traces(picture, panel, t, values)
-    picture.fit(panel, values, least=least, most=most)
-    beyond(picture, panel, values)
-
-
-def beyond(picture, panel: str, values) -> None:
-    """A word where values leave the picture."""
-    most = np.ravel(values)[np.argmax(np.abs(values))]
-    if abs(most) > picture.ylim(panel)[1]:
-        words = f"goes on to {most:.0f}".replace("-", "−")
+    picture.fit(panel, values, beside, least=least, most=most)
+    farthest = np.ravel(values)[np.argmax(np.abs(values))]
+    if abs(farthest) > picture.ylim(panel)[1]:
+        words = f"goes on to {farthest:.0f}".replace("-", "−")
         picture.text(panel, 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
 
 
