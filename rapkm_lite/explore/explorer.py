@@ -13,6 +13,7 @@ from pathlib import Path
 import anywidget
 import ipywidgets as widgets
 import traitlets
+from IPython import display
 
 from ..figures.marks import Picture, bundle, encode, png, scene
 from ..machine.arguments import ConvergenceError, having, of_kind
@@ -269,11 +270,9 @@ class Explorer:
 
     def _ipython_display_(self, **kwargs) -> None:
         """Two outputs: the stored picture, and the widget, which hides it as soon as a kernel has answered."""
-        from IPython.display import display
-
         self._first = self._first if self._watched else self.values
-        display(self.stored(), raw=True)
-        display(self.widget)
+        display.display(self.stored(), raw=True)
+        display.display(self.widget)
 
     def __repr__(self):
         setting = ", ".join(f"{k} = {v:g}" if isinstance(v, float) else f"{k} = {v}" for k, v in self.values.items())

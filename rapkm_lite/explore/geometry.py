@@ -133,12 +133,9 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         else:
             t = circle(robot, 5e-4 * size, dt=0.01, centre=marks.middle(robot))
         A = act.control_matrix(robot, t.q)
-        if robot.n_arms == 3:
-            null = null_vector(robot, t.q)
-        else:
-            # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
-            share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
-            null = np.sqrt(np.maximum(share, 0.0))
+        # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
+        share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
+        null = null_vector(robot, t.q) if robot.n_arms == 3 else np.sqrt(np.maximum(share, 0.0))
         return t, A, pair_measures(robot, t.q), null
 
     def draw(picture, place, path, size, torque):

@@ -134,9 +134,8 @@ def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mo
     picture.handle(panel, *point, x=(1e3, 0), y=(0, 1e3))
     there, step = 1e3 * point, size(robot)
     short, digits = np.abs(there - [x, y]).max() > 0.5 * step, max(0, -math.floor(math.log10(step)))
-    place = f"({there[0]:z.{digits}f}, {there[1]:z.{digits}f}) mm"
-    words = {"end-effector": f"{place}: an arm reaches no further"} if short else {}
-    return point, q, words
+    words = f"({there[0]:z.{digits}f}, {there[1]:z.{digits}f}) mm: an arm reaches no further"
+    return point, q, {"end-effector": words} if short else {}
 
 
 def force_panel(limit: float) -> dict:

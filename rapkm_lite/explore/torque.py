@@ -49,10 +49,6 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     path = lru_cache(maxsize=2)(partial(central_triangle, robot))
     coarse = lru_cache(maxsize=64)(lambda side: path(side)[::10])
 
-    def law_of(word, rate):
-        # Two equal real poles at -rate.
-        return laws[word](rate**2, 2.0 * rate)
-
     @lru_cache(maxsize=64)
     def distance(law: str, side: int) -> str:
         """How near the path comes to the points on which the pair is singular."""
@@ -63,19 +59,12 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         # The points of a line are as far apart as those of a grid: twenty on each piece that may be the nearest.
         room = apart.min() + np.linalg.norm(pieces[1] - pieces[0], axis=-1).max()
         start, end = pieces[:, apart.min(axis=0) <= room]
-        near = coarse(side).x[apart.min(axis=1) <= room]
-        gap = cdist(near, np.linspace(start, end, 20).reshape(-1, 2)).min()
+        gap = cdist(coarse(side).x, np.linspace(start, end, 20).reshape(-1, 2)).min()
         return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
-    norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, law_of(word, 1.0), coarse(side).q))
-
-    @lru_cache(maxsize=64)
-    def needed(side: int) -> float:
-        """Largest torque in mN m that the path takes."""
-        t = path(side)[::50]
-        return 1e3 * float(np.abs(act.inverse_dynamics(robot, t.q, t.qd, t.qdd)).max())
+    norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, laws[word](1.0, 2.0), coarse(side).q))
 
     def draw(picture, law, side, rate, **offsets):
         t = coarse(side)
@@ -91,10 +80,13 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.line("map", times[::5], other, color=NEUTRAL, linewidth=1.2, linestyle="--")
         picture.line("map", at, np.minimum(norm, 1e6 * heavier), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
-        run = simulate(robot, law_of(law, rate), path(side), offset_values(offsets, N))
+        # Two equal real poles at -rate.
+        run = simulate(robot, laws[law](rate**2, 2.0 * rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         # What a failing law does leaves the picture, so that what a working one does stays seen.
-        curves(picture, "torque", run.t, torque, 50.0, most=max(1000.0, 1.5 * needed(side)))
+        some = path(side)[::50]
+        needed = 1e3 * float(np.abs(act.inverse_dynamics(robot, some.q, some.qd, some.qdd)).max())
+        curves(picture, "torque", run.t, torque, 50.0, most=max(1000.0, 1.5 * needed))
         curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
