@@ -7,6 +7,7 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Collection, Hashable
+from typing import Any
 
 import ipywidgets as widgets
 import numpy as np
@@ -16,7 +17,7 @@ from ..machine.arguments import switch as truth
 from ..machine.manipulator import Manipulator
 
 # A widget from elsewhere may have ends, too, but no steps of numbers.
-SLIDERS = widgets.IntSlider, widgets.FloatSlider, widgets.FloatLogSlider
+SLIDERS: Any = (widgets.IntSlider, widgets.FloatSlider, widgets.FloatLogSlider)
 _COMMON: dict = {"style": {"description_width": "initial"}, "layout": {"width": "auto", "margin": "2px 0"}}
 
 
