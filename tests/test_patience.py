@@ -5,14 +5,10 @@ import sys
 import time
 import types
 
-import numpy as np
 import pytest
 
 import rapkm_lite as rk
-from rapkm_lite.engine import rows
 from rapkm_lite.simulation import patience as _patience
-from rapkm_lite.simulation import runs
-from rapkm_lite.simulation.compiled import Plant
 
 
 class Terminal(io.StringIO):
@@ -68,21 +64,6 @@ def test_a_failed_call_is_not_remembered(terminal):
         raise ZeroDivisionError
     slow("failed")
     assert terminal.getvalue().count("compiles") == 1
-
-
-def test_stiff_friction_is_named_each_time(terminal, monkeypatch):
-    """The number is the engine's own: of a hold at rest it takes as many steps."""
-    monkeypatch.setattr(runs, "patience", lambda text: _patience.patience(after=1e-3, text=text))
-    robot = rk.load().replace(friction=1.0, friction_velocity=1e-4)
-    still = rk.hold(robot, [0.02, 0.05], 0.03)
-    plant = Plant(robot, still)
-    plant.hold((0.02, 0.05, 0.0, 0.0), np.zeros(3), still.dt)
-    taken = int(plant._w[rows.BLOCKS * len(plant._arms) + rows.STEPS])
-    for _ in range(2):
-        rk.simulate(robot, rk.PD(7.05, 0.225), still, [4e-3, -2e-3, 5e-3])
-    assert taken > 1000 and terminal.getvalue().count(f"friction is stiff: up to {taken} steps") == 2
-    rk.simulate(rk.load(), rk.PD(7.05, 0.225), still, [4e-3, -2e-3, 5e-3])
-    assert terminal.getvalue().count("stiff") == 2
 
 
 def test_nothing_is_shown_where_nobody_looks(monkeypatch):

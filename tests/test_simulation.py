@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import rapkm_lite as rk
+from rapkm_lite.engine import rows
 from rapkm_lite.simulation.compiled import Plant
 from rapkm_lite.simulation.energy import root_mean_square_torque
 from rapkm_lite.simulation.growth import growth
-from rapkm_lite.simulation.setup import friction_steps, prepare
+from rapkm_lite.simulation.setup import prepare
 
 TESTBED = rk.load()
 ROBOT = TESTBED.replace(friction=0.0)
@@ -236,24 +237,17 @@ def test_a_hold_lasts_a_second_and_a_compiled_law_has_no_memory_unless_asked():
     assert rk.compiled(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory == 0
 
 
-def test_friction_asks_for_a_step_per_time_in_which_creep_decays():
-    """The rates of Gbar xdd = -A^T diag(f_c / v0) A xd add up to a trace; one step at least, also without friction."""
-    robot, x, dt = rk.load(), [0.02, 0.05], 1e-3
+@pytest.mark.parametrize("times", [1.0, 30.0, 3000.0])
+def test_a_hold_takes_a_step_per_time_in_which_creep_decays(times):
+    """The rates of Gbar xdd = -A^T diag(f_c / v0) A xd add up to a trace, here at rest."""
+    robot, x = rk.load(), [0.02, 0.05]
+    robot, path = robot.replace(friction=times * robot.friction), rk.hold(robot, x, 0.01)
     q = rk.inverse_kinematics(robot, x)
     pose = rk.at(robot, q, 0 * q)
-    for times in (0.0, 1.0, 30.0):
-        stiff = robot.replace(friction=times * robot.friction)
-        drag = pose.A.T @ np.diag(stiff.friction / stiff.friction_velocity) @ pose.A
-        rates = np.linalg.eigvals(np.linalg.solve(pose.minimal[0], drag))
-        assert friction_steps(stiff, *x, dt) == max(1, int(np.ceil(dt * rates.sum().real)))
-
-
-def test_friction_asks_for_one_step_on_the_boundary_where_no_hold_follows():
-    """A stretched arm: there is no F, by which creep would decay."""
-    base, reach = TESTBED.base[0], TESTBED.lengths[0].sum()
-    edge = base * (1.0 - reach / np.linalg.norm(base))
-    assert friction_steps(TESTBED.replace(friction=1.0), *edge.tolist(), 1e-3) == 1
-    assert friction_steps(TESTBED.replace(friction=1.0), *(0.99 * edge).tolist(), 1e-3) > 1
+    drag = pose.A.T @ np.diag(robot.friction / robot.friction_velocity) @ pose.A
+    rates, plant = np.linalg.eigvals(np.linalg.solve(pose.minimal[0], drag)), Plant(robot, path)
+    plant.hold((*x, 0.0, 0.0), np.zeros(3), path.dt)
+    assert plant._w[rows.BLOCKS * len(plant._arms) + rows.STEPS] == np.ceil(path.dt * rates.sum().real)
 
 
 @pytest.mark.parametrize("name", ["q_a", "qd_a"])

@@ -14,23 +14,21 @@ _known = set()
 _TEXT = "rapkm_lite compiles its engine for this kind of run; once, some seconds ..."
 
 
-def patience(*kind, after: float = 0.7, text: str = _TEXT) -> contextlib.AbstractContextManager:
+def patience(*kind, after: float = 0.7) -> contextlib.AbstractContextManager:
     """Show one line if the first call of this kind takes longer than `after` seconds, and take it away at its end.
-
-    Without a kind, if this call does.
 
     In a terminal the line is overwritten; in a notebook it is a widget that is closed, which leaves no text behind;
     anywhere else nothing is shown.
     """
     if kind in _known or not (_notebook() or _in_terminal()):
         return contextlib.nullcontext()
-    return _shown_after(kind, after, text)
+    return _shown_after(kind, after)
 
 
 @contextlib.contextmanager
-def _shown_after(kind: tuple, after: float, text: str):
+def _shown_after(kind: tuple, after: float):
     clear = []
-    timer = threading.Timer(after, lambda: clear.append(_show(text)))
+    timer = threading.Timer(after, lambda: clear.append(_show(_TEXT)))
     try:
         timer.start()
     except RuntimeError:  # no thread to be had: then without a word
@@ -38,7 +36,7 @@ def _shown_after(kind: tuple, after: float, text: str):
         return
     try:
         yield
-        _known.update([kind] if kind else [])
+        _known.add(kind)
     finally:
         timer.cancel()
         timer.join()

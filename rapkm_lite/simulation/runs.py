@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,13 +23,9 @@ from .energy import copper_loss, mechanical_work
 from .explain import explain
 from .faults import Fault, FaultsLike, check_faults, fault_table
 from .loop import again_in_python, closed_loop, own_copy
-from .patience import patience
 from .pools import kept_here
 from .sensors import Encoders, Sensors
-from .setup import Outcome, Setup, friction_steps, prepare
-
-MANY_STEPS = 50
-"""Steps in a hold from which on the wait for a run is put down to friction."""
+from .setup import Outcome, Setup, prepare
 
 
 class SimulationError(RuntimeError):
@@ -232,16 +228,13 @@ def attempt(setup: Setup, law) -> tuple[Run, SimulationError | None]:
     """A run as far as it came, and what ended it; what a law raises at its first sample comes through as it is."""
     as_law(law)
     code, cause = encode(law, setup), None
-    steps = friction_steps(setup.robot, *setup.trajectory.x[0].tolist(), setup.trajectory.dt)
-    words = f"friction is stiff: up to {steps} steps in every hold in which a drive is nearly at rest ..."
-    with patience(text=words) if steps > MANY_STEPS else nullcontext():
-        if code is not None:
-            outcome, cause = single(setup, code)
-            if code.user is not None and outcome.status == SINGULAR:
-                outcome, cause = again_in_python(setup, law, outcome)
-        else:
-            law = own_copy(law)
-            outcome, cause = closed_loop(setup, law)
+    if code is not None:
+        outcome, cause = single(setup, code)
+        if code.user is not None and outcome.status == SINGULAR:
+            outcome, cause = again_in_python(setup, law, outcome)
+    else:
+        law = own_copy(law)
+        outcome, cause = closed_loop(setup, law)
     run, time = _run(setup, law, outcome), setup.trajectory.t[outcome.sample]
     try:
         if cause is not None and not isinstance(cause, Exception):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,6 @@ from ..control.compiled_law import CompiledLaw
 from ..machine.arguments import of_kind
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics import cores
-from ..mechanics.at import at
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.trajectory import Trajectory
 from .faults import Fault, FaultTable, check_faults, fault_table
@@ -67,20 +65,6 @@ class Outcome(NamedTuple):
     qd_a: np.ndarray
     c: np.ndarray
     pairs: np.ndarray
-
-
-@functools.lru_cache(maxsize=64)
-def friction_steps(robot: Manipulator, x: float, y: float, dt: float) -> int:
-    """Runge-Kutta steps that friction asks of a hold with a drive nearly at rest, the end-effector at (x, y).
-
-    dt times the rate tr(Gbar^-1 A^T diag(f_c / v0) A) at which creep decays there, rounded up.
-    """
-    try:
-        pose = at(robot, inverse_kinematics(robot, [x, y]))
-        inertia, drag = pose.F.T @ pose.G @ pose.F, pose.A.T * (robot.friction / robot.friction_velocity) @ pose.A
-    except ValueError:  # on the boundary, where a run ends at once
-        return 1
-    return max(1, math.ceil(dt * np.trace(np.linalg.solve(inertia, drag))))
 
 
 @functools.lru_cache(maxsize=64)
