@@ -73,21 +73,6 @@ def _reach(robot: Manipulator, x: float, y: float) -> None:
     inverse_kinematics(robot, [x, y])
 
 
-def _check_samples(path: Trajectory) -> None:
-    """Raise ValueError where the samples of a user's class, which laws in Python follow, are not its columns."""
-    if all(getattr(type(path), name) is getattr(Trajectory, name) for name in ("__getitem__", "q_a", "qd_a", "qdd_a")):
-        return
-    for k in range(len(path)):
-        sample = path[k]
-        pairs = [(getattr(sample, name), getattr(path, name)[k]) for name in ("x", "xd", "xdd", "q", "qd", "qdd")]
-        pairs += [(getattr(sample, f"{name}_a"), getattr(path, name)[k, : path.n_arms]) for name in ("q", "qd", "qdd")]
-        if not all(np.array_equal(*pair) for pair in pairs):
-            raise ValueError(
-                f"trajectory[{k}] of the class {type(path).__name__} is not the row {k} of x, xd, xdd, q, qd and qdd, "
-                "which compiled loops follow; allowed: other rows, see follow and Trajectory.with_set_points"
-            )
-
-
 def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=None, faults=()) -> Setup:
     """The one check of the arguments of `simulate` and `sweep`.
 
@@ -96,7 +81,6 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
     manipulator(robot)
     model = robot if model is None else manipulator(model, "model")
     of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
-    _check_samples(trajectory)
     of_kind("sensors", sensors, Sensors, "Sensors")
     if model.n_arms != robot.n_arms:
         raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
