@@ -276,10 +276,6 @@ def test_an_array_made_of_a_study_is_the_callers_own(of):
     np.testing.assert_array_equal(study.energies, before)
 
 
-CLOSED = ThreadPoolExecutor(1)
-CLOSED.shutdown()
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -291,7 +287,6 @@ CLOSED.shutdown()
         ({"failed": "ignore"}, "failed = 'ignore'; allowed: 'raise', 'mask'"),
         ({"chunk": 0}, "chunk = 0; allowed: >= 1"),
         ({"executor": 3}, "executor = 3; allowed: an executor"),
-        ({"executor": CLOSED}, "executor = .*ThreadPoolExecutor.* was shut down; allowed: one that takes runs"),
         ({"encoder": -5}, "encoder = -5; allowed: >= 1"),
     ],
 )

@@ -6,8 +6,9 @@ A run is repeated only with laws of this package; a user's law is never asked ab
 from __future__ import annotations
 
 import dataclasses
-import linecache
 import math
+import os
+import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,7 +34,8 @@ REASONS = {
     TOO_STIFF: "friction is too stiff for the sampling time",
 }
 _NONE = np.empty((0, 2))
-_FOREIGN = Path(__file__).parents[1], Path(linecache.__file__).parent
+_FOREIGN = "<frozen", f"{Path(__file__).parents[1]}{os.sep}", f"{Path(traceback.__file__).parent}{os.sep}"
+"""How files of Python and of this package begin."""
 
 
 def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = None, c: np.ndarray = _NONE) -> str:
@@ -41,7 +43,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     if status not in REASONS:
         if isinstance(cause, BadAnswer):
             return str(cause)
-        return f"the law raised {type(cause).__name__}{_said(cause)}{place(cause)}"
+        return f"the law raised {type(cause).__name__}{f': {cause}' if str(cause) else ''}{place(cause)}"
     if status == TOO_STIFF:
         friction, v0 = setup.robot.friction.max(), setup.robot.friction_velocity
         return (
@@ -59,33 +61,14 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     return f"{REASONS[status]} ({words})"
 
 
-def _said(error: BaseException | None) -> str:
-    """The words of an exception, after a colon; none where `str` itself fails."""
-    try:
-        words = str(error)
-    except Exception:
-        words = ""
-    return f": {words}" if words else ""
-
-
 def place(error: BaseException | None) -> str:
     """The line of the user's code that raised, as far as the traceback knows it."""
-    found, trace = "", getattr(error, "__traceback__", None)
-    while trace is not None:
-        file, line = trace.tb_frame.f_code.co_filename, trace.tb_lineno
-        if not _library(file):
-            text = linecache.getline(file, line).strip()
-            found = f" (line {line} of {Path(file).name}{f': {text}' if text else ''})"
-        trace = trace.tb_next
-    return found
-
-
-def _library(file: str) -> bool:
-    """Does a file belong to this package, or to what Python came with or installed?"""
-    if file.startswith("<frozen"):
-        return True
-    path = Path(file)
-    return "site-packages" in path.parts or any(path.is_relative_to(folder) for folder in _FOREIGN)
+    frames = traceback.extract_tb(getattr(error, "__traceback__", None))
+    own = [f for f in frames if "site-packages" not in f.filename and not f.filename.startswith(_FOREIGN)]
+    if not own:
+        return ""
+    line, file, text = own[-1].lineno, Path(own[-1].filename).name, own[-1].line
+    return f" (line {line} of {file}{f': {text}' if text else ''})"
 
 
 def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -> Iterator[str]:

@@ -8,9 +8,8 @@ import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from inspect import isfunction
 
-from ..machine.arguments import having, short
+from ..machine.arguments import short
 
 
 @contextmanager
@@ -24,16 +23,6 @@ def pool_of(executor: Executor | None, threads: int):
             pool.shutdown(cancel_futures=True)
 
 
-def handed(pool: Executor, *job) -> Future:
-    """`submit` of an executor; raises ValueError for one that was shut down, and for an answer that is no Future."""
-    try:
-        return having("executor.submit(...)", pool.submit(*job), "a Future of concurrent.futures", "result", "cancel")
-    except RuntimeError as error:
-        if "after shutdown" not in str(error):
-            raise
-        raise ValueError(f"executor = {short(pool)} was shut down; allowed: one that takes runs") from error
-
-
 def answer(job: Future, first: int, setup, laws, offsets):
     """What `run_chunk` answers for the runs from `first` on.
 
@@ -42,20 +31,16 @@ def answer(job: Future, first: int, setup, laws, offsets):
     try:
         return job.result()
     except BrokenExecutor as error:
-        for name, value in _sent(first, setup, laws):
-            inner = value
-            while hasattr(inner, "law") or hasattr(inner, "function"):  # of a filter, and what is compiled
-                inner = getattr(inner, "law", None) or inner.function
-            kind = inner if isfunction(inner) else type(inner)
-            if kind.__module__ == "__main__" and not hasattr(sys.modules["__main__"], "__file__"):
-                error.add_note(
-                    f"{name} = {short(value)} was written in a notebook, where only a process that is forked finds it; "
-                    "allowed: what stands in a module, or threads (executor = None or a ThreadPoolExecutor)"
-                )
-                break
+        if not hasattr(sys.modules["__main__"], "__file__"):
+            error.add_note(
+                "What was written in a notebook only a process that is forked finds; allowed: laws and faults of a "
+                "module, or threads (executor = None or a ThreadPoolExecutor)"
+            )
         raise
     except (pickle.PicklingError, AttributeError, TypeError) as error:
-        for name, value in _sent(first, setup, laws):
+        sent = {f"law of run {i}": law for i, law in enumerate(laws, first)}
+        sent |= {f"fault {i}": fault for i, fault in enumerate(setup.broken)}
+        for name, value in sent.items():
             if words := kept_here(value):
                 raise ValueError(
                     f"{name} = {short(value)} cannot be sent to another process ({words}); allowed: what pickle sends, "
@@ -64,22 +49,13 @@ def answer(job: Future, first: int, setup, laws, offsets):
         raise
 
 
-def _sent(first: int, setup, laws):
-    """Names and values of what a user may have written, of the runs from `first` on."""
-    yield from ((f"law of run {i}", law) for i, law in enumerate(laws, first))
-    yield from ((f"fault {i}", fault) for i, fault in enumerate(setup.broken))
-
-
 def kept_here(value) -> str:
     """Why a value cannot be sent to another process; nothing where it can."""
     try:
         pickle.loads(pickle.dumps(value))
         return ""
     except Exception as error:
-        try:
-            return " ".join(str(error).split()) or type(error).__name__
-        except Exception:  # words that fail themselves
-            return type(error).__name__
+        return " ".join(str(error).split()) or type(error).__name__
 
 
 class Stop:

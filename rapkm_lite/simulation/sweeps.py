@@ -20,7 +20,7 @@ from .explain import REASONS
 from .faults import FaultsLike
 from .loop import own_copy
 from .patience import progress_bar
-from .pools import Stop, answer, handed, pool_of
+from .pools import Stop, answer, pool_of
 from .runs import SimulationError, attempt, hand_over
 from .sensors import Sensors
 from .setup import Setup, prepare
@@ -104,7 +104,8 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
     jobs, errors = {}, {}
     try:
         for i, arguments in chunks.items():
-            jobs[i] = handed(pool, run_chunk, *arguments)
+            job = pool.submit(run_chunk, *arguments)
+            jobs[i] = having("executor.submit(...)", job, "a Future of concurrent.futures", "result", "cancel")
         with progress_bar(len(jobs) if progress else 0) as advance:
             for i, job in jobs.items():
                 errors |= table.enter(i, *answer(job, i, *chunks[i]))
