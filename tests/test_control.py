@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 
 import rapkm_lite as rk
 from rapkm_lite.control.grammar import joint_gain
-from rapkm_lite.simulation import energy
 from rapkm_lite.simulation.experiments import Table1
 
 T = lambda M: np.swapaxes(M, -1, -2)  # noqa: E731
@@ -565,18 +564,6 @@ def test_energies_of_a_run_by_their_definitions():
     assert_allclose(run.energy, rk.copper_loss(FRICTIONLESS, run.c[:-1], 1e-3) + rk.mechanical_work(run), rtol=1e-12)
     gained = rk.kinetic_energy(FRICTIONLESS, run.q[-1], run.qd[-1])
     assert_allclose(rk.mechanical_work(run).sum(), gained, atol=1e-9)
-
-
-def test_energies_of_long_runs_are_summed_in_parts(monkeypatch):
-    """Sums do not depend on where they are cut: by their definitions, for all remainders of parts of four holds."""
-    monkeypatch.setattr(energy, "PART", 4)
-    rng = np.random.default_rng(6)
-    for k in range(1, 14):
-        c, q_a = rng.normal(size=(2, k, 3))
-        run = SimpleNamespace(robot=FRICTIONLESS, c=c, q_a=q_a, dt=1e-3)
-        assert_allclose(rk.mechanical_work(run), (c[:-1] * (q_a[1:] - q_a[:-1])).sum(axis=0), rtol=0, atol=1e-14)
-        heat = 0.611 / 0.0259**2 * (c**2).sum(axis=0) * 1e-3
-        assert_allclose(rk.copper_loss(FRICTIONLESS, c, 1e-3), heat, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -350,19 +350,13 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
         (-1, lambda table: None, r"drive = -1 in .*; allowed: 0 to 2"),
         ("0", lambda table: None, r"drive = '0' in .*; allowed: 0 to 2"),
         (0, lambda table: table, r"mark returns something; allowed: to write into the table"),
-        (0, lambda table: table.jump.fill(np.nan), r"writes NaN or an infinite table\.jump; allowed"),
-        (0, lambda table: table.jump.fill(np.inf), r"writes NaN or an infinite table\.jump; allowed"),
-        (0, lambda table: table.jump.__setitem__((3, 1), np.inf), r"writes NaN or an infinite table\.jump; allowed"),
-        (0, lambda table: table.limit.__setitem__(1, np.nan), r"writes NaN or an infinite table\.jump; allowed"),
-        (0, lambda table: table.limit.fill(np.nan), r"writes NaN or an infinite table\.jump; allowed"),
-        (
-            0,
-            lambda table: setattr(table, "limit", np.ones(3)),
-            r"Wrong.*mark raised AttributeError: .*; allowed: to write",
-        ),
-        (0, lambda table: table.limit.__setitem__(..., np.ones(7)), r"mark raised ValueError: .*; allowed: to write"),
-        (0, lambda table: table.limit.__setitem__(1, -0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
-        (0, lambda table: table.limit.fill(-0.1), r"writes table\.limit = -0\.1 N m; allowed: 0 or more"),
+        (0, lambda table: table.jump.fill(np.nan), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.jump.fill(np.inf), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.jump.__setitem__((3, 1), np.inf), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.limit.__setitem__(1, np.nan), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.limit.fill(np.nan), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.limit.__setitem__(1, -0.1), r"allowed: limits >= 0, finite jumps"),
+        (0, lambda table: table.limit.fill(-0.1), r"allowed: limits >= 0, finite jumps"),
     ],
 )
 def test_a_new_fault_that_marks_wrongly_is_named(drive, write, words):
@@ -381,14 +375,13 @@ def test_a_fault_of_the_package_says_itself_what_does_not_fit():
         rk.simulate(ROBOT, PD, PATH, faults=rk.TorqueLimit([0.1, 0.2]))
 
 
-def test_a_new_fault_that_raises_is_the_cause_of_its_error():
+def test_what_a_new_fault_raises_comes_through():
     class Odd(Fault):
         def mark(self, table, t):
             raise KeyError("here")
 
-    with pytest.raises(ValueError, match="mark raised KeyError") as caught:
+    with pytest.raises(KeyError, match="here"):
         rk.simulate(ROBOT, PD, PATH, faults=[Odd()])
-    assert isinstance(caught.value.__cause__, KeyError)
 
 
 def test_the_beginning_of_a_run_has_the_beginning_of_its_faults():
@@ -524,8 +517,11 @@ def test_faults_that_do_not_fit_the_machine_are_refused_when_a_file_is_read(tmp_
     [
         ("[[fault]]\ndrive = 1\n", r"allowed: a table with kind = one of TorqueLimit, DeadDrive"),
         ('[[fault]]\nkind = "DeadDrives"\n', r"unknown kind of fault 'DeadDrives' \(did you mean 'DeadDrive'\?\)"),
-        ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive lacks 'time'; needed: drive, time"),
-        ('[[fault]]\nkind = "Ripple"\nfrequency = 1\n', "the fault Ripple lacks 'drive'; needed: drive$"),
+        ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\n', "the fault DeadDrive: missing .* 'time'; allowed: drive, time"),
+        (
+            '[[fault]]\nkind = "Ripple"\nfrequency = 1\n',
+            "the fault Ripple: missing .* 'drive'; allowed: drive, freq",
+        ),
         ('[[fault]]\nkind = "DeadDrive"\ndrive = 1\ntimes = 1\n', r"unknown entry of DeadDrive 'times' \(did you mean"),
     ],
 )
@@ -558,16 +554,15 @@ def test_mistakes_in_a_data_file(tmp_path, text, message):
             lambda: rk.simulate(ROBOT, PD, PATH, faults=[rk.TorqueLimit([1.0, 2.0])]),
             r"limit has shape \(2,\); .* \(3,\)",
         ),
-        (lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]), "faults holds 'dead'; allowed: TorqueLimit, DeadDrive"),
         (
-            lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive),
-            r"faults holds .*DeadDrive'>, which is a class; allowed: a fault, such as DeadDrive\(\.\.\.\)$",
+            lambda: rk.simulate(ROBOT, PD, PATH, faults=["dead"]),
+            "faults holds 'dead'; allowed: values of TorqueLimit",
         ),
-        (lambda: rk.simulate(ROBOT, PD, PATH, faults=[Weaker]), r"is a class; allowed: a fault, such as Weaker\("),
-        (lambda: rk.simulate(ROBOT, PD, PATH, faults=[int]), r"is a class; allowed: a fault, such as DeadDrive\("),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=rk.DeadDrive), r"faults holds .*DeadDrive'>; allowed: values of "),
+        (lambda: rk.simulate(ROBOT, PD, PATH, faults=[Weaker]), r"faults holds .*Weaker'>; allowed: values of "),
         (
             lambda: rk.simulate(ROBOT, PD, PATH, faults=[Orphan()]),
-            r"faults holds .*; allowed: TorqueLimit, .* derive its class from rapkm_lite\.simulation\.faults\.Fault",
+            r"faults holds .*; allowed: values of .* that derives from rapkm_lite\.simulation\.faults\.Fault",
         ),
         (lambda: rk.Sensors(encoder=0), "encoder = 0; allowed: >= 1"),
         (lambda: rk.Sensors(velocity_filter=-1.0), "velocity_filter = -1; allowed: >= 0"),

@@ -520,21 +520,6 @@ def test_a_run_that_cannot_travel_leaves_its_time_and_reason():
     assert caught.value.sweep.failed.tolist() == [False, True]
 
 
-class Own(Exception):
-    """Its `partial` is its own."""
-
-    partial = property(lambda self: "mine")
-
-
-def test_an_exception_with_a_partial_of_its_own_is_raised_as_it_is():
-    def own():
-        raise Own("words")
-
-    with pytest.raises(Own, match="words") as caught:
-        rk.sweep(ROBOT, [pd, FailsAt(0.0, own)], PATH, OFFSET)
-    assert caught.value.partial == "mine" and not hasattr(caught.value, "__notes__")
-
-
 def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):
     """A second Ctrl-C, or one just after the last run."""
 

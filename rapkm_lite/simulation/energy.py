@@ -1,7 +1,6 @@
 """Electric energy per drive, and the part of it that antagonism costs.
 
-Functions of a `run` read its `robot`, `q`, `q_a`, `c` and `dt`.  Long runs are summed in parts, for which they need
-little memory.
+Functions of a `run` read its `robot`, `q`, `q_a`, `c` and `dt`.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import steady_state_torque
 from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.sampling import PART
 from ..mechanics.trajectory import Trajectory
 
 
@@ -38,10 +36,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
     """
     c = real_array("c", c, manipulator(robot).n_arms)
     shaped("c", c, c.ndim >= 2, f"(..., k, {robot.n_arms}), one row per hold")
-    dt = positive_number("dt", dt)
-    parts = (c[..., k : k + PART, :] for k in range(0, max(1, c.shape[-2]), PART))
-    heats = [np.sum(joule_heat(part, dt, robot.resistance, robot.torque_constant), axis=-2) for part in parts]
-    return np.sum(heats, axis=0)
+    return np.sum(joule_heat(c, positive_number("dt", dt), robot.resistance, robot.torque_constant), axis=-2)
 
 
 def mechanical_work(run) -> np.ndarray:
@@ -56,8 +51,7 @@ def mechanical_work(run) -> np.ndarray:
     True
     """
     _run(run, "q_a", "c", "dt")
-    parts = (slice(k, k + PART + 1) for k in range(0, max(1, len(run.c) - 1), PART))
-    return np.sum([np.sum(work_of_holds(run.c[part], run.q_a[part]), axis=0) for part in parts], axis=0)
+    return np.sum(work_of_holds(run.c, run.q_a), axis=0)
 
 
 def root_mean_square_torque(run) -> float:

@@ -204,7 +204,8 @@ def blank_table(t: np.ndarray, N: int) -> FaultTable:
 def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
     """The table of a run with the times t (k,) and N drives, from `check_faults`; None without faults.
 
-    Raises ValueError for a drive that there is not, and for a fault that writes what is no number.
+    Raises ValueError for a drive that there is not, and for a fault that writes what is no number; what the `mark` of
+    a user's raises comes through.
     """
     if not faults:
         return None
@@ -213,25 +214,12 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
         drive = getattr(fault, "drive", 0)
         if not isinstance(drive, int | np.integer) or not 0 <= drive < N:
             raise ValueError(f"drive = {drive!r} in {fault!r}; allowed: 0 to {N - 1}, drives count from 0")
-        if _marked(fault, table, t) is not None:
+        # A copy: what a fault remembers begins anew in every run.
+        if copy.deepcopy(fault).mark(table, t) is not None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
-        if np.isnan(table.limit).any() or not np.isfinite(table.jump).all():
-            raise ValueError(f"{fault!r} writes NaN or an infinite table.jump; allowed: finite jumps, limits >= 0")
-        if table.limit.min() < 0.0:
-            raise ValueError(f"{fault!r} writes table.limit = {table.limit.min():g} N m; allowed: 0 or more")
+        if not (np.all(table.limit >= 0.0) and np.all(np.isfinite(table.jump))):
+            raise ValueError(f"{fault!r} writes a table that no run can have; allowed: limits >= 0, finite jumps")
     return table
-
-
-def _marked(fault: Fault, table: FaultTable, t: np.ndarray) -> object:
-    """What `mark` returns; what a fault remembers begins anew."""
-    own = copy.deepcopy(fault)
-    try:
-        return own.mark(table, t)
-    except Exception as error:
-        if type(fault).__module__ == __name__:  # it says itself what does not fit
-            raise
-        words = "allowed: to write into table.limit (N,), alive, held and jump (k, N)"
-        raise ValueError(f"{fault!r}.mark raised {type(error).__name__}: {error}; {words}") from error
 
 
 def check_faults(faults) -> tuple[Fault, ...]:
@@ -241,18 +229,10 @@ def check_faults(faults) -> tuple[Fault, ...]:
     checked = []
     for fault in () if faults is None else faults if np.iterable(faults) else (faults,):
         if not isinstance(fault, Fault):
-            raise ValueError(f"faults holds {short(fault)}{_instead(fault)}")
+            own = "or of a class of your own that derives from rapkm_lite.simulation.faults.Fault"
+            raise ValueError(f"faults holds {short(fault)}; allowed: values of {', '.join(kinds())}, {own}")
         checked.append(fault)
     return tuple(checked)
-
-
-def _instead(wrong) -> str:
-    """What is allowed in place of what is no fault."""
-    if isinstance(wrong, type):
-        name = wrong.__name__ if issubclass(wrong, Fault) else "DeadDrive"
-        return f", which is a class; allowed: a fault, such as {name}(...)"
-    own = ", or a fault of your own: derive its class from rapkm_lite.simulation.faults.Fault"
-    return f"; allowed: {', '.join(kinds())}{own if hasattr(wrong, 'mark') else ''}"
 
 
 def read_fault(table) -> Fault:
@@ -262,12 +242,11 @@ def read_fault(table) -> Fault:
     values = {key: value for key, value in table.items() if key != "kind"}
     known("kind of fault", [table["kind"]], kinds())
     kind = kinds()[table["kind"]]
-    # The signature knows defaults, also of a class that is no dataclass.
-    parameters = inspect.signature(kind).parameters.values()
-    given = {p.name: p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)}
-    known(f"entry of {table['kind']}", values, given)
-    needed = [name for name, parameter in given.items() if parameter.default is parameter.empty]
-    for name in needed:
-        if name not in values:
-            raise ValueError(f"the fault {table['kind']} lacks {name!r}; needed: {', '.join(needed)}")
+    signature = inspect.signature(kind)
+    known(f"entry of {table['kind']}", values, signature.parameters)
+    try:
+        signature.bind(**values)
+    except TypeError as error:
+        words = f"the fault {table['kind']}: {error}"
+        raise ValueError(f"{words}; allowed: {', '.join(signature.parameters)}") from None
     return kind(**values)

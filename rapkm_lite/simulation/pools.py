@@ -72,11 +72,9 @@ class Stop:
 def _threads() -> bool:
     """Can a thread be started here?"""
     try:
-        thread = threading.Thread(target=int)
-        thread.start()
-        thread.join()
+        threading.Thread(target=int).start()
         return True
-    except Exception:
+    except RuntimeError:
         return False
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -51,12 +50,7 @@ class SimulationError(RuntimeError):
     def __reduce__(self):
         cause = None if kept_here(self.__cause__) else self.__cause__  # its words are in `reason`
         arguments = self.time, self.reason, self.partial, self.run, self.sweep
-        return SimulationError, arguments, (cause, list(getattr(self, "__notes__", [])))
-
-    def __setstate__(self, state):
-        self.__cause__, notes = state
-        if notes:
-            self.__notes__ = notes
+        return SimulationError, arguments, vars(self) | {"__cause__": cause}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -268,6 +262,5 @@ def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so instead of one that did."""
     if isinstance(getattr(error, "partial", None), Run):
         error.__notes__ = [text for text in getattr(error, "__notes__", []) if "`partial`" not in text]
-    with suppress(AttributeError):  # of an exception class whose `partial` is its own
-        error.partial = partial
-        error.add_note(note)
+    error.partial = partial
+    error.add_note(note)

@@ -64,12 +64,10 @@ class Sweep(Value):
         for law in self.law if type(self.law) is tuple else [self.law]:
             as_law(law)
         self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
-        if type(self.stopped) not in (list, tuple) or any(not isinstance(w, str | None) for w in self.stopped):
-            raise ValueError(f"stopped = {short(self.stopped)}; allowed: a tuple, a string or None for each run")
         super().__post_init__()
         self._check_rows()
-        words = self.stopped or tuple("it failed" if failed else None for failed in self.failed)
-        if len(words) != len(self):
+        words = tuple("it failed" if failed else None for failed in self.failed) if self.stopped == () else self.stopped
+        if type(words) is not tuple or len(words) != len(self) or any(not isinstance(w, str | None) for w in words):
             raise ValueError(f"stopped = {short(words)}; allowed: a string or None for each of {len(self)} runs")
         self._set(stopped=words)
 
