@@ -139,7 +139,7 @@ TWICE, LATER = rk.AntagonismFilter(FILTER), rk.OffsetJump(1, 0.4, 2.0)
 FASTER, SMALL = rk.triangle(ROBOT, duration=0.6), [1e-4, 0.0, 0.0]
 FOUR = rk.load("four_arms").replace(friction=0.0)
 HOLD_FOUR = rk.hold(FOUR, [0.02, 0.03], 2.0)
-UNSTABLE = "unstable gain K_I = .* of the integral: .*; without it it is not lost"
+UNSTABLE = "unstable gain: near the desired state"
 SETS += [
     (UNSTABLE, FOUR, rk.PID(7.0, 1e5, 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
     (UNSTABLE, FOUR, rk.PID(7.0, [1e5, 1e5, 1e5, 0.0], 0.2), HOLD_FOUR, {"offset": [4e-3, 0.0, 0.0, 0.0]}),
@@ -232,7 +232,13 @@ SETS += [
         fault(rk.EncoderDropout(0, 0.01, 1.0)) | {"offset": OFFSET},
     ),
     ("velocity_filter = 0.5 s delays", FOUR, mine, FAST, {"velocity_filter": 0.5}),
-    ("velocity_filter = 0.5 s delays the rates; with the true ones", FOUR, PD, FAST, {"velocity_filter": 0.5}),
+    (
+        "the rates that velocity_filter = 0.5 s makes are poor; with the true ones",
+        FOUR,
+        PD,
+        FAST,
+        {"velocity_filter": 0.5},
+    ),
     # Of what the encoders add, only the offset is to blame; a drive without one is no obstacle.
     (r"\(offset = ", ROBOT, FILTER, HOLD, {"offset": [2.5, -2.5, 2.5], "velocity_filter": 2e-3, "encoder": 10**5}),
     (r"\(offset = ", ROBOT, TASK, HOLD, {"offset": [2.5, 0.0, 2.5]}),
@@ -251,13 +257,12 @@ SETS += [
     ),
     # Differences of one count, 2 pi / 50, in a sample of 1 ms; ideal angles in the same filter lose nothing.
     (
-        "encoder = 50 counts per turn with velocity_filter = 0 s make rates in steps of 126 rad/s; with the true",
+        "the rates that velocity_filter = 0 s makes of encoder = 50 counts per turn are poor; with the true",
         ROBOT,
         CTC,
         rk.circle(ROBOT, 0.03, 0.5, centre=(0.0, 0.08)),
         {"encoder": 50, "velocity_filter": 0.0},
     ),
-    (UNSTABLE, ROBOT, rk.PID(0.02, 1.0, 1e-3), rk.hold(ROBOT, [0.0, 0.0], 2.0), {"offset": [0.08, -0.04, 0.1]}),
     (
         r"OffsetJump\(1, 0.1, -2.0\)",
         ROBOT,
@@ -616,16 +621,10 @@ def test_an_input_singularity_is_named_although_the_run_was_lost_after_it(aside,
     assert ("near an input singularity" in caught.value.reason) == named
 
 
-def test_a_model_that_makes_a_loop_unstable_is_named_so_where_the_machines_own_would_be_lost_too():
-    """Computed torque with 35 times the inertia has 35 times the gains: K_D dt = 60 * 35 * 1e-3 > 2, unstable."""
+def test_a_model_is_not_blamed_where_the_readings_fit_no_pose_from_the_start():
+    """No torque has acted, though computed torque with 35 times the inertia would be unstable."""
     names = ("masses", "inertias", "rotor_inertia")
     heavy = ROBOT.replace(**{name: 35.0 * getattr(ROBOT, name) for name in names})
-    options = {"law": TASK, "path": TRIANGLE, "offset": OFFSET, "faults": [rk.DeadDrive(i, 0.01) for i in (0, 1)]}
-    assert "DeadDrive" in lost(**options)
-    said = lost(**options, model=heavy)
-    assert "the sampled loop magnifies an error" in said and said.endswith("with the machine's own it does not)")
-    assert "not lost" not in said and all(name in said for name in names)
-    # Where the readings fit no pose from the start, no torque has acted.
     assert "(offset = " in lost(law=TASK, path=HOLD, model=heavy, offset=[2.5, -2.5, 2.5])
 
 

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from numpy.testing import assert_array_equal
 
 import rapkm_lite as rk
 from rapkm_lite import engine
-from rapkm_lite.engine import loop
 from rapkm_lite.simulation import compiled, pools, runs
 from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
@@ -152,38 +150,6 @@ def test_an_interrupt_comes_through():
         rk.simulate(ROBOT, FailsAt(0.1, interrupt), PATH)
     consistent(caught.value, 100)
     assert "up to t = 0.1000 s" in caught.value.__notes__[-1]
-
-
-@pytest.mark.parametrize("law", [PD, rk.SwitchedCTC(900.0, 60.0), rk.CTC(900.0, 60.0, (0, 4))], ids=repr)
-@pytest.mark.parametrize(("before", "rows"), [(True, 49), (False, 60)], ids=["before a part", "after a part"])
-def test_an_interrupt_in_the_engine_keeps_what_it_has_done(law, before, rows, monkeypatch):
-    """A Ctrl-C is raised when a kernel returns; it did all or nothing of its part of the samples."""
-    path = rk.triangle(ROBOT, duration=0.6, dt=0.01)
-    whole, real, parts = rk.simulate(ROBOT, law, path, OFFSET), loop.closed_loops, []
-
-    def interrupted(*arguments):
-        parts.append(None)
-        if not (before and len(parts) == 2):
-            real(*arguments)
-        if len(parts) == 2:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(loop, "closed_loops", interrupted)
-    monkeypatch.setattr(compiled, "PART", 50)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        rk.simulate(ROBOT, law, path, OFFSET)
-    consistent(caught.value, rows)
-    for name in ("t", "x", "xd", "q_a", "qd_a", "c", "pairs"):
-        assert_array_equal(getattr(caught.value.partial, name), getattr(whole, name)[:rows])
-
-
-def test_an_interrupt_before_the_first_sample_comes_through_as_it_is(monkeypatch):
-    """Nothing is lost, as nothing was done."""
-    stop = KeyboardInterrupt()
-    monkeypatch.setattr(loop, "closed_loops", lambda *arguments: (_ for _ in ()).throw(stop))
-    with pytest.raises(KeyboardInterrupt) as caught:
-        rk.simulate(ROBOT, PD, PATH, OFFSET)
-    assert caught.value is stop and vars(stop) == {}
 
 
 def test_an_interrupt_while_the_cause_is_looked_for_loses_no_run(monkeypatch):
@@ -618,19 +584,6 @@ def test_a_failure_of_the_executor_with_nothing_finished_has_no_partial():
     with pytest.raises(OSError, match="no processes left") as caught:
         rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, OSError("no processes left")), chunk=2)
     assert not hasattr(caught.value, "partial") and not hasattr(caught.value, "__notes__")
-
-
-@pytest.mark.parametrize("file", [None, "script.py"])
-def test_what_a_process_may_have_died_of_in_a_notebook_is_told_there(file, monkeypatch):
-    """Its main module has no file, in which another process could find what was written there; that of a script has."""
-    main, job = ModuleType("__main__"), Future()
-    job.set_exception(BrokenProcessPool("died"))
-    if file:
-        main.__file__ = file
-    monkeypatch.setitem(sys.modules, "__main__", main)
-    with pytest.raises(BrokenProcessPool) as caught:
-        pools.answer(job, 5, prepare(ROBOT, PATH, rk.Sensors()), [PD], None)
-    assert ["written in a notebook" in note for note in getattr(caught.value, "__notes__", [])] == [True] * (not file)
 
 
 class Taciturn:

@@ -273,7 +273,7 @@ SAMPLE = rk.Sample(rk.Controller(PD, TESTBED), 0.0, HOLD.q_a[0], HOLD.qd_a[0], H
             r"iterations = 1e\+09; allowed: whole numbers >= 1, to 10000",
         ),
         (lambda: rk.CTC(400.0, 40.0, range(10**12)), r"independent = range.*; allowed: 2 different joint indices"),
-        (lambda: rk.simulate(TESTBED, PD, HOLD, faults=range(10**12)), r"faults holds 0; allowed: values of TorqueLimit"),
+        (lambda: rk.simulate(TESTBED, PD, HOLD, faults=range(10**12)), r"faults holds 0; allowed: values of Torque"),
         (lambda: PD.gains(10**7), r"m = 1e\+07; allowed: whole numbers >= 1, to 1000"),
         (lambda: PD.start(3, 1e-3), r"model = 3; allowed: a Manipulator"),
         (lambda: PD.step(None, 3), r"sample = 3; allowed: a Sample"),

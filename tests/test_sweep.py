@@ -241,7 +241,7 @@ def test_a_study_has_one_law_or_one_per_row():
         rk.Sweep(**(study._fields() | {"law": [PD]}))
 
 
-def test_a_law_that_cannot_go_to_another_process_is_named():
+def test_a_law_that_cannot_go_to_another_process_is_told_where_it_can():
     """A lambda has no name in a module, by which pickle would find it there."""
     law = lambda t, q_a, qd_a, desired: -7.05 * (q_a - desired.q_a)  # noqa: E731
 
@@ -249,13 +249,11 @@ def test_a_law_that_cannot_go_to_another_process_is_named():
         def mark(self, table, t):
             pass
 
-    words = r"law of run 1 = <function .* cannot be sent to another process \(.*\); allowed: .*, or threads"
     with ProcessPoolExecutor(1) as executor:
-        with pytest.raises(ValueError, match=words) as e:
+        with pytest.raises((pickle.PicklingError, AttributeError), match="lambda") as e:
             rk.sweep(ROBOT, [PD, law], PATH, OFFSETS[:2], executor=executor, chunk=1)
-        assert isinstance(e.value.__cause__, pickle.PicklingError | AttributeError)
-        assert e.value.partial.failed.tolist() == [False, True]
-        with pytest.raises(ValueError, match=r"fault 0 = Local\(\) cannot be sent to another process"):
+        assert "only in modules" in e.value.__notes__[0] and e.value.partial.failed.tolist() == [False, True]
+        with pytest.raises((pickle.PicklingError, AttributeError), match="Local"):
             rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=executor, faults=Local())
         same(rk.sweep(ROBOT, PD, PATH, OFFSETS[:2], executor=executor), rk.sweep(ROBOT, PD, PATH, OFFSETS[:2]))
     with ThreadPoolExecutor(1) as executor:

@@ -79,11 +79,12 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
         yield from _seen(setup, _suspects(setup, begun, status, k), c)
         return
     factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
-    yield from _model(setup, law, k, factor)
+    wrong = _difference(setup.model, setup.robot)
+    if wrong and _runs(setup._replace(model=setup.robot), law, k):
+        yield f"the controller's model has {wrong}; with the machine's own it is not lost"
     yield from _broken(setup, law, k, begun)
     if status == NO_POSE and not len(c):  # nor are the coordinates of the law
         yield from _sensors(setup, law, k)
-    yield from _integral(setup, law, k, factor)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
     if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
         yield f"unstable gain: near the desired state the sampled loop {magnified(factor, setup.trajectory.dt)}"
@@ -94,18 +95,6 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
     if factor is not None:
         words = f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at a weak"
         yield f"{words} gain{_too(setup)}, or a path too near the boundary"
-
-
-def _model(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
-    """Another model than the machine's own, with which the run is not lost, or at least no error grows."""
-    wrong, right = _difference(setup.model, setup.robot), setup._replace(model=setup.robot)
-    if wrong and _runs(right, law, k):
-        yield f"the controller's model has {wrong}; with the machine's own it is not lost"
-    if wrong and factor is not None and factor > 1.001:
-        own = growth(right._replace(trajectory=setup.trajectory.for_robot(setup.robot)), law, k)
-        if own is not None and own <= 1.001:
-            grows = magnified(factor, setup.trajectory.dt)
-            yield f"the controller's model has {wrong}: the sampled loop {grows}; with the machine's own it does not"
 
 
 def _seen(setup: Setup, begun: list[Fault], c: np.ndarray) -> Iterator[str]:
@@ -153,18 +142,6 @@ def _broken(setup: Setup, law, k: int, begun: list[Fault]) -> Iterator[str]:
             yield f"{described(begun[0])}, and {own}; without both it is not lost"
 
 
-def _integral(setup: Setup, law, k: int, factor: float | None) -> Iterator[str]:
-    """An integral gain beyond what K_P and K_D hold; Routh: K_I < K_P K_D / m for a mass m."""
-    inner = inner_law(law)
-    if factor is None or factor <= 1.0 + 1e-6 or not isinstance(inner, PID) or not np.any(inner.K_I):
-        return
-    if _runs(setup, _replaced(law, K_I=0.0), k):
-        yield (
-            f"unstable gain K_I = {short(inner.K_I.tolist())} of the integral: near the desired state the sampled loop "
-            f"{magnified(factor, setup.trajectory.dt)}; without it it is not lost"
-        )
-
-
 def _singular(setup: Setup, law, rows: slice, least: float) -> Iterator[str]:
     """A desired pose among some samples at which all drives, or the angles of independent ones, nearly fail."""
     pair, pairs, q = coordinates(law, None), drive_pairs(setup.model), setup.trajectory.q[rows]
@@ -194,13 +171,8 @@ def _sensors(setup: Setup, law, k: int) -> Iterator[str]:
 
     delay, coarse = sensors.velocity_filter, sensors.encoder is not None and without(encoder=None)
     if delay is not None and without(velocity_filter=None):
-        if coarse and sensors.count:
-            step = sensors.count / (delay + setup.trajectory.dt)
-            yield (
-                f"encoder = {sensors.encoder} counts per turn with velocity_filter = {delay:g} s make rates in steps "
-                f"of {step:.3g} rad/s; with the true rates, or ideal angles, it is not lost"
-            )
-        yield f"velocity_filter = {delay:g} s delays the rates; with the true ones it is not lost"
+        counts = f" of encoder = {sensors.encoder} counts per turn" if coarse else ""
+        yield f"the rates that velocity_filter = {delay:g} s makes{counts} are poor; with the true ones it is not lost"
     if coarse:
         yield f"encoder = {sensors.encoder} counts per turn are too coarse; with ideal angles it is not lost"
     if sensors.offset.any() and without(offset=0.0 * sensors.offset):
@@ -241,7 +213,7 @@ def _runs(setup: Setup, law, k: int) -> bool:
     setup = setup._replace(trajectory=trajectory).begin(k + k // 2 + 100)
     try:
         code = encode(law, setup)
-        outcome, cause = closed_loop(setup, law) if code is None else single(setup, code)
+        outcome, cause = closed_loop(setup, law) if code is None else (single(setup, code), None)
     except (ValueError, ArithmeticError):
         return False
     if cause is not None and not isinstance(cause, Exception):

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import pickle
-import sys
 import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-
-from ..machine.arguments import short
 
 
 @contextmanager
@@ -23,29 +20,15 @@ def pool_of(executor: Executor | None, threads: int):
             pool.shutdown(cancel_futures=True)
 
 
-def answer(job: Future, first: int, setup, laws, offsets):
-    """What `run_chunk` answers for the runs from `first` on.
-
-    Raises ValueError where an executor could not send it to another process, for a law or fault that does not travel.
-    """
+def answer(job: Future):
+    """What `run_chunk` answers; an error of the way to another process and back gets a note on what can go it."""
     try:
         return job.result()
-    except BrokenExecutor as error:
-        if not hasattr(sys.modules["__main__"], "__file__"):
-            error.add_note(
-                "What was written in a notebook only a process that is forked finds; allowed: laws and faults of a "
-                "module, or threads (executor = None or a ThreadPoolExecutor)"
-            )
-        raise
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        sent = {f"law of run {i}": law for i, law in enumerate(laws, first)}
-        sent |= {f"fault {i}": fault for i, fault in enumerate(setup.broken)}
-        for name, value in sent.items():
-            if words := kept_here(value):
-                raise ValueError(
-                    f"{name} = {short(value)} cannot be sent to another process ({words}); allowed: what pickle sends, "
-                    "such as a def or a class of a module, or threads (executor = None or a ThreadPoolExecutor)"
-                ) from error
+    except (BrokenExecutor, pickle.PicklingError, AttributeError, TypeError) as error:
+        error.add_note(
+            "Other processes find laws and faults only in modules, and in a notebook only where they are forked; "
+            "allowed, too: threads (executor = None or a ThreadPoolExecutor)."
+        )
         raise
 
 

@@ -32,13 +32,11 @@ class Setup(NamedTuple):
 
     def suits(self, law: CompiledLaw) -> bool:
         """Do the loops close where a compiled law asks for matrices?  Where not, it runs in Python, which says so."""
-        path = self.trajectory
-        if law.at != "desired" or path._apart is None:
-            return True
-        try:
-            cores.closed(self.model.tree, cores.link_vectors(self.model.tree, path.q))
-        except ValueError:
-            return False
+        if law.at == "desired" and self.trajectory._apart is not None:
+            try:
+                cores.closed(self.model.tree, cores.link_vectors(self.model.tree, self.trajectory.q))
+            except ValueError:
+                return False
         return True
 
     def begin(self, samples: int) -> Setup:

@@ -108,7 +108,7 @@ def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> di
             jobs[i] = having("executor.submit(...)", job, "a Future of concurrent.futures", "result", "cancel")
         with progress_bar(len(jobs) if progress else 0) as advance:
             for i, job in jobs.items():
-                errors |= table.enter(i, *answer(job, i, *chunks[i]))
+                errors |= table.enter(i, *answer(job))
                 advance()
     except BaseException:
         for i, job in jobs.items():
