@@ -9,6 +9,7 @@ import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from numpy.testing import assert_array_equal
 
 import rapkm_lite as rk
 from rapkm_lite import engine
-from rapkm_lite.simulation import compiled, pools, runs
+from rapkm_lite.simulation import compiled, pools, runs, sweeps
 from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.setup import Outcome, prepare
@@ -380,7 +381,7 @@ def test_a_sweep_raises_the_first_failure_and_keeps_the_rest(in_process):
 def test_a_bad_first_answer_is_no_failed_row():
     """Rows that ended otherwise are there, and the run is named."""
     laws = [FailsAt(0.0, boom), pd, lambda *sample: None]
-    for chunk, executor in ((1, None), (64, None), (64, pools.Serial())):  # the last one in one chunk
+    for chunk, executor in ((1, None), (64, None), (64, Pool(9, KeyError()))):  # the last one in one chunk
         with pytest.raises(ValueError, match="law returned None") as caught:
             rk.sweep(ROBOT, laws, PATH, OFFSET, failed="mask", chunk=chunk, executor=executor)
         assert "first sample of run 2" in caught.value.__notes__[-1]
@@ -489,10 +490,12 @@ def test_a_run_that_cannot_travel_leaves_its_time_and_reason():
 def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):
     """A second Ctrl-C, or one just after the last run."""
 
-    def interrupted(self, *arguments, **named):
+    @contextmanager
+    def interrupted(executor, threads):
+        yield executor
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pools.Serial, "shutdown", interrupted)
+    monkeypatch.setattr(sweeps, "pool_of", interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         rk.sweep(ROBOT, [pd, pd], PATH, OFFSET)
     assert not caught.value.partial.failed.any() and "2 of 2 runs were finished" in caught.value.__notes__[-1]
@@ -591,8 +594,8 @@ class Taciturn:
         raise LookupError
 
 
-def test_what_does_not_travel_without_a_word_is_kept_here_by_the_name_of_its_error():
-    assert pools.kept_here(Taciturn()) == "LookupError" and pools.kept_here(PD) == ""
+def test_what_does_not_travel_is_kept_here():
+    assert pools.kept_here(Taciturn()) and not pools.kept_here(PD)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")

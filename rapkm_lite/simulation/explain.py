@@ -90,9 +90,10 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
         yield f"unstable gain: near the desired state the sampled loop {magnified(factor, setup.trajectory.dt)}"
     yield from _sensors(setup, law, k)
     yield from _singular(setup, law, slice(k), 0.1)
-    if factor is not None and factor > 1.001:
-        yield f"the gains do not hold it: near the desired state an error grows by the factor {factor:.4g} per sample"
     if factor is not None:
+        if factor > 1.001:
+            grows = f"an error grows by the factor {factor:.4g} per sample"
+            yield f"the gains do not hold it: near the desired state {grows}"
         words = f"near the desired state an error changes only by the factor {factor:.4g} per sample, so look at a weak"
         yield f"{words} gain{_too(setup)}, or a path too near the boundary"
 

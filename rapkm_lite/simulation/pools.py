@@ -5,19 +5,14 @@ from __future__ import annotations
 import pickle
 import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
-from functools import partial
+from contextlib import nullcontext
 
 
-@contextmanager
 def pool_of(executor: Executor | None, threads: int):
-    """The executor of the caller, or threads of our own, which end with the sweep; none where one is enough."""
-    pool = executor or (ThreadPoolExecutor(threads) if threads > 1 and _threads() else Serial())
-    try:
-        yield pool
-    finally:
-        if executor is None:
-            pool.shutdown(cancel_futures=True)
+    """A context with the executor of the caller, or with threads that end with it; with None where one is enough."""
+    if executor is None and threads > 1 and _threads():
+        return ThreadPoolExecutor(threads)
+    return nullcontext(executor)
 
 
 def answer(job: Future):
@@ -32,13 +27,13 @@ def answer(job: Future):
         raise
 
 
-def kept_here(value) -> str:
-    """Why a value cannot be sent to another process; nothing where it can."""
+def kept_here(value) -> bool:
+    """Can a value not be sent to another process?"""
     try:
         pickle.loads(pickle.dumps(value))
-        return ""
-    except Exception as error:
-        return " ".join(str(error).split()) or type(error).__name__
+    except Exception:
+        return True
+    return False
 
 
 class Stop:
@@ -59,23 +54,3 @@ def _threads() -> bool:
         return True
     except RuntimeError:
         return False
-
-
-class Serial(Executor):
-    """Does a job when its result is asked for, in the thread that asks."""
-
-    def submit(self, function, *arguments, **named):
-        return Job(partial(function, *arguments, **named))
-
-
-class Job(Future):
-    """A job of `Serial`."""
-
-    def __init__(self, work):
-        super().__init__()
-        self._work = work
-
-    def result(self, timeout=None):
-        if not self.done():
-            self.set_result(self._work())
-        return super().result(timeout)

@@ -96,19 +96,19 @@ def _blamed(errors: dict, failed: np.ndarray, mask: bool) -> int | None:
     return None if mask or not failed.any() else int(np.argmax(failed))
 
 
-def _collect(pool: Executor, chunks: dict, table: Columns, progress: bool) -> dict:
+def _collect(pool: Executor | None, chunks: dict, table: Columns, progress: bool) -> dict:
     """Run the chunks, by their first rows; fills the table and returns what stopped rows in Python.
 
     Whatever goes wrong, what is finished is in the table, and what waits is cancelled.
     """
     jobs, errors = {}, {}
     try:
-        for i, arguments in chunks.items():
+        for i, arguments in chunks.items() if pool is not None else ():
             job = pool.submit(run_chunk, *arguments)
             jobs[i] = having("executor.submit(...)", job, "a Future of concurrent.futures", "result", "cancel")
-        with progress_bar(len(jobs) if progress else 0) as advance:
-            for i, job in jobs.items():
-                errors |= table.enter(i, *answer(job))
+        with progress_bar(len(chunks) if progress else 0) as advance:
+            for i, arguments in chunks.items():
+                errors |= table.enter(i, *(answer(jobs[i]) if jobs else run_chunk(*arguments)))
                 advance()
     except BaseException:
         for i, job in jobs.items():
