@@ -191,7 +191,7 @@ def test_mirrored_machine():
         ({"law": lambda *a: [1.0]}, r"law returned the shape \(1,\); allowed: \(3,\)"),
         ({"law": lambda *a: [1.0, np.inf, 0.0]}, r"\[1\] = inf; allowed: finite numbers"),
         ({"law": rk.PD([1.0, 2.0], 0.1)}, r"K_P has shape \(2,\); allowed: one number, \(3,\) or \(3, 3\)"),
-        ({"law": rk.CTC(9.0, 6.0, (0, 6))}, r"independent = \(0, 6\); allowed: joint indices from 0 to 5"),
+        ({"law": rk.CTC(9.0, 6.0, (0, 6))}, r"independent = \(0, 6\); allowed: 2 different joint indices from 0 to 5"),
     ],
 )
 def test_bad_arguments(options, message):

@@ -11,7 +11,7 @@ from ..control.compiled_law import CompiledLaw
 from ..control.computed_torque import APD, CTC, RedundantAPD, RedundantCTC, SwitchedCTC
 from ..control.grammar import joint_gain
 from ..control.laws import PD, PID, AntagonismFilter, CommandFilter
-from ..machine.arguments import shaped
+from ..machine.arguments import joint_indices, shaped
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +95,8 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
         code = code if law.projected else f"{code}_LINE2"
         return code, {"GAIN_P": P[:N], "ELBOW_P": P[N:], "GAIN_D": D[:N], "ELBOW_D": D[N:]}, {}
     gains = *_per("K_P", law.K_P, 2), *_per("K_D", law.K_D, 2)
-    joints = getattr(law, "independent", None) or (-1, -1)
-    if max(joints) >= 2 * N:
-        raise ValueError(f"independent = {joints}; allowed: joint indices from 0 to {2 * N - 1}")
+    pair = getattr(law, "independent", None)
+    joints = (-1, -1) if pair is None else joint_indices("independent", pair, 2 * N)
     rows = "PAIR_P1", "PAIR_P2", "PAIR_D1", "PAIR_D2", "HYSTERESIS", "JOINT_J", "JOINT_K"
     values = *gains, getattr(law, "hysteresis", 1.0), *joints
     return code, {}, dict(zip(rows, map(float, values), strict=True))

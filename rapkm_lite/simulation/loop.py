@@ -15,9 +15,6 @@ from .compiled import DONE, LAW_FAILED, LEFT_WORKSPACE, NO_POSE, Plant
 from .sensors import Encoders
 from .setup import Outcome, Setup
 
-LOST = 1e9
-"""Rates in rad/s that say that the machine was lost in the hold before; what a law makes of them is not its fault."""
-
 
 def own_copy(law):
     """A copy that a run may change, so that each starts with the law as it was given; raises ValueError without one."""
@@ -34,7 +31,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     """One run with a law or callable that nobody else uses; returns it and the exception that stopped it.
 
     What goes wrong at the first sample is an error of the caller, and raised as it is.  A Ctrl-C is returned, too.
-    A law that fails because the state is absurdly large is not to blame: the machine was lost in the hold before.
+    A law that fails at rates beyond 1e9 rad/s is not to blame: the machine was lost in the hold before.
     """
     robot, model, trajectory, sensors, faults, _ = setup
     plant, encoders = Plant(robot, trajectory, model), Encoders(sensors, faults, trajectory.dt)
@@ -68,7 +65,7 @@ def closed_loop(setup: Setup, law) -> tuple[Outcome, BaseException | None]:
     except BaseException as error:
         if k == 0:
             raise
-        if isinstance(error, Exception) and np.abs(qd).max() > LOST:
+        if isinstance(error, Exception) and np.abs(qd).max() > 1e9:
             return Outcome(LEFT_WORKSPACE, k - 1, *history), error
         return Outcome(LAW_FAILED, k, *history), error
     return Outcome(DONE, last, *history), None

@@ -9,9 +9,6 @@ import numpy as np
 from ..machine.arguments import bounded, exact_array, real_array, shaped, whole_number
 from ..machine.values import Array, OptionalCount, Value, default
 
-_MOST = 10**12
-"""Counts per turn; finer ones are lost in the rounding of the angles."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sensors(Value):
@@ -35,7 +32,8 @@ class Sensors(Value):
         offset = real_array("offset", self.offset)
         shaped("offset", offset, offset.ndim <= 1 and offset.size > 0, "one number or (N,), one per drive")
         if self.encoder is not None:
-            self._set(encoder=whole_number("encoder", self.encoder, 1, _MOST))
+            # Finer counts are lost in the rounding of the angles.
+            self._set(encoder=whole_number("encoder", self.encoder, 1, 10**12))
         if self.velocity_filter is not None:
             tau = bounded("velocity_filter", exact_array("velocity_filter", self.velocity_filter), 0.0, strict=False)
             self._set(velocity_filter=float(tau))
