@@ -103,12 +103,14 @@ def _collect(pool: Executor | None, chunks: dict, table: Columns, progress: bool
     """
     jobs, errors = {}, {}
     try:
-        for i, arguments in chunks.items() if pool is not None else ():
-            job = pool.submit(run_chunk, *arguments)
-            jobs[i] = having("executor.submit(...)", job, "a Future of concurrent.futures", "result", "cancel")
+        if pool is not None:
+            for i, arguments in chunks.items():
+                job = pool.submit(run_chunk, *arguments)
+                jobs[i] = having("executor.submit(...)", job, "a Future of concurrent.futures", "result", "cancel")
         with progress_bar(len(chunks) if progress else 0) as advance:
             for i, arguments in chunks.items():
-                errors |= table.enter(i, *(answer(jobs[i]) if jobs else run_chunk(*arguments)))
+                rows, stops = answer(jobs[i]) if jobs else run_chunk(*arguments)
+                errors |= table.enter(i, rows, stops)
                 advance()
     except BaseException:
         for i, job in jobs.items():
