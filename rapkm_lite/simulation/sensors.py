@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..machine.arguments import bounded, exact_array, real_array, shaped, whole_number
+from ..machine.arguments import bounded, exact_array, positive_number, real_array, shaped, whole_number
 from ..machine.values import Array, OptionalCount, Value, default
 
 
@@ -48,6 +48,8 @@ class Sensors(Value):
         """The same for N drives, with one offset each."""
         N = whole_number("N", N, 1)
         shaped("offset", self.offset, self.offset.shape in ((), (N,)), f"one number or ({N},), one per drive")
+        if self.count is not None:  # of a user's class, perhaps
+            positive_number("count", self.count)
         return self if self.offset.ndim else self.with_offset(np.broadcast_to(self.offset, (N,)))
 
     def with_offset(self, offset) -> Sensors:
