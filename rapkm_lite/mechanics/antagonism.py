@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from ..machine.arguments import (
@@ -15,11 +13,12 @@ from ..machine.arguments import (
     positive_number,
     real_array,
     shaped,
+    short,
     tall_matrix,
 )
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .actuation import control_matrix, required_wrench
+from .actuation import control_matrix, required_wrench, weighted_pseudoinverse
 from .at import at
 from .kinematics import cross
 from .linalg import product
@@ -203,13 +202,16 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     and with exact rates.  It does for K_P quantum <= 2 friction, whatever the offsets; a run may still not find it.
     K_P : number, (N,) or (N, N), N m/rad.  offset : (N,) rad.  quantum : angle of one count, rad.
     friction : number, N m of each drive.
-    Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and
-    where friction may carry soft drives too many counts to try (two of a millionth of the third one's gain, say).
+    Decided by mixed-integer programming, to its tolerance, a millionth of a count.
+    Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and for
+    gains of more than 1e4 times one another: soft drives would have too many counts to try.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)
     True
     """
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
     N = manipulator(robot).n_arms
     desired = exact_array("q", q, robot.n_joints)[:N]
     offset, quantum = exact_array("offset", offset, N), positive_number("quantum", quantum)
@@ -217,56 +219,26 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     K = positive_definite("K_P", K_P, N)
     shaped("K_P", K, K.ndim == 2, f"one number, ({N},) or ({N}, {N}), one pose")
     A, weight = control_matrix(robot, q), required_wrench(robot, q, np.zeros(2 * N), np.zeros(2 * N))
-    zero = (desired + offset) / quantum
-    ideal = zero + steady_state_error(A, K, offset, weight) / quantum
-    if np.all(np.abs(K).sum(axis=-1) * quantum <= 2 * friction):
+    carrying, free = matvec(weighted_pseudoinverse(A), weight), cores.null_space(A)
+    step = quantum * np.abs(K).sum(axis=-1)  # of a torque, where all angles are a count off
+    if np.all(step <= 2 * friction):
         return True
-    counts = _readable(A, ideal, _reach(A, K, friction / quantum), zero)
-    c = -matvec(K, quantum * counts - desired)
-    # Slabs |c_i - n_i| <= friction about torques n that carry the weight share a point if all but any one of them do
-    # (Helly): a bound on the virtual work of the end-effector's motions that keep that drive still.
-    still, work = cross(A[:, None], A), cross(A, weight)
-    return bool(np.any(np.all(np.abs(c @ still.T - work) <= friction * np.abs(still).sum(axis=-1), axis=-1)))
-
-
-def _reach(A: np.ndarray, K: np.ndarray, ratio: float) -> np.ndarray:
-    """How many counts (N,) those of a rest differ from the ideal ones at most, for a friction of `ratio` per count.
-
-    At a rest the angles read differ from the true ones by a rounding r, |r_i| <= 1/2 count, and the torques from a
-    prestress by p, |p_i| <= friction.  Their equilibrium A^T K (A x + offset + r) + A^T p = 0, all in counts, makes
-    counts - ideal = (1 - S K) r - S p with S = A (A^T K A)^-1 A^T: soft drives are carried far by the others' friction.
-    """
-    L = np.linalg.cholesky(K)
-    half = np.linalg.solve(L.T, cores.uneven_rank("A weighted with K_P", L.T @ A)[0])
-    S = half @ half.T
-    reach = np.abs(np.eye(len(A)) - S @ K).sum(axis=-1) / 2 + ratio * np.abs(S).sum(axis=-1)
-    if np.prod(np.sort(2 * reach + 1)[:2]) > 1e6:
+    if step.max() > 1e4 * step.min():
         raise ValueError(
-            f"K_P is so unequal that a drive may rest {reach.max():.3g} counts from where exact angles let it, "
-            "too many to try; allowed: gains that differ less"
+            f"K_P = {short(K_P)} is too unequal to try all counts; allowed: gains of up to 1e4 times another"
         )
-    return reach
-
-
-def _readable(A: np.ndarray, near: np.ndarray, reach: np.ndarray, zero: np.ndarray) -> np.ndarray:
-    """Counts (k, N) within `reach` of `near` that some displacement x reads: |counts - zero - A x| <= 1/2 everywhere.
-
-    Strips of the plane share a point if every three of them do (Helly).  Where n_i A_i + n_j A_j + n_k A_k = 0, two
-    counts leave an interval for the third.  The drives of the smallest reach come first.
-    """
-    order = np.argsort(reach)
-    A, zero, lowest, highest = A[order], zero[order], (near - reach)[order] - 1e-3, (near + reach)[order] + 1e-3
-    counts = np.zeros((1, 0))
-    for k in range(len(A)):
-        low, high = np.full(len(counts), lowest[k]), np.full(len(counts), highest[k])
-        for i, j in itertools.combinations(range(k), 2):
-            n = np.array([cross(A[j], A[k]), cross(A[k], A[i]), cross(A[i], A[j])])
-            off, half = (counts[:, [i, j]] - zero[[i, j]]) @ n[:2], np.abs(n).sum() / 2
-            with np.errstate(divide="ignore", invalid="ignore"):  # parallel strips i, j: no bound, or no count at all
-                ends = zero[k] + np.sort([(-half - off) / n[2], (half - off) / n[2]], axis=0)
-            low, high = np.fmax(low, ends[0]), np.fmin(high, ends[1])
-        first = np.ceil(low)
-        number = np.maximum(np.floor(high) - first + 1, 0).astype(int)
-        steps = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
-        counts = np.column_stack([np.repeat(counts, number, axis=0), np.repeat(first, number) + steps])
-    return counts[:, np.argsort(order)]
+    # Unknown are whole counts k from `near`, a displacement x that reads them, near + k = zero + A x to half a count,
+    # and a prestress y with -K (quantum (near + k) - desired) = carrying + free y to the friction of each drive.
+    zero = (desired + offset) / quantum
+    near = np.rint(zero)
+    torque = -matvec(K, quantum * near - desired) - carrying
+    read = np.hstack([np.eye(N), -A / np.abs(A).max(), 0 * free])
+    carried = np.hstack([quantum * K, 0 * A, step.max() * free]) / step[:, None]
+    middle, half = np.concatenate([zero - near, torque / step]), np.concatenate([np.full(N, 0.5), friction / step])
+    found = milp(
+        np.zeros(2 * N),
+        constraints=LinearConstraint(np.vstack([read, carried]), middle - half, middle + half),
+        integrality=np.repeat([1, 0], N),
+        bounds=Bounds(-np.inf, np.inf),
+    )
+    return found.status == 0
