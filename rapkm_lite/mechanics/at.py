@@ -12,6 +12,7 @@ from ..machine.arguments import check_leading, joint_indices, real_array
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from . import cores
+from .linalg import linear
 
 Kept = TypeVar("Kept")
 
@@ -100,26 +101,25 @@ class At(Value):
 
     @rate
     def _rates(self):
-        return cores.link_rates(self.robot.tree, self.qd)
+        """Rate of turn of every link against the x axis, once for each entry of _v, (..., 4N)."""
+        tree = self.robot.tree
+        return linear(linear(self.qd, tree.absolute), tree.spread_links)
 
     @quantity
     def tip_columns(self) -> np.ndarray:
-        """d tip_i / d joint, the column of every joint, (..., 2, 2N), m/rad."""
-        return cores.tip_columns(self.robot.tree, self._v)
+        """d tip_i / d joint, (..., 2, 2N), m/rad: E (a_i + d_i) for the base joints, E d_i for the elbows."""
+        tree = self.robot.tree
+        return linear(self._v, tree.tips, 2, tree.n)
 
     @quantity
     def a(self) -> np.ndarray:
         """Proximal vectors (..., N, 2), m."""
-        return self._links(0)
+        return self._v.reshape(*self.q.shape[:-1], 2, 2, self.robot.n_arms)[..., 0, :].mT
 
     @quantity
     def d(self) -> np.ndarray:
         """Distal vectors (..., N, 2), m."""
-        return self._links(1)
-
-    def _links(self, k: int) -> np.ndarray:
-        N = self.robot.n_arms
-        return self._v.reshape(*self.q.shape[:-1], 2, 2, N)[..., k, :].mT
+        return self._v.reshape(*self.q.shape[:-1], 2, 2, self.robot.n_arms)[..., 1, :].mT
 
     @quantity
     def x(self) -> np.ndarray:
@@ -134,13 +134,15 @@ class At(Value):
 
     @quantity
     def J(self) -> np.ndarray:
-        """Constraint Jacobian (..., r, 2N) of (1), m/rad."""
-        return cores.constraint_jacobian(self.robot.tree, self._v)
+        """Constraint Jacobian (..., r, 2N) of (1), m/rad: the columns of the cut arms minus those of arm 2."""
+        tree = self.robot.tree
+        return linear(self._v, tree.jacobian, tree.r, tree.n)
 
     @rate
     def J_dot(self) -> np.ndarray:
-        """dJ/dt (..., r, 2N), m/(rad s)."""
-        return cores.constraint_jacobian_dot(self.robot.tree, self._v, self._rates)
+        """dJ/dt (..., r, 2N), m/(rad s): a link vector that turns at the rate w changes by w E v, and E E = -1."""
+        tree = self.robot.tree
+        return linear(self._v * self._rates, tree.jacobian_dot, tree.r, tree.n)
 
     @quantity
     def _closed(self):
@@ -156,6 +158,7 @@ class At(Value):
 
     @quantity
     def _over(self):
+        """The base joint of an arm turns at d . xd / (a x d), its distal link at -a . xd / (a x d)."""
         return self._v / self._levers
 
     @quantity
@@ -164,7 +167,7 @@ class At(Value):
         if self.independent is not None:
             _ = self._closed
             return cores.joint_complement(self.J, self.independent)
-        return cores.complement(self.robot.tree, self._over)
+        return linear(self._over, self.robot.tree.complement, self.robot.n_joints, 2)
 
     @rate
     def F_dot(self) -> np.ndarray:
@@ -172,8 +175,10 @@ class At(Value):
         if self.independent is not None:
             return cores.joint_complement_dot(self.J, self.J_dot, self.F, self.independent)
         tree = self.robot.tree
-        over_dot = cores.over_lever_dot(tree, self._v, self._levers, self._over, self._rates, self.qd)
-        return cores.complement(tree, over_dot)
+        # d(a x d)/dt = (a . d) times the elbow rate, and v turns at the rate of its link.
+        lever_dot = linear(np.vecdot(self.a, self.d) * self.qd[..., tree.N :], tree.spread_arms)
+        over_dot = (linear(self._v, tree.turn) * self._rates - self._over * lever_dot) / self._levers
+        return linear(over_dot, tree.complement, tree.n, 2)
 
     @quantity
     def A(self) -> np.ndarray:
@@ -193,18 +198,21 @@ class At(Value):
     # The cut tree (2).
     @quantity
     def G(self) -> np.ndarray:
-        """Mass matrix of (2), (..., 2N, 2N), kg m^2."""
-        return cores.mass_matrix(self.robot.tree, self.q)
+        """Mass matrix of (2), (..., 2N, 2N), kg m^2; the cosine of an elbow angle couples the joints of its arm."""
+        tree = self.robot.tree
+        return linear(np.cos(self.q), tree.coupling, tree.n, tree.n) + tree.inertia.reshape(tree.n, tree.n)
 
     @rate
     def C(self) -> np.ndarray:
-        """Coriolis matrix of (2), (..., 2N, 2N), N m s."""
-        return cores.coriolis_matrix(self.robot.tree, self.q, self.qd)
+        """Coriolis matrix of (2) from the Christoffel symbols, (..., 2N, 2N), N m s."""
+        tree = self.robot.tree
+        return linear(np.sin(self.q).take(tree.elbow, axis=-1) * self.qd, tree.christoffel, tree.n, tree.n)
 
     @rate
     def Q(self) -> np.ndarray:
-        """Remaining forces of (2), (..., 2N), N m, on the left-hand side."""
-        return cores.generalized_forces(self.robot.tree, self._v, self.qd, self.robot.friction_velocity)
+        """Remaining forces of (2), (..., 2N), N m, on the left-hand side: gravity, and friction f_c tanh(qd / v0)."""
+        tree = self.robot.tree
+        return linear(self._v, tree.weight) + tree.friction * np.tanh(self.qd / self.robot.friction_velocity)
 
     # Redundant coordinates.
     @quantity
@@ -258,22 +266,13 @@ def at(robot: Manipulator, q, qd=None) -> At:
     (True, (3, 6))
     """
     n = manipulator(robot).n_joints
-    q = _copy("q", q, n)
+    q = real_array("q", q, n).copy()
+    q.setflags(write=False)
     if qd is not None:
-        qd = _copy("qd", qd, n)
+        qd = real_array("qd", qd, n).copy()
+        qd.setflags(write=False)
         if qd.shape != q.shape:
             check_leading(q=q.shape[:-1], qd=qd.shape[:-1])
     pose = object.__new__(At)
     pose.__dict__.update(robot=robot, q=q, qd=qd, independent=None)
     return pose
-
-
-def given(qd):
-    """The rates of a function that needs them: None is refused like anything else that is no array."""
-    return real_array("qd", qd) if qd is None else qd
-
-
-def _copy(name: str, value, n: int) -> np.ndarray:
-    array = real_array(name, value, n).copy()
-    array.setflags(write=False)
-    return array

@@ -1,7 +1,6 @@
-"""The formulas, one function per quantity, on arrays that were checked before; leading axes are free.
+"""Formulas that serve poses and others, such as `matrices` of any mechanism, on arrays that were checked before.
 
-`at` evaluates them once per pose and keeps the results; the public functions are checked shells around it.
-Link vectors are flat, v (..., 4N) in m, as `machine.tree` says; `tree` holds the constant tables.
+Leading axes are free.  Link vectors are flat, v (..., 4N) in m, as `machine.tree` says, where the constant tables are.
 """
 
 from __future__ import annotations
@@ -52,30 +51,6 @@ def link_vectors(tree: Tree, q: np.ndarray) -> np.ndarray:
     return v
 
 
-def link_rates(tree: Tree, qd: np.ndarray) -> np.ndarray:
-    """Rate of turn of every link against the x axis, once for each entry of v, (..., 4N)."""
-    return linear(linear(qd, tree.absolute), tree.spread_links)
-
-
-def _matrix(flat: np.ndarray, *shape: int) -> np.ndarray:
-    return flat.reshape(shape) if flat.ndim == 1 else flat.reshape(*flat.shape[:-1], *shape)
-
-
-def tip_columns(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """d tip_i / d joint, (..., 2, 2N): E (a_i + d_i) for the base joints, E d_i for the elbows."""
-    return _matrix(linear(v, tree.tips), 2, tree.n)
-
-
-def constraint_jacobian(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """J, (..., r, 2N): the columns of the cut arms minus those of arm 2."""
-    return _matrix(linear(v, tree.jacobian), tree.r, tree.n)
-
-
-def constraint_jacobian_dot(tree: Tree, v: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """dJ/dt, (..., r, 2N): a link vector that turns at the rate w changes by w E v, and E E = -1."""
-    return _matrix(linear(v * rates, tree.jacobian_dot), tree.r, tree.n)
-
-
 def closed(tree: Tree, v: np.ndarray) -> np.ndarray:
     """v, after a check that the tips meet, |h| <= 1e-3 times the longest link."""
     h, limit = linear(v, tree.gaps) + tree.gap, 1e-3 * tree.longest
@@ -116,22 +91,6 @@ def inner_levers(tree: Tree, v: np.ndarray) -> np.ndarray:
     return linear(lever, tree.spread_arms)
 
 
-def complement(tree: Tree, over: np.ndarray) -> np.ndarray:
-    """F for the end-effector position, qd = F xd, (..., 2N, 2) in rad/m, from v over the levers.
-
-    The base joint of an arm turns at d . xd / (a x d), its distal link at -a . xd / (a x d).
-    """
-    return _matrix(linear(over, tree.complement), tree.n, 2)
-
-
-def over_lever_dot(tree: Tree, v, lever, over, rates, qd) -> np.ndarray:
-    """d(v / lever)/dt = (E v w - (v / lever) d(lever)/dt) / lever, with d(a x d)/dt = (a . d) times the elbow rate."""
-    N, n = tree.N, tree.n
-    along = v[..., :N] * v[..., N:n] + v[..., n : n + N] * v[..., n + N :]
-    lever_dot = linear(along * qd[..., N:], tree.spread_arms)
-    return (linear(v, tree.turn) * rates - over * lever_dot) / lever
-
-
 def joint_complement(J: np.ndarray, independent, of_pose: bool = True) -> np.ndarray:
     """F of (5) for delta = n - r joints as q2: the identity in their rows, -J1^-1 J2 in the others, (..., n, delta)."""
     dependent, delta = _others(J.shape[-1], independent), len(independent)
@@ -161,21 +120,6 @@ def joint_complement_dot(J, J_dot, F, independent) -> np.ndarray:
 
 def _others(n: int, indices) -> list[int]:
     return [j for j in range(n) if j not in indices]
-
-
-def mass_matrix(tree: Tree, q: np.ndarray) -> np.ndarray:
-    """G of (2), (..., 2N, 2N); the cosine of an elbow angle couples the two joints of its arm."""
-    return _matrix(tree.inertia + linear(np.cos(q), tree.coupling), tree.n, tree.n)
-
-
-def coriolis_matrix(tree: Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """C of (2) from the Christoffel symbols, (..., 2N, 2N)."""
-    return _matrix(linear(np.sin(q).take(tree.elbow, axis=-1) * qd, tree.christoffel), tree.n, tree.n)
-
-
-def generalized_forces(tree: Tree, v: np.ndarray, qd: np.ndarray, v0: float) -> np.ndarray:
-    """Q of (2), (..., 2N): gravity on the links, and friction f_c tanh(qd / v0) in the base joints."""
-    return linear(v, tree.weight) + tree.friction * np.tanh(qd / v0)
 
 
 def null_space(A: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from ..machine.arguments import check_leading, matvec, real_array, small_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .at import at, given
+from .at import at
 
 
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:
@@ -33,7 +33,7 @@ def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(C, 0.1 * rk.coriolis_matrix(robot, q, q))
     True
     """
-    return at(robot, q, given(qd)).C.copy()
+    return at(robot, q, qd).C.copy()
 
 
 def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
@@ -45,7 +45,7 @@ def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
     >>> rk.generalized_forces(robot, q, 10 + 0 * q).round(4)
     array([0.0042, 0.0042, 0.0042, 0.    , 0.    , 0.    ])
     """
-    return at(robot, q, given(qd)).Q.copy()
+    return at(robot, q, qd).Q.copy()
 
 
 def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -74,7 +74,7 @@ def orthogonal_complement_dot(robot: Manipulator, q, qd, independent=None) -> np
     array([[0., 0.],
            [0., 0.]])
     """
-    return at(robot, q, given(qd)).using(independent).F_dot.copy()
+    return at(robot, q, qd).using(independent).F_dot.copy()
 
 
 def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -89,7 +89,7 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
     array([[ 0.42, -0.04],
            [-0.04,  0.3 ]])
     """
-    Gbar, Cbar, Qbar = at(robot, q, given(qd)).using(independent).minimal
+    Gbar, Cbar, Qbar = at(robot, q, qd).using(independent).minimal
     return Gbar.copy(), Cbar.copy(), Qbar.copy()
 
 
@@ -142,7 +142,7 @@ def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(N @ N_dot + N_dot @ N, N_dot)
     True
     """
-    return at(robot, q, given(qd)).N_dot.copy()
+    return at(robot, q, qd).N_dot.copy()
 
 
 def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -157,7 +157,7 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
     >>> np.allclose(rk.nullspace_projector(robot, q) @ G, G)
     True
     """
-    G, C, Q = at(robot, q, given(qd)).redundant
+    G, C, Q = at(robot, q, qd).redundant
     return G.copy(), C.copy(), Q.copy()
 
 
@@ -173,7 +173,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
     >>> qdd.round(1)
     array([ 8.5, -2.9, -2. , -8.6, -5.9,  9.2])
     """
-    pose, c = at(robot, q, given(qd)), real_array("c", c, robot.n_arms)
+    pose, c = at(robot, q, real_array("qd", qd)), real_array("c", c, robot.n_arms)
     lead = check_leading(q=pose.q.shape[:-1], qd=pose.qd.shape[:-1], c=c.shape[:-1])
     _ = pose.N  # raises where J has lost rank
     cores.check_tangent(robot.tree, pose.J, pose.qd)
@@ -194,7 +194,7 @@ def kinetic_energy(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(rk.kinetic_energy(robot, q, q), q @ rk.mass_matrix(robot, q) @ q / 2)
     True
     """
-    pose = at(robot, q, given(qd))
+    pose = at(robot, q, real_array("qd", qd))
     return np.einsum("...i,...ij,...j->...", pose.qd, pose.G, pose.qd) / 2
 
 

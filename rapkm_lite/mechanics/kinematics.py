@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..machine.arguments import check_leading, entry, real_array, short
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .at import at, given
+from .at import at
 from .cores import wrap as wrap
 
 
@@ -105,7 +105,7 @@ def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(rk.constraint_jacobian_dot(robot, q, 2 * q), 2 * J_dot)
     True
     """
-    return at(robot, q, given(qd)).J_dot.copy()
+    return at(robot, q, qd).J_dot.copy()
 
 
 def reachable(robot: Manipulator, x) -> np.ndarray:

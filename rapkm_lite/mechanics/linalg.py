@@ -22,18 +22,18 @@ def squares(M: np.ndarray) -> np.ndarray | float:
     return float(np.vdot(M, M)) if M.ndim == 2 else np.einsum("...ij,...ij->...", M, M)
 
 
-def linear(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """vector (..., i) times a constant table (i, j).
+def linear(vector: np.ndarray, table: np.ndarray, *shape: int) -> np.ndarray:
+    """vector (..., i) times a constant table (i, j), as matrices (..., *shape) where a shape of j entries is given.
 
     Many vectors go in blocks, each too small for OpenBLAS to wake its threads, which would cost more than they save.
     """
     if vector.ndim == 1:
-        return vector.dot(table)
+        return vector.dot(table).reshape(shape) if shape else vector.dot(table)
     rows = vector.reshape(-1, len(table))
     result, block = np.empty((len(rows), table.shape[1])), 512
     for k in range(0, len(rows), block):
         np.dot(rows[k : k + block], table, out=result[k : k + block])
-    return result.reshape(*vector.shape[:-1], table.shape[1])
+    return result.reshape(*vector.shape[:-1], *(shape or table.shape[1:]))
 
 
 @functools.cache
