@@ -102,7 +102,8 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
     _ = pose.F  # raises where the choice is singular
     # As joint accelerations T (T^T G T)^-1 T_a^T in an orthonormal basis T of the motions: Gbar = F^T G F squares the
     # condition number of F, which the choice of coordinates makes large, while the fields stay as they are.
-    T, N = cores.tangent(pose._row_space[0], pose.J), robot.n_arms
+    (Q, R), N = pose._row_space, robot.n_arms
+    T = Q[..., R.shape[-1] :]
     qdd = product(T, np.linalg.solve(product(T.mT, pose.G, T), T[..., :N, :].mT))
     if pose.independent is not None:
         return qdd[..., list(pose.independent), :]

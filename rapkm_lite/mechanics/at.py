@@ -238,7 +238,8 @@ class At(Value):
     @quantity
     def A_tilde_T_pinv(self) -> np.ndarray:
         """(A~^T)^+ of (25), (..., m, 2N); by (27) it comes from A~ alone, here from the tangent space of V."""
-        return cores.redundant_right_inverse(cores.tangent(self._row_space[0], self.J), self.robot.n_arms)
+        Q, R = self._row_space
+        return cores.redundant_right_inverse(Q[..., R.shape[-1] :], self.robot.n_arms)
 
     @rate
     def redundant(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..machine.arguments import matvec
 from ..machine.tree import Tree
-from .linalg import by_minors, least_singular_value, linear, minors, orthogonal, pairs, product, solve, uneven
+from .linalg import by_minors, least_singular_value, linear, orthogonal, product, singular_values, solve, uneven
 
 _INPUT_SINGULARITY = (
     "an input singularity, where the drives cannot produce every control force; allowed: poses with the full degree of "
@@ -128,12 +128,12 @@ def null_space(A: np.ndarray) -> np.ndarray:
 
 
 def row_space(J: np.ndarray, size: float, of_pose: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Q1 (..., n, r) and R of J^T = Q1 R; for one pose Q1 and the tangent space in one, see `tangent`.
+    """Q (..., n, n) and R of J^T = Q1 R: Q1 is its first r columns, the others span the tangent space of V.
 
     of_pose : the caller was given q, and not J.
     Raises ValueError where J, whose entries are of the order of `size`, lacks full rank.
     """
-    Q, R = orthogonal(J.mT, complete=J.ndim == 2)
+    Q, R = orthogonal(J.mT, complete=True)
     smallest = least_singular_value(R)[0] / size
     if smallest < 1e-12:
         start, place = ("q is a c-space singularity: ", "configurations") if of_pose else ("", "matrices")
@@ -144,19 +144,10 @@ def row_space(J: np.ndarray, size: float, of_pose: bool = True) -> tuple[np.ndar
     return Q, R
 
 
-def tangent(Q: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Orthonormal basis T of the tangent space of V, (..., n, n - r), from `row_space`."""
-    if J.ndim > 2:
-        Q, _ = orthogonal(J.mT, complete=True)
-    return Q[..., J.shape[-2] :]
-
-
 def projector(Q: np.ndarray, R: np.ndarray) -> np.ndarray:
     """N_J = T T^T = I - Q1 Q1^T, from `row_space`, (..., n, n)."""
-    if Q.ndim == 2:
-        T = Q[:, R.shape[-1] :]
-        return product(T, T.T)
-    return np.eye(Q.shape[-2]) - Q @ Q.mT
+    T = Q[..., R.shape[-1] :]
+    return product(T, T.mT)
 
 
 def projector_dot(Q, R, J_dot, N) -> np.ndarray:
@@ -201,22 +192,13 @@ def right_inverse(name: str, A: np.ndarray, where: str = _INPUT_SINGULARITY) -> 
 
 
 def prestress_shares(A: np.ndarray) -> np.ndarray:
-    """Length of the rows of a null basis of A^T, (..., m) for A (..., m, 2); infinite at input singularities.
-
-    By Cauchy-Binet the square is det(A_-i^T A_-i) / det(A^T A) with A_-i the other rows, both sums of squared minors.
-    """
-    j, k = pairs(A.shape[-2])
-    drives = np.arange(A.shape[-2])
-    without = ((drives != j[:, None]) & (drives != k[:, None])).astype(float)
-    squares = minors(A) ** 2
-    whole = squares.sum(axis=-1, keepdims=True)
-    regular = whole > 1e-24 * (A * A).sum(axis=(-2, -1))[..., None] ** 2
-    part = squares @ without
-    return np.sqrt(np.divide(part, whole, out=np.full_like(part, np.inf), where=regular))
+    """Length of the rows of a null basis of A^T, (..., m) for A (..., m, 2); infinite at input singularities."""
+    sigma = singular_values(A)
+    return np.where(sigma[..., 1:] > 1e-12 * sigma[..., :1], np.linalg.norm(null_space(A), axis=-1), np.inf)
 
 
 def redundant_right_inverse(T: np.ndarray, m: int) -> np.ndarray:
-    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of `tangent`: A~^T = T T_a^T, (..., m, 2N)."""
+    """(A~^T)^+ = (T_a^T)^+ T^T, with T_a the m driven rows of T: A~^T = T T_a^T, (..., m, 2N)."""
     over, square = by_minors(T[..., :m, :])
     smallest = square.min(initial=np.inf) if isinstance(square, np.ndarray) else square
     if smallest < 1e-24:

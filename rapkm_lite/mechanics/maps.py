@@ -13,7 +13,7 @@ from .actuation import distal_cross_products, drive_pairs
 from .at import at
 from .cores import prestress_shares
 from .kinematics import inverse_kinematics
-from .linalg import singular_values
+from .linalg import minors, singular_values
 from .partition import PARTITION_RULES, first_best
 
 
@@ -140,8 +140,7 @@ def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
 
 
 def _cross(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    chosen = [k for k, pair in enumerate(drive_pairs(robot)) if set(pair) <= set(drives)]
-    return np.abs(distal_cross_products(robot, q)[..., chosen]).max(axis=-1)
+    return np.abs(minors(at(robot, q).d[..., drives, :] / robot.lengths[drives, 1:])).max(axis=-1)
 
 
 def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:

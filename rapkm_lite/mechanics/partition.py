@@ -34,22 +34,14 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     where = "an input singularity, or dependent rows; allowed: the full degree of actuation, rows by select_independent"
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
-    if not _spans(A_tilde, A1T_pinv, product(B.mT, A1) - A2):
+    # Do they make the others, to 1e-6, near an input singularity to the rounding of B?  Each matrix by itself.
+    left, size, inverse = squares(product(B.mT, A1) - A2), squares(A_tilde), squares(A1T_pinv)
+    if np.any(left > np.maximum(1e-12, 1e-28 * size * inverse) * size):
         raise ValueError(f"rows holds {first.shape[-1]} of the rows, below the rank of A_tilde; allowed: delta of them")
     small, right = product(B.mT, B), product(B.mT, A1T_pinv)
     bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)
     top = A1T_pinv - product(B, bottom)  # the first factor multiplied out
     return _rows(np.concatenate([top, bottom], axis=-2), back)
-
-
-def _spans(A_tilde: np.ndarray, A1T_pinv: np.ndarray, left: np.ndarray) -> bool:
-    """Do the chosen rows make the others, but for `left`: to 1e-6, near an input singularity to the rounding of B?"""
-    # Each matrix by itself, whatever the size of the others; sums of squares, which are quick, mostly decide.
-    if np.all(A_tilde.shape[-2] * A_tilde.shape[-1] * squares(left) <= 1e-12 * squares(A_tilde)):
-        return True
-    size, inverse = np.abs(A_tilde).max(axis=(-2, -1)), np.abs(A1T_pinv).max(axis=(-2, -1))
-    limit = np.maximum(1e-6, 1e-14 * size * inverse) * size
-    return bool(np.all(np.abs(left).max(axis=(-2, -1), initial=0.0) <= limit))
 
 
 def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
