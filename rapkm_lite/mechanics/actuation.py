@@ -24,7 +24,7 @@ from ..machine.arguments import (
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores, linalg
 from .at import at
-from .linalg import many_inverses, minors, product
+from .linalg import minors, product
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -161,8 +161,7 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     """
     A = tall_matrix("A", A)
     if W is None:
-        inverses = many_inverses(A)
-        return cores.right_inverse("A", A) if inverses is None else inverses
+        return cores.right_inverse("A", A)
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
     Q, R, _ = cores.uneven_rank("A weighted with W", np.linalg.solve(L, A))

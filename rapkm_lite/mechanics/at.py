@@ -24,7 +24,6 @@ class quantity(Generic[Kept]):
 
     def __init__(self, function: Callable[[Any], Kept]):
         self.function, self.name, self.__doc__ = function, function.__name__, function.__doc__
-        self.shown = not self.name.startswith("_")
 
     @overload
     def __get__(self, pose: None, cls: type) -> quantity[Kept]: ...
@@ -38,9 +37,8 @@ class quantity(Generic[Kept]):
             raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
         value: Any = self.function(pose)
         pose.__dict__[self.name] = value
-        if self.shown:
-            for array in value if type(value) is tuple else (value,):
-                array.setflags(write=False)
+        for array in value if type(value) is tuple else (value,):
+            array.setflags(write=False)
         return value
 
 

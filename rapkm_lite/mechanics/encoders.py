@@ -169,15 +169,16 @@ def cautions(
     x: np.ndarray, robot: Manipulator, condition: float, spread: float, step: float, noise: float | None
 ) -> list[str]:
     """What to mind: a residual above the noise, or else above the steps of the readings (rad), places (k, 2) close."""
-    said, wrong = [], "is wrong, such as a length or a base point"
-    if noise is None and step and spread > 3 * step:
+    said = []
+    if noise:
+        size, what, cause = noise, "the noise", "something else"
+    else:
+        size, what = step, "the steps of the readings,"
+        cause = "they have more noise than that (to be given as noise), or something"
+    if size and spread > 3 * size:
         said.append(
-            f"the residual {1e3 * spread:.3g} mrad exceeds the steps of the readings, {1e3 * step:.2g} mrad: they have "
-            f"more noise than that (to be given as noise), or something {wrong}"
-        )
-    elif noise and spread > 3 * noise:
-        said.append(
-            f"the residual {1e3 * spread:.3g} mrad exceeds the noise {1e3 * noise:.2g} mrad: something else {wrong}"
+            f"the residual {1e3 * spread:.3g} mrad exceeds {what} {1e3 * size:.2g} mrad: {cause} is wrong, such as a "
+            "length or a base point"
         )
     extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
     if extent < 0.25 * robot.lengths.max():
