@@ -1,7 +1,6 @@
 """Actuation: control matrix, degree of actuation (8)-(10), inverse dynamics and prestress (11).
 
 m = N drives act on delta = 2 degrees of freedom.  What needs only a matrix takes any A (..., m, delta) of full rank.
-What takes a pose raises ValueError where its loops are open, as `At` does, but for `distal_cross_products`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Motion equations: tree with multipliers (2), minimal coordinates (4)-(7), redundant coordinates (22)-(24).
 
 Sign convention, as in (2):  G qdd + C qd + Q + J^T lambda = u,  u = (c, 0),  c (..., N) the drive torques in N m.
-Where F or N_J enters, poses whose loops are open raise ValueError, as with `At`; the rank of J, the energies, and mass
-matrix, Coriolis matrix and forces of the tree are there for any pose.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import at
 from .cores import wrap as wrap
+from .linalg import linear
 
 
 def turn(v: np.ndarray) -> np.ndarray:
@@ -76,9 +77,7 @@ def loop_constraints(robot: Manipulator, q) -> np.ndarray:
     >>> bool(np.abs(loop_constraints(robot, inverse_kinematics(robot, [0.02, 0.05]))).max() < 1e-15)
     True
     """
-    p = tips(robot, q)
-    h = np.delete(p, 1, axis=-2) - p[..., 1:2, :]
-    return h.reshape(*h.shape[:-2], robot.n_constraints)
+    return linear(at(robot, q)._v, robot.tree.gaps) + robot.tree.gap
 
 
 def tip_jacobians(robot: Manipulator, q) -> np.ndarray:

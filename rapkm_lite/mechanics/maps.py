@@ -129,11 +129,6 @@ def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.Mask
     return np.ma.array(grid, mask=mask)
 
 
-def _sigma_min(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    """Smallest singular value of the rows of A~ = Q_a Q^T, with the columns of F made orthonormal in Q."""
-    return singular_values(np.linalg.qr(at(robot, q).F).Q[..., drives, :])[..., 1]
-
-
 def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
     sigma = singular_values(at(robot, q).F[..., drives, :])
     return np.divide(sigma[..., 0], sigma[..., 1], out=np.full(sigma.shape[:-1], np.inf), where=sigma[..., 1] > 0)
@@ -150,4 +145,10 @@ def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
     return np.moveaxis(prestress_shares(at(robot, q).A), -1, 0)
 
 
-_MEASURES = {"sigma_min": _sigma_min, "condition": _condition, "cross": _cross, "prestress": _prestress}
+_MEASURES = {
+    # Of the rows of A~ = Q_a Q^T, with the columns of F made orthonormal in Q.
+    "sigma_min": lambda robot, q, drives: singular_values(np.linalg.qr(at(robot, q).F).Q[..., drives, :])[..., 1],
+    "condition": _condition,
+    "cross": _cross,
+    "prestress": _prestress,
+}

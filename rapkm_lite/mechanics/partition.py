@@ -52,12 +52,18 @@ def _rows(matrix: np.ndarray, index: np.ndarray) -> np.ndarray:
 
 def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Row indices of A~_1, (delta,) or (..., delta), of A~_2, and where each row of A~ stands in these."""
-    m = A_tilde.shape[-2]
+    m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
     if not isinstance(rows, np.ndarray) or rows.ndim < 2:
         rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
         count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
         return _fixed_partition(joint_indices("rows", rows, m, count, "row"), m)
-    rows = _row_choice(rows, A_tilde)
+    rows = real_array("rows", rows).astype(rows.dtype)
+    batch = f" or ({', '.join(map(str, lead))}, delta)" if lead else ""
+    if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
+        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,){batch}")
+    bad = np.any((rows < 0) | (rows >= m) | (np.diff(np.sort(rows, axis=-1), prepend=-1) == 0), axis=-1)
+    if np.any(bad):
+        raise ValueError(f"rows holds {rows[bad][0].tolist()}; allowed: different indices from 0 to {m - 1}")
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
     others = np.argsort(taken, axis=-1, kind="stable")[..., : m - rows.shape[-1]]
     return rows, others, np.argsort(np.concatenate([rows, others], axis=-1), axis=-1)
@@ -67,19 +73,6 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 def _fixed_partition(first: tuple[int, ...], m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     others = [i for i in range(m) if i not in first]
     return frozen(first), frozen(np.array(others, dtype=int)), frozen(np.argsort([*first, *others]))
-
-
-def _row_choice(rows, A_tilde: np.ndarray) -> np.ndarray:
-    m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
-    rows = real_array("rows", rows).astype(np.asarray(rows).dtype)
-    batch = f" or ({', '.join(map(str, lead))}, delta)" if lead else ""
-    if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
-        raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,){batch}")
-    ordered = np.sort(rows, axis=-1)
-    bad = np.any((rows < 0) | (rows >= m), axis=-1) | np.any(np.diff(ordered, axis=-1) == 0, axis=-1)
-    if np.any(bad):
-        raise ValueError(f"rows holds {rows[bad][0].tolist()}; allowed: different indices from 0 to {m - 1}")
-    return rows
 
 
 def _inverse_condition(A1: np.ndarray) -> np.ndarray:

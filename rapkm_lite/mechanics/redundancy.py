@@ -11,6 +11,7 @@ import numpy as np
 from ..machine.arguments import (
     bounded,
     check_leading,
+    drive_values,
     exact_array,
     matvec,
     positive_definite,
@@ -106,13 +107,10 @@ def minimax_torques(A, wrench, limit=1.0) -> np.ndarray:
 
 def _demand(A, wrench, limit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     A = tall_matrix("A", A)
-    if A.ndim != 2:
-        raise ValueError(f"A has shape {A.shape}; allowed: (m, delta), one pose")
-    weighted_pseudoinverse(A)  # raises at input singularities
-    limit = bounded("limit", real_array("limit", limit), 0.0, strict=True)
-    if limit.shape not in ((), (len(A),)):
-        raise ValueError(f"limit has shape {limit.shape}; allowed: one number or ({len(A)},)")
-    return A, exact_array("wrench", wrench, A.shape[1]), np.broadcast_to(limit, len(A))
+    shaped("A", A, A.ndim == 2, "(m, delta), one pose")
+    cores.full_rank("A", A)
+    limit = drive_values("limit", bounded("limit", real_array("limit", limit), 0.0, strict=True), len(A))
+    return A, exact_array("wrench", wrench, A.shape[1]), limit
 
 
 def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, float]:

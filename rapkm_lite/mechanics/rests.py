@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..machine.arguments import bounded, matvec, short
+from ..machine.arguments import matvec, short
 from ..machine.logs import Log
 from ..machine.manipulator import Manipulator
 from . import cores
@@ -151,7 +151,6 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
                 f"K_P = None, and the rests show K_P[{wrong[0]}] = {K_P[wrong[0]]:.6g}; allowed: > 0, so torques of "
                 "drives that act, with the sign that drives their angles"
             )
-    K_P = bounded("K_P", K_P, 0.0, strict=True)
     angles = stand.desired - stand.c / K_P
     try:
         poses(robot, angles)
