@@ -210,7 +210,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)
     True
     """
-    from scipy.optimize import Bounds, LinearConstraint, milp
+    from scipy.optimize import Bounds, milp
 
     N = manipulator(robot).n_arms
     desired = exact_array("q", q, robot.n_joints)[:N]
@@ -237,7 +237,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     middle, half = np.concatenate([zero - near, torque / step]), np.concatenate([np.full(N, 0.5), friction / step])
     found = milp(
         np.zeros(2 * N),
-        constraints=LinearConstraint(np.vstack([read, carried]), middle - half, middle + half),
+        constraints=(np.vstack([read, carried]), middle - half, middle + half),
         integrality=np.repeat([1, 0], N),
         bounds=Bounds(-np.inf, np.inf),
     )

@@ -56,11 +56,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
         return best
     edge, peak = _least_peak(A, wrench, limit)
     if peak > 1.0 + 1e-12:
-        factor = f"{peak:.4g}" if peak > 1.001 else f"1 + {peak - 1.0:.2g}"
-        raise ValueError(
-            f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} at least; allowed: a wrench "
-            "inside the force polygon of the limits"
-        )
+        raise _beyond(wrench, peak, limit)
     if len(A) == A.shape[1]:  # on the edge, to rounding, and no other torques make this force
         return np.clip(best, -limit, limit)
     # c = best + n z with |z|^2 the cost above the best one, as a share of the largest weight, and the limits as
@@ -111,6 +107,14 @@ def _demand(A, wrench, limit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cores.full_rank("A", A)
     limit = drive_values("limit", bounded("limit", real_array("limit", limit), 0.0, strict=True), len(A))
     return A, exact_array("wrench", wrench, A.shape[1]), limit
+
+
+def _beyond(wrench: np.ndarray, peak: float, limit: np.ndarray) -> ValueError:
+    factor = f"{peak:.4g}" if peak > 1.001 else f"1 + {peak - 1.0:.2g}"
+    return ValueError(
+        f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} at least; allowed: a wrench "
+        "inside the force polygon of the limits"
+    )
 
 
 def _least_peak(A: np.ndarray, wrench: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, float]:
