@@ -10,8 +10,8 @@ import numpy as np
 from ..machine.arguments import (
     bounded,
     exact_array,
-    masked,
     matvec,
+    numeric,
     positive_definite,
     real_array,
     shaped,
@@ -117,18 +117,10 @@ def _times(K: np.ndarray, e: np.ndarray) -> np.ndarray:
 
 def torque_limit(limit) -> np.ndarray:
     """A largest torque in N m, one number or (N,), not negative; infinity is no limit."""
-    endless = _is_infinite(limit)
-    array = real_array("limit", np.where(endless, 0.0, limit) if np.any(endless) else limit)
+    array = numeric("limit", limit)
     shaped("limit", array, array.ndim <= 1 and array.size > 0, "one number or one per drive")
-    return np.where(endless, math.inf, bounded("limit", array, 0.0, strict=False))
-
-
-def _is_infinite(value) -> np.ndarray:
-    """Where a number is infinite; nowhere in what `real_array` refuses, such as text and masked entries."""
-    try:
-        return np.zeros((), bool) if masked(value) and np.ma.is_masked(value) else np.asarray(value) == math.inf
-    except Exception:  # whatever an object answers that is asked for a number
-        return np.zeros((), bool)
+    bounded("limit", real_array("limit", np.where(array == math.inf, 0.0, array)), 0.0, strict=False)
+    return array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -34,7 +34,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     numbers from 1e100 on, or has other trailing axes.
     """
     plain = type(value) is np.ndarray and value.dtype == _FLOAT and value.shape[value.ndim - len(last) :] == last
-    array = value if plain else _converted(name, value, last)
+    array = value if plain else numeric(name, value, *last)
     # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
     # for a large one it would wake the threads of the linear algebra library.
     if not (np.vdot(array, array) < 1e200 if array.size <= 1000 else -1e100 < array.min() and array.max() < 1e100):
@@ -50,7 +50,8 @@ def masked(value) -> bool:
     return "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray)
 
 
-def _converted(name: str, value, last: tuple[int, ...]) -> np.ndarray:
+def numeric(name: str, value, *last: int) -> np.ndarray:
+    """`real_array` before the check that its numbers are finite."""
     if masked(value) and np.ma.is_masked(value):
         holes = np.ma.count_masked(value)
         raise ValueError(f"{name} is masked in {holes} of {value.size} entries; allowed: numbers (fill or drop them)")
