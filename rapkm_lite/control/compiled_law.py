@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,8 +14,6 @@ import numpy as np
 from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
 from .grammar import UNASKED, LawValue, check_asked, in_order
-
-SOURCES = ("desired", "measured", "true")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,23 +65,8 @@ class CompiledLaw(LawValue):
 
     def check(self) -> None:
         """Raise ValueError when the function does not take what a run gives it."""
-        given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
-        try:
-            signature = inspect.signature(self.function)
-        except ValueError:
-            return  # built-in functions have none
-        try:
-            signature.bind(*given)
-        except TypeError:
-            raise ValueError(
-                f"the law {self._name} takes {signature}; allowed with at = {self.at!r} and memory = {self.memory}: "
-                f"({', '.join(given)})"
-            ) from None
-        in_order(f"the law {self._name}", self.function, *given)
-
-    @property
-    def _name(self) -> str:
-        return getattr(self.function, "__name__", type(self.function).__name__)
+        more = ["at"] * (self.at is not None) + ["memory"] * (self.memory > 0)
+        in_order(repr(self), self.function, "t", "q_a", "qd_a", "d", *more)
 
     def step(self, memory, sample):
         check_asked(type(self), CompiledLaw)
@@ -98,7 +80,8 @@ class CompiledLaw(LawValue):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), desired, *given), memory
 
     def __repr__(self):
-        return f"compiled({self._name}, at={self.at!r}, memory={self.memory})"
+        name = getattr(self.function, "__name__", type(self.function).__name__)
+        return f"compiled({name}, at={self.at!r}, memory={self.memory})"
 
 
 def _function(module: str, name: str):
@@ -114,7 +97,7 @@ def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
 def _asked(at, memory) -> int:
     """The number of floats of a memory, where both arguments of `compiled` are what they may be."""
     if at is not None:
-        one_of("at", at, SOURCES)
+        one_of("at", at, ("desired", "measured", "true"))
     return whole_number("memory", memory, 0, 10**6)
 
 
