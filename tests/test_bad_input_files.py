@@ -363,18 +363,6 @@ def test_a_log_that_cannot_be_read_says_why(tmp_path):
         rk.write_log(rk.mystery_run("gain"), tmp_path / "missing" / "mine.csv")
 
 
-def test_the_long_header_of_a_log_of_many_drives_is_told_where_it_is_wrong(tmp_path):
-    file, header = tmp_path / "nine.csv", ["t in s"]
-    header += [f"q{i} {what} in rad" for what in ("measured", "desired") for i in range(1, 10)]
-    header += [f"c{i} in N m" for i in range(1, 10)]
-    header[12] = "q3 wished in rad"
-    file.write_text(",".join(header))
-    words = "column 13 holds 'q3 wished in rad'; allowed: the header t in s, q1 measured in rad, q2 measured in rad, "
-    words += "..., q2 desired in rad, q3 desired in rad, q4 desired in rad, ..."
-    with pytest.raises(ValueError, match=f"{re.escape(words)}$"):
-        rk.read_log(file)
-
-
 def dimension(unit):
     """Powers of kg, m, s and A in a unit, (4,)."""
     kg, m, s, ampere = np.eye(4)

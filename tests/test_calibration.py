@@ -781,7 +781,7 @@ HEADER = ",".join(
         ),
         (HEADER + "\n0,1,2,,1,2,3,0,0,0\n", "line 2, column 4"),
         (HEADER + "\n0,1,2,nan,1,2,3,0,0,0\n", "line 2, column 4"),
-        (HEADER + "\n" + 2 * "0,1,2,3,1,2,3,0,0,0\n", "line 3, column 1: time does not increase"),
+        (HEADER + "\n" + 2 * "0,1,2,3,1,2,3,0,0,0\n", "line 3, column 1: after 0 s comes 0 s"),
         (
             HEADER + "".join(f"\n{t},1,2,3,1,2,3,0,0,0" for t in (0.0, 0.1, 0.2, 0.5, 0.6)) + "\n",
             r"line 5, column 1: after 0.2 s comes 0.5 s, though records come every 0.1 s; allowed: a log without gaps",

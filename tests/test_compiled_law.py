@@ -475,7 +475,7 @@ def test_what_it_returns_instead_of_torques_is_told_without_names_of_types(kind,
 
 
 def test_arguments_are_counted_before_the_run():
-    message = r"compiled\(<lambda>, at=None, memory=0\) = .* cannot be called .* allowed: a function \(t, q_a, qd_a, d\)"
+    message = r"compiled\(<lambda>, at=None, memory=0\) = .* cannot be called .*: a function \(t, q_a, qd_a, d\)"
     with pytest.raises(ValueError, match=message):
         rk.simulate(ROBOT, rk.compiled(lambda t, q_a, qd_a: -q_a), PATH)
     with pytest.raises(ValueError, match=r"at='true', memory=2\) = .* \(t, q_a, qd_a, d, at, memory\)$"):

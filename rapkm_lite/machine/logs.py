@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import itertools
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -120,16 +119,13 @@ def write_log(log: Log, target: str | Path) -> None:
 def _check_times(path: Path, t: np.ndarray) -> None:
     """Time increases, and records come evenly, but for jitter: a rest with a hole in it may be two."""
     steps = np.diff(t)
-    late = np.flatnonzero(steps <= 0.0)
-    if len(late):
-        number = late[0] + 3
-        raise ValueError(f"the log {path.name!r}, line {number}, column 1: time does not increase; allowed: rising")
-    gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) if len(steps) else steps
-    if len(gaps):
-        k = gaps[0]
+    usual = np.median(steps) if len(steps) else 0.0
+    wrong = np.flatnonzero((steps <= 0.0) | (steps > 1.5 * usual))
+    if len(wrong):
+        k = wrong[0]
         raise ValueError(
             f"the log {path.name!r}, line {k + 3}, column 1: after {t[k]:g} s comes {t[k + 1]:g} s, though records "
-            f"come every {np.median(steps):g} s; allowed: a log without gaps, or one file for each part"
+            f"come every {usual:g} s; allowed: a log without gaps, or one file for each part"
         )
 
 
@@ -146,11 +142,8 @@ def _names(path: Path, header: list[str]) -> list[str]:
     for column, (name, want) in enumerate(itertools.zip_longest(names, wanted), 1):
         if name != want:
             got = "nothing" if name is None else short(name)
-            shown = (
-                wanted if len(wanted) < 28 else [*wanted[:3], "...", *wanted[max(column - 2, 3) : column + 1], "..."]
-            )
             raise ValueError(
-                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(shown)}"
+                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(wanted)}"
             )
     return wanted
 
@@ -185,9 +178,4 @@ def mystery_run(name: str) -> Log:
     Log('offset_a', 901 records, 9 s, 3 drives)
     """
     one_of("name", name, ("offset_a", "offset_b", "offset_c", "gain"))
-    return _mystery_run(name)
-
-
-@cache
-def _mystery_run(name: str) -> Log:
     return read_log(data_path(f"mystery_runs/{name}.csv"))

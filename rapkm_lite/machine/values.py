@@ -21,11 +21,11 @@ every array among all fields, in tuples and lists too.  What is computed on dema
 from __future__ import annotations
 
 import copy
-import ctypes
 import dataclasses
 import itertools
 from functools import cache, cached_property
 from reprlib import recursive_repr
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -81,28 +81,18 @@ def frozen(array) -> np.ndarray:
 
 
 def room(*sizes: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Arrays to write into once, before anybody else sees them; and the same arrays, read-only like those of `frozen`.
-
-    They are not initialized: all that is handed on has to be written.  The memory lives as long as the second ones.
+    """Zeros to write into once, before anybody else sees them; and the same arrays, read-only like those of `frozen`.
 
     >>> (write, _), (read, _) = room(2, 3)
     >>> write[:] = 1.0, 2.0
     >>> frozen(read) is read, read.tolist()
     (True, [1.0, 2.0])
     """
-    size = 8 * sum(sizes)
-    place = _unwritten(None, size)
-    read, write = np.frombuffer(place), np.frombuffer(_writable(place, size, _WRITE))
-    parts = [slice(end - part, end) for end, part in zip(itertools.accumulate(sizes), sizes, strict=True)]
+    read = np.frombuffer(bytes(8 * sum(sizes)))
+    place = read.__array_interface__
+    write = np.asarray(SimpleNamespace(of=read, __array_interface__=place | {"data": (place["data"][0], False)}))
+    parts = [slice(end - size, end) for end, size in zip(itertools.accumulate(sizes), sizes, strict=True)]
     return [write[part] for part in parts], [read[part] for part in parts]
-
-
-# An object of type bytes without contents, and a view of memory to write into.
-_unwritten = ctypes.pythonapi.PyBytes_FromStringAndSize
-_unwritten.restype, _unwritten.argtypes = ctypes.py_object, (ctypes.c_char_p, ctypes.c_ssize_t)
-_writable = ctypes.pythonapi.PyMemoryView_FromMemory
-_writable.restype, _writable.argtypes = ctypes.py_object, (ctypes.c_char_p, ctypes.c_ssize_t, ctypes.c_int)
-_WRITE = 0x200
 
 
 def _is_frozen(array: np.ndarray) -> bool:
