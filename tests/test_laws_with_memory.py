@@ -579,7 +579,7 @@ def test_a_formula_of_a_users_is_asked_or_refused():
     named = type("Named", (rk.PD,), {})(7.0, 0.2)
     assert_allclose(*(rk.simulate(ROBOT, rk.CommandFilter(pd), PATH, OFFSET).c for pd in (named, plain)), atol=1e-9)
     for more in (law, gained, Kicking(7.0, 0.2, 1e-3)):
-        with pytest.raises(ValueError, match="is more than its gains; allowed: PD, whose commands are filtered"):
+        with pytest.raises(ValueError, match="is not just a PD; allowed: PD, whose commands are filtered"):
             rk.CommandFilter(more)
 
 

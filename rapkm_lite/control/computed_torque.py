@@ -70,25 +70,26 @@ class APD(LawValue):
     def coordinates(self, memory):
         return self.independent
 
-    def _feedback(self, model, q, qd, q_a, qd_a, desired):
-        """Errors and desired motion of q2, its rate, and A: (e2, e2d, q2d^d, q2dd^d, q2d, A)."""
+    def _terms(self, model, q, qd, q_a, qd_a, desired):
+        """K_P e2 + K_D e2d, q2d^d, q2dd^d and q2d, then Gbar, Cbar, Qbar and (A^T)_W^+."""
         angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
         qd = np.asarray(qd, dtype=float)
         if self.independent is None:
-            xd = matvec(np.linalg.pinv(at(model, q).F), qd)
-            e, ed = forward_kinematics(model, q) - desired.x, xd - desired.xd
+            rate = matvec(np.linalg.pinv(at(model, q).F), qd)
+            motion = desired.xd, desired.xdd, rate
+            e, ed = forward_kinematics(model, q) - desired.x, rate - desired.xd
             e = np.broadcast_to(e, (*angles.shape[:-1], 2))  # one torque for each measurement, which do not enter
-            return e, ed, desired.xd, desired.xdd, xd, control_matrix(model, q)
-        j = list(joint_indices("independent", self.independent, model.n_joints))
-        e, ed = angles[..., j] - desired.q[..., j], rates[..., j] - desired.qd[..., j]
-        return e, ed, desired.qd[..., j], desired.qdd[..., j], qd[..., j], control_matrix(model, q, j)
+        else:
+            j = list(joint_indices("independent", self.independent, model.n_joints))
+            motion = desired.qd[..., j], desired.qdd[..., j], qd[..., j]
+            e, ed = angles[..., j] - desired.q[..., j], rates[..., j] - desired.qd[..., j]
+        feedback = matvec(positive_definite("K_P", self.K_P, 2), e) + matvec(positive_definite("K_D", self.K_D, 2), ed)
+        pinv = weighted_pseudoinverse(control_matrix(model, q, self.independent), self.W)
+        return feedback, *motion, *minimal_dynamics(model, q, qd, self.independent), pinv
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        e, ed, rate, acceleration, _, A = self._feedback(model, q, qd, q_a, qd_a, desired)
-        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
-        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
-        force = matvec(Gbar, acceleration) + matvec(Cbar, rate) + Qbar - matvec(K_P, e) - matvec(K_D, ed)
-        return matvec(weighted_pseudoinverse(A, self.W), force)
+        feedback, rate, acceleration, _, Gbar, Cbar, Qbar, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
+        return matvec(pinv, matvec(Gbar, acceleration) + matvec(Cbar, rate) + Qbar - feedback)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,11 +104,8 @@ class CTC(APD):
     """
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        e, ed, _, acceleration, rate, A = self._feedback(model, q, qd, q_a, qd_a, desired)
-        K_P, K_D = positive_definite("K_P", self.K_P, 2), positive_definite("K_D", self.K_D, 2)
-        Gbar, Cbar, Qbar = minimal_dynamics(model, q, qd, self.independent)
-        v = acceleration - matvec(K_D, ed) - matvec(K_P, e)
-        return matvec(weighted_pseudoinverse(A, self.W), matvec(Gbar, v) + matvec(Cbar, rate) + Qbar)
+        feedback, _, acceleration, rate, Gbar, Cbar, Qbar, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
+        return matvec(pinv, matvec(Gbar, acceleration - feedback) + matvec(Cbar, rate) + Qbar)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

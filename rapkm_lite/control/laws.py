@@ -186,12 +186,8 @@ class CommandFilter(LawValue):
 
     def __post_init__(self):
         self._check_pose()
-        if not isinstance(self.law, PD):
-            raise ValueError(f"law = {short(self.law)}; allowed: PD, whose commands are filtered")
-        if not _as_made(type(self.law), "step", "torque", "gains"):
-            raise ValueError(
-                f"law = {short(self.law)} is more than its gains; allowed: PD, whose commands are filtered"
-            )
+        if not isinstance(self.law, PD) or not _as_made(type(self.law), "step", "torque", "gains"):
+            raise ValueError(f"law = {short(self.law)} is not just a PD; allowed: PD, whose commands are filtered")
         super().__post_init__()
 
     def start(self, model, dt):
