@@ -610,7 +610,7 @@ def test_a_step_of_a_users_does_not_pass_by_a_formula_of_a_users():
         def __call__(self, *given):
             return 2.0 * super().__call__(*given)
 
-    with pytest.raises(ValueError, match=r"Called\.__call__ is of your own, but CompiledLaw\.step does not use it"):
+    with pytest.raises(ValueError, match=r"Called\.__call__ is of your own, but a run asks for step"):
         rk.simulate(ROBOT, Called(lambda t, q_a, qd_a, d: np.zeros(3)), PATH)
 
 

@@ -29,7 +29,7 @@ class CompiledLaw(LawValue):
     function: Callable
     at: str | None = None
     memory: int = 0
-    _unasked = UNASKED | {"__call__": "step"}
+    _unasked = UNASKED
 
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type | LawValue):

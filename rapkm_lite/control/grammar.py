@@ -28,6 +28,7 @@ from ..machine.arguments import (
     having,
     joint_indices,
     joint_vectors,
+    numeric,
     of_kind,
     one_of,
     positive_definite,
@@ -132,15 +133,15 @@ def begin(law, model: Manipulator, dt: float):
     Raises ValueError where a method of a user's law takes other arguments, or is one that no run would ask.
     """
     law = as_law(law)
-    check_asked(type(law), next((c for c in type(law).__mro__ if "step" in vars(c)), Law))
     nearest = next((c for c in type(law).__mro__ if {"step", "torque", "__call__"} & vars(c).keys()), Law)
     if not {"step", "torque"} & vars(nearest).keys():
         raise ValueError(f"{nearest.__name__}.__call__ is of your own, but a run asks for step; allowed: a step")
     if type(law).step is Law.step and law.pose is not None:
         one_of("pose", law.pose, ("measured", "true", None))
-    for name, given in _METHODS.items():
+    for name in ("start", "step", "coordinates", "torque"):
+        # A law that has a step of its own is not asked for its torque.
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
-            in_order(f"law.{name}", getattr(law, name), *given)
+            in_order(f"law.{name}", getattr(law, name), *list(inspect.signature(getattr(Law, name)).parameters)[1:])
     return law.start(model, dt)
 
 
@@ -172,15 +173,6 @@ def check_asked(kind: type, base: type) -> None:
             )
 
 
-_METHODS = {
-    "start": ("model", "dt"),
-    "step": ("memory", "sample"),
-    "coordinates": ("memory",),
-    "torque": ("model", "q", "qd", "q_a", "qd_a", "desired"),
-}
-"""What a run gives the methods of a law; `torque` only where the law has no step of its own."""
-
-
 def coordinates(law, memory) -> tuple[int, int] | None:
     """`Law.coordinates` of any law or callable.
 
@@ -205,14 +197,6 @@ class NotFinite(BadAnswer):
     """One torque per drive, but not all of them finite."""
 
 
-def _fits(c, shape: tuple) -> bool:
-    try:
-        c = np.asarray(c)
-    except (TypeError, ValueError):
-        return False
-    return c.shape == shape and c.dtype.kind in "iuf"
-
-
 def ask(law, memory, sample) -> tuple[np.ndarray, object]:
     """`step` of a law or callable, with an answer that fits: N finite torques, and the memory.
 
@@ -227,13 +211,17 @@ def ask(law, memory, sample) -> tuple[np.ndarray, object]:
         return c, memory
     if c is None:
         raise BadAnswer("law returned None; allowed: the drive torques c, an array (N,) in N m (is a return missing?)")
+    name = f"law(t = {sample.t:.4f} s, ...)"
     try:
-        c = real_array(f"law(t = {sample.t:.4f} s, ...)", c)
+        c = numeric(name, c)
     except ValueError as error:
-        raise (NotFinite if _fits(c, sample.q_a.shape) else BadAnswer)(str(error)) from None
+        raise BadAnswer(str(error)) from None
     if c.shape != sample.q_a.shape:
         raise BadAnswer(f"law returned the shape {c.shape}; allowed: {sample.q_a.shape}, one torque in N m per drive")
-    return c, memory
+    try:
+        return real_array(name, c), memory
+    except ValueError as error:
+        raise NotFinite(str(error)) from None
 
 
 class LawValue(Law, Value):
