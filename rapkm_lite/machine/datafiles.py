@@ -8,23 +8,22 @@ from pathlib import Path
 
 from .arguments import of_kind, short
 
-UNITS = {
-    "base": "m",
-    "lengths": "m",
-    "masses": "kg",
-    "centers": "m",
-    "inertias": "kg m^2",
-    "rotor_inertia": "kg m^2",
-    "resistance": "ohm",
-    "torque_constant": "N m/A",
-    "friction": "N m",
-    "friction_velocity": "rad/s",
-    "gravity": "m/s^2",
-    "load": "kg",
-    "mode": "1",
-}
 UNITS_OF = {
-    "manipulator": UNITS,
+    "manipulator": {
+        "base": "m",
+        "lengths": "m",
+        "masses": "kg",
+        "centers": "m",
+        "inertias": "kg m^2",
+        "rotor_inertia": "kg m^2",
+        "resistance": "ohm",
+        "torque_constant": "N m/A",
+        "friction": "N m",
+        "friction_velocity": "rad/s",
+        "gravity": "m/s^2",
+        "load": "kg",
+        "mode": "1",
+    },
     "control": {"K_P": "N m/rad", "K_D": "N m s/rad", "dt": "s"},
     "path": {"side": "m", "duration": "s", "centre": "m", "angle": "rad", "rest": "s"},
     "sensor": {"offset": "rad", "encoder": "1", "velocity_filter": "s"},
@@ -84,12 +83,9 @@ def read_toml(source: str | Path) -> dict:
     try:
         # Editors may write a byte order mark before the first line.
         tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise _unread(path, f"cannot be read ({error.strerror})") from None
-    except RecursionError:
-        raise _unread(path, "is nested too deeply") from None
-    except ValueError as error:  # also a NUL in the path, and numbers of more digits than Python reads
-        raise _unread(path, f"is not valid TOML: {error}") from None
+    except (OSError, RecursionError, ValueError) as error:  # the last ones also for a NUL in the path
+        words = f"cannot be read ({error.strerror})" if isinstance(error, OSError) else f"is not valid TOML: {error}"
+        raise ValueError(f"source: the file {short(str(path))} {words}; allowed: a TOML file") from None
     known("TOML table", tables, ["name", "about", *UNITS_OF])
     return {key: _table(key, value) for key, value in tables.items()}
 
@@ -111,10 +107,6 @@ def _entries(name: str, values) -> dict:
             words = f"which is not known here{hint}; allowed: a number in the unit of its class"
             raise ValueError(f"{key} in [[fault]] has the unit {short(value['unit'])}, {words}")
     return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
-
-
-def _unread(path: Path, words: str) -> ValueError:
-    return ValueError(f"source: the file {short(str(path))} {words}; allowed: a TOML file")
 
 
 def _plain(key: str, value, unit: str | None):

@@ -21,7 +21,7 @@ from .arguments import (
     shaped,
     short,
 )
-from .datafiles import UNITS, known, read_toml
+from .datafiles import UNITS_OF, known, read_toml
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
 
@@ -257,7 +257,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """
     tables = read_toml(source)
     values = tables.get("manipulator", {})
-    known("TOML key", values, UNITS)
+    known("TOML key", values, UNITS_OF["manipulator"])
     for key in ("base", "lengths", "masses"):
         if key not in values:
             raise ValueError(f"the table [manipulator] of {str(source)!r} lacks {key!r}; needed: base, lengths, masses")
