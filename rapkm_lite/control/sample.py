@@ -57,14 +57,8 @@ class Sample:
         of_kind("keeper", keeper, Controller, "the Controller that makes the samples")
         self._fill(keeper, *one_instant(keeper.model, t, q_a, qd_a, desired, truth))
 
-    @classmethod
-    def _made(cls, *known) -> Sample:
-        """A sample of what was checked before."""
-        sample = object.__new__(cls)
-        sample._fill(*known)
-        return sample
-
-    def _fill(self, keeper: Controller, t, q_a, qd_a, desired, truth):
+    def _fill(self, keeper: Controller, t, q_a, qd_a, desired, truth) -> None:
+        """Take what was checked before."""
         self.__dict__.update(
             t=t, dt=keeper.dt, model=keeper.model, q_a=q_a, qd_a=qd_a, desired=desired,
             _keeper=keeper, _truth=truth, _found={},
@@ -169,5 +163,7 @@ class Controller:
 
     def command(self, t, q_a, qd_a, desired, truth=None) -> np.ndarray:
         """What a call of the controller returns, without its check of the measurement."""
-        c, self.memory = ask(self.law, self.memory, Sample._made(self, t, q_a, qd_a, desired, truth))
+        sample = Sample.__new__(Sample)
+        sample._fill(self, t, q_a, qd_a, desired, truth)
+        c, self.memory = ask(self.law, self.memory, sample)
         return c

@@ -11,6 +11,7 @@ from ..machine.arguments import (
     joint_indices,
     joint_vectors,
     real_array,
+    shaped,
     solve,
     tall_matrix,
     wide_matrix,
@@ -67,8 +68,7 @@ def effective_gain(F, K) -> np.ndarray:
     F = tall_matrix("F", F)
     n = F.shape[-2]
     K = real_array("K", K)
-    if K.shape[-2:] not in ((), (n, n)):
-        raise ValueError(f"K has shape {K.shape}; allowed: one number or (..., {n}, {n})")
+    shaped("K", K, K.shape[-2:] in ((), (n, n)), f"one number or (..., {n}, {n})")
     K = K * np.eye(n) if K.ndim == 0 else K
     check_leading(F=F.shape[:-2], K=K.shape[:-2])
     Q, R = full_rank("F", F, "its columns are not independent; allowed: one column for each degree of freedom")
