@@ -13,7 +13,7 @@ import numpy as np
 
 from ..machine.arguments import one_of, short, whole_number
 from ..mechanics.at import at as at_pose
-from .grammar import UNASKED, LawValue, check_asked, in_order
+from .grammar import LawValue, check_asked, in_order
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +29,6 @@ class CompiledLaw(LawValue):
     function: Callable
     at: str | None = None
     memory: int = 0
-    _unasked = UNASKED
 
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type | LawValue):

@@ -33,7 +33,7 @@ from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matri
 from ..mechanics.kinematics import forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
 from ..mechanics.trajectory import Desired
-from .grammar import UNASKED, LawValue, check_asked, gain, joint_gain, measured, seen
+from .grammar import LawValue, check_asked, gain, joint_gain, measured, seen
 
 _TIE = 1.0 + 1e-9
 """Ratio of two measures above which rounding does not decide which pair is better."""
@@ -125,7 +125,6 @@ class SwitchedCTC(LawValue):
     K_D: Array
     hysteresis: float = 1.2
     pose: str = "measured"
-    _unasked = UNASKED | {"pairs": "choose"}
 
     def __post_init__(self):
         self._check_pose()
@@ -133,7 +132,7 @@ class SwitchedCTC(LawValue):
         super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), hysteresis=float(hysteresis))
 
     def step(self, memory, sample):
-        check_asked(type(self), SwitchedCTC)
+        check_asked(type(self), SwitchedCTC, pairs="choose")
         q, qd = seen(sample).pose(self.pose)
         pair = self.choose(sample.model, q, memory)
         return self.fixed(pair).torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), pair
@@ -265,7 +264,6 @@ def _joint_state(model, q, qd, q_a, qd_a, desired) -> tuple[np.ndarray, np.ndarr
     N = manipulator(model, "model").n_arms
     q, qd = joint_vectors(model.n_joints, q=q, qd=qd)
     q_a, qd_a = measured(model, q_a, qd_a, desired)
-    parts = {"q": q[..., N:], "qd": qd[..., N:], "q_a": q_a, "qd_a": qd_a}
-    lead = check_leading(**{name: part.shape[:-1] for name, part in parts.items()})
-    elbows, rates, q_a, qd_a = (np.broadcast_to(part, (*lead, N)) for part in parts.values())
+    lead = check_leading(q=q.shape[:-1], qd=qd.shape[:-1], q_a=q_a.shape[:-1], qd_a=qd_a.shape[:-1])
+    elbows, rates, q_a, qd_a = (np.broadcast_to(part, (*lead, N)) for part in (q[..., N:], qd[..., N:], q_a, qd_a))
     return np.concatenate([q_a, elbows], axis=-1), np.concatenate([qd_a, rates], axis=-1)

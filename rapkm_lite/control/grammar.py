@@ -17,7 +17,7 @@ import inspect
 import math
 from collections.abc import Callable
 from reprlib import recursive_repr
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -40,9 +40,6 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from ..mechanics.trajectory import Desired
 
-UNASKED = {"torque": "step"}
-"""Formulas that the step of a law with more than a formula does not use, and what is asked instead."""
-
 
 class Law:
     """Base of all laws, also of those that users write.
@@ -63,7 +60,6 @@ class Law:
     """
 
     pose: str | None = "measured"
-    _unasked: ClassVar[dict[str, str]] = {}
 
     def start(self, model: Manipulator, dt: float):
         """The memory at the beginning of a run with this model, sampled every dt in s."""
@@ -80,10 +76,8 @@ class Law:
         Raises NotImplementedError for laws that have none without a memory, such as `PID`, functions, and a filter
         around either; ValueError for open loops and at singularities of the law, where it uses the pose.
         """
-        alone = type(self).start is Law.start and type(self).step is Law.step
-        no = "gives neither torque nor step; needed: one of them"
-        unasked = "has no torque without its memory; needed: start and step, as in simulate"
-        raise NotImplementedError(f"{short(self)} {no if alone else unasked}")
+        needed = "a class that gives torque, or one that gives step, and a run to ask it"
+        raise NotImplementedError(f"{short(self)} has no torque; needed: {needed}")
 
     def coordinates(self, memory) -> tuple[int, int] | None:
         """The two independent joints that the law works in, given its memory; None where it has none."""
@@ -157,12 +151,13 @@ def in_order(name: str, function, *given: str) -> None:
         raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: ({', '.join(given)})")
 
 
-def check_asked(kind: type, base: type) -> None:
+def check_asked(kind: type, base: type, **unasked: str) -> None:
     """Raise ValueError where a user's class has a formula of its own that the step of `base` does not use.
 
+    unasked : such formulas besides `torque`, and what is asked instead.
     A step of the user's may ask that of a law of the package: a class that has both a formula and a step knows of it.
     """
-    for name, instead in vars(base).get("_unasked", {}).items():
+    for name, instead in {"torque": "step", **unasked}.items():
         if getattr(kind, name) is getattr(base, name):
             continue
         owner = next(c for c in kind.__mro__ if name in vars(c))

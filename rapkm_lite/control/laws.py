@@ -22,7 +22,7 @@ from ..machine.manipulator import manipulator
 from ..machine.values import Array, OptionalArray, default
 from ..mechanics.actuation import control_matrix, weighted_pseudoinverse
 from ..mechanics.antagonism import antagonism_filter, command_filter
-from .grammar import UNASKED, LawLike, LawValue, as_law, ask, begin, check_asked, coordinates, gain, measured, seen
+from .grammar import LawLike, LawValue, as_law, ask, begin, check_asked, coordinates, gain, measured, seen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,7 +86,6 @@ class PID(LawValue):
     K_D: Array
     limit: Array = default(math.inf)
     pose = None
-    _unasked = UNASKED
 
     def __post_init__(self):
         self._set(K_P=gain("K_P", self.K_P), K_I=gain("K_I", self.K_I, zero=True), K_D=gain("K_D", self.K_D))
@@ -141,7 +140,6 @@ class AntagonismFilter(LawValue):
     law: LawLike
     pose: str = "measured"
     W: OptionalArray = default(None)
-    _unasked = UNASKED
 
     def __post_init__(self):
         self._check_pose()
