@@ -469,9 +469,9 @@ def test_a_step_must_answer_with_the_torques_and_the_memory():
 
     with pytest.raises(ValueError, match=r"Half.step returned .* allowed: the pair \(c, memory\)"):
         rk.simulate(ROBOT, Half(), PATH)
-    with pytest.raises(NotImplementedError, match=r"PID.* has no torque; needed: .* one that gives step, and a run to ask it"):
+    with pytest.raises(NotImplementedError, match=r"PID.* has no torque; needed: .* step, and a run to ask it"):
         rk.PID(7.0, 1.0, 0.2).torque(ROBOT, None, None, None, None, None)
-    with pytest.raises(NotImplementedError, match="has no torque; needed: a class that gives torque, or one that gives step"):
+    with pytest.raises(NotImplementedError, match="has no torque; needed: a class that gives torque, or one"):
         rk.simulate(ROBOT, rk.Law(), PATH)
     elsewhere = type("Elsewhere", (rk.Law,), {"pose": "desired", "torque": lambda self, *known: np.zeros(3)})
     with pytest.raises(ValueError, match=r"pose = 'desired'; allowed: 'measured', 'true', None"):

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..machine.arguments import one_of, short, whole_number
+from ..machine.arguments import callable_with, one_of, short, whole_number
 from ..mechanics.at import at as at_pose
-from .grammar import LawValue, check_asked, in_order
+from .grammar import LawValue, check_asked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +65,7 @@ class CompiledLaw(LawValue):
     def check(self) -> None:
         """Raise ValueError when the function does not take what a run gives it."""
         more = ["at"] * (self.at is not None) + ["memory"] * (self.memory > 0)
-        in_order(repr(self), self.function, "t", "q_a", "qd_a", "d", *more)
+        callable_with(repr(self), self.function, "t", "q_a", "qd_a", "d", *more)
 
     def step(self, memory, sample):
         check_asked(type(self), CompiledLaw)

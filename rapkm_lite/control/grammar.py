@@ -100,7 +100,7 @@ class Function(Law):
 
     def start(self, model, dt):
         """A function that cannot be called so is refused before the run."""
-        in_order("law", self.function, "t", "q_a", "qd_a", "desired")
+        callable_with("law", self.function, "t", "q_a", "qd_a", "desired")
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
@@ -135,20 +135,9 @@ def begin(law, model: Manipulator, dt: float):
     for name in ("start", "step", "coordinates", "torque"):
         # A law that has a step of its own is not asked for its torque.
         if hasattr(law, name) and not (name == "torque" and getattr(type(law), "step", None) is not Law.step):
-            in_order(f"law.{name}", getattr(law, name), *list(inspect.signature(getattr(Law, name)).parameters)[1:])
+            _, *given = inspect.signature(getattr(Law, name)).parameters
+            callable_with(f"law.{name}", getattr(law, name), *given)
     return law.start(model, dt)
-
-
-def in_order(name: str, function, *given: str) -> None:
-    """Raise ValueError where a function does not take these arguments by position, or has them in another order."""
-    callable_with(name, function, *given)
-    try:
-        parameters = inspect.signature(function, follow_wrapped=False).parameters.values()
-        told = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
-    except (TypeError, ValueError):
-        return  # built-in functions have none
-    if any(own in given and own != place for own, place in zip(told, given, strict=False)):
-        raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: ({', '.join(given)})")
 
 
 def check_asked(kind: type, base: type, **unasked: str) -> None:

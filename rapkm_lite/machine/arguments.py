@@ -139,12 +139,12 @@ def bounded(name: str, array: np.ndarray, low: float, *, strict: bool) -> np.nda
 
     Above zero means 1e-100 at least: what is divided by less may leave a function as infinity.
     """
-    bad = array < low if not strict else array < _LEAST if low == 0.0 else array <= low
+    bad = array < (_LEAST if strict else low)
     if np.any(bad):
         where = np.argwhere(bad)[0]
-        number, sign = array[tuple(where)], ">" if strict else ">="
-        least = f", from {_LEAST:g} on" if strict and number > low else ""
-        raise ValueError(f"{name}{entry(where)} = {number:g}; allowed: {sign} {low:g}{least}")
+        number = array[tuple(where)]
+        allowed = f"> 0, from {_LEAST:g} on" if strict and number > 0.0 else "> 0" if strict else f">= {low:g}"
+        raise ValueError(f"{name}{entry(where)} = {number:g}; allowed: {allowed}")
     return array
 
 
@@ -234,14 +234,19 @@ def function(name: str, value: Any) -> Any:
 
 
 def callable_with(name: str, value: Any, *given: str) -> Any:
-    """Return `value` when it can be called with the arguments `given`, by position."""
+    """Return `value` when it can be called with the arguments `given`, by position, and has none of them elsewhere."""
+    allowed = f"({', '.join(given)})"
     try:
         inspect.signature(value).bind(*given)
+        parameters = inspect.signature(value, follow_wrapped=False).parameters.values()
     except TypeError as error:
         words = f"{name} = {short(value)} cannot be called ({error})"
-        raise ValueError(f"{words}; allowed: a function ({', '.join(given)})") from None
+        raise ValueError(f"{words}; allowed: a function {allowed}") from None
     except ValueError:
-        pass  # built-in functions have no signature
+        return value  # built-in functions have no signature
+    told = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
+    if any(own in given and own != place for own, place in zip(told, given, strict=False)):
+        raise ValueError(f"{name} takes ({', '.join(told)}), in another order; allowed: {allowed}")
     return value
 
 
