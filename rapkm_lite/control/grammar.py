@@ -77,7 +77,7 @@ class Law:
         around either; ValueError for open loops and at singularities of the law, where it uses the pose.
         """
         needed = "a class that gives torque, or one that gives step, and a run to ask it"
-        raise NotImplementedError(f"{short(self)} has no torque; needed: {needed}")
+        raise NotImplementedError(f"{short(getattr(self, 'function', self))} has no torque; needed: {needed}")
 
     def coordinates(self, memory) -> tuple[int, int] | None:
         """The two independent joints that the law works in, given its memory; None where it has none."""
@@ -104,10 +104,6 @@ class Function(Law):
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
-
-    def torque(self, model, q, qd, q_a, qd_a, desired):
-        given = f"law = {short(self.function)} is a function of time, which torque is not told"
-        raise NotImplementedError(f"{given}; needed: a law with a torque, or a run")
 
 
 def as_law(law) -> Law:

@@ -67,9 +67,8 @@ def numeric(name: str, value, *last: int) -> np.ndarray:
         raise ValueError(f"{name} = {short(value)} is too large; allowed: finite numbers, below 1e100") from None
     except Exception:
         raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers") from None
-    if last and array.shape[-len(last) :] != last:
-        raise ValueError(f"{name} has shape {array.shape}; allowed: ({', '.join(['...', *map(str, last)])})")
-    return array
+    fits = not last or array.shape[-len(last) :] == last
+    return shaped(name, array, fits, f"({', '.join(['...', *map(str, last)])})")
 
 
 def shaped(name: str, array: np.ndarray, fits: bool, allowed: Any) -> np.ndarray:
@@ -135,15 +134,13 @@ def sized(name: str, array: np.ndarray) -> np.ndarray:
 
 
 def bounded(name: str, array: np.ndarray, low: float, *, strict: bool) -> np.ndarray:
-    """Return `array` when every entry is above `low` (not below it when `strict` is false).
-
-    Above zero means 1e-100 at least: what is divided by less may leave a function as infinity.
-    """
+    """Return `array` when no entry is below `low`, or when `strict`, where `low` is zero, all are above it."""
+    # By 1e-100 at least: what is divided by less may leave a function as infinity.
     bad = array < (_LEAST if strict else low)
     if np.any(bad):
         where = np.argwhere(bad)[0]
         number = array[tuple(where)]
-        allowed = f"> 0, from {_LEAST:g} on" if strict and number > 0.0 else "> 0" if strict else f">= {low:g}"
+        allowed = f">= {low:g}" if not strict else f"> 0, from {_LEAST:g} on" if number > 0.0 else "> 0"
         raise ValueError(f"{name}{entry(where)} = {number:g}; allowed: {allowed}")
     return array
 
@@ -228,9 +225,7 @@ def of_kind(name: str, value: Any, kind, allowed: str) -> Any:
 
 def function(name: str, value: Any) -> Any:
     """Return `value` when it can be called, and is no class."""
-    if not callable(value) or isinstance(value, type):
-        raise ValueError(f"{name} = {short(value)}; allowed: a function")
-    return value
+    return having(name, value, "a function", "__call__")
 
 
 def callable_with(name: str, value: Any, *given: str) -> Any:
@@ -240,8 +235,7 @@ def callable_with(name: str, value: Any, *given: str) -> Any:
         inspect.signature(value).bind(*given)
         parameters = inspect.signature(value, follow_wrapped=False).parameters.values()
     except TypeError as error:
-        words = f"{name} = {short(value)} cannot be called ({error})"
-        raise ValueError(f"{words}; allowed: a function {allowed}") from None
+        raise ValueError(f"{name} = {short(value)} cannot be called ({error}); allowed: a function {allowed}") from None
     except ValueError:
         return value  # built-in functions have no signature
     told = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
