@@ -215,24 +215,20 @@ class RedundantAPD(LawValue):
         projected = switch("projected", self.projected)
         super().__post_init__(K_P=gain("K_P", self.K_P), K_D=gain("K_D", self.K_D), projected=projected)
 
-    def _feedback(self, model, q, qd, q_a, qd_a, desired):
-        """K_P e + K_D ed in all joints, and (A~^T)^+."""
+    def _terms(self, model, q, qd, q_a, qd_a, desired):
+        """K_P e + K_D ed in all joints, then inertia, velocity terms and forces of the line in use, and (A~^T)^+."""
         angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
         K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
         feedback = matvec(K_P, angles - desired.q) + matvec(K_D, rates - desired.qd)
         A_tilde = redundant_control_matrix(model, q)
-        return feedback, explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
-
-    def _terms(self, model, q, qd):
-        """Inertia, velocity terms and forces of the line in use."""
+        pinv = explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
         if self.projected:
-            return redundant_dynamics(model, q, qd)
+            return feedback, *redundant_dynamics(model, q, qd), pinv
         # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
-        return mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd)
+        return feedback, mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd), pinv
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
-        G, C, Q = self._terms(model, q, qd)
+        feedback, G, C, Q, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
         return matvec(pinv, matvec(G, desired.qdd) + matvec(C, desired.qd) + Q - feedback)
 
 
@@ -254,8 +250,7 @@ class RedundantCTC(RedundantAPD):
     """
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
-        feedback, pinv = self._feedback(model, q, qd, q_a, qd_a, desired)
-        G, C, Q = self._terms(model, q, qd)
+        feedback, G, C, Q, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
         return matvec(pinv, matvec(G, desired.qdd - feedback) + matvec(C, np.asarray(qd, dtype=float)) + Q)
 
 
