@@ -82,10 +82,9 @@ class Manipulator(Value):
         given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
         if np.any((given["centers"] < 0.0) | (given["centers"] > lengths)):
             raise ValueError(f"centers = {short(given['centers'].tolist())} m; allowed: on the link, 0 to its length")
-        for key in ("rotor_inertia", "friction"):
-            given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=False)
-        for key in ("resistance", "torque_constant"):
-            given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=True)
+        for key in ("rotor_inertia", "friction", "resistance", "torque_constant"):
+            strict = key in ("resistance", "torque_constant")
+            given[key] = bounded(key, drive_values(key, getattr(self, key), N), 0.0, strict=strict)
         given["gravity"] = exact_array("gravity", self.gravity, 2)
         given["friction_velocity"] = positive_number("friction_velocity", self.friction_velocity)
         given["load"] = float(bounded("load", exact_array("load", self.load), 0.0, strict=False))

@@ -117,12 +117,11 @@ def _frozen(value):
 class Value:
     """Base of the frozen dataclasses of this package: read-only arrays, compared by value, printed as typed.
 
-    `frozen` copies of the caller's arrays are kept, so neither side can change the other's; that also holds after
-    pickling, ``copy.copy`` and ``copy.deepcopy``.  (One thing NumPy allows with a read-only array: ``a.shape = ...``
-    gives it another shape in place, and so changes the value; use ``a.reshape``.)  Two values are equal when they have
-    the same type and equal fields (equal shapes and numbers; NaN equals NaN; functions and objects of a user as
-    `likeness.equal` says); equal values have equal hashes, computed once.  What a user's class sets besides its fields
-    is compared, copied and printed with them, and stays as it is.
+    `frozen` copies of the caller's arrays are kept, also by pickling and copying, so neither side can change the
+    other's.  (One thing NumPy allows with a read-only array: ``a.shape = ...`` gives it another shape in place, and so
+    changes the value; use ``a.reshape``.)  Values of one type are equal when their fields are, as `likeness.equal`
+    says; equal values have equal hashes, computed once.  What a user's class sets besides its fields is compared,
+    copied and printed with them, and stays as it is.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -146,14 +145,12 @@ class Value:
         """Refuse a value in the body of a user's class that is meant for a field, which kept its default."""
         for field in dataclasses.fields(self) if _names(type(self)) else ():
             own = getattr(type(self), field.name, field.default)
-            if own is field.default or hasattr(type(own), "__set__"):  # a property sets what it likes
-                continue
+            untyped = own is not field.default and not hasattr(type(own), "__set__")  # a property sets what it likes
             value = getattr(self, field.name, own)
-            if _same(value, field.default) and not _same(value, own):
+            if untyped and _same(value, field.default) and not _same(value, own):
                 raise ValueError(
                     f"{type(self).__name__}.{field.name} = {short(own)} in the body of the class does not reach the "
-                    f"field, which is {_typed(value)}; allowed: to give {field.name} when the value is made, or "
-                    f"`{field.name}: type = ...` in a class under @dataclass(frozen=True)"
+                    f"field; allowed: `{field.name}: type = ...` in a class under @dataclass(frozen=True)"
                 )
 
     def _checked(self, name: str, value):
