@@ -1,14 +1,9 @@
 """The grammar of laws: what a law is asked, and what it may remember.
 
-A law maps what a controller knows to drive torques.  Two ways to ask it:
-
-``law.torque(model, q, qd, q_a, qd_a, desired)`` is the formula: pose and rate on V (..., 2N), measured base angles and
-rates (..., N), desired motion; one instant or many.  `model` is the controller's own manipulator.
-
-``law.start(model, dt) -> memory`` and ``law.step(memory, sample) -> (c, memory)`` are the law at work, sampled every
-dt: what it remembers is in `memory` and nowhere else.  A law without memory inherits both.
-
-Errors are measured minus desired.
+A law maps what a controller knows to drive torques.  Two ways to ask it: `Law.torque` is the formula, for one instant
+or many; `Law.start` and `Law.step` are the law at work, sampled every dt: what it remembers is in `memory` and nowhere
+else.  A law without memory inherits both.  `model` is the controller's own manipulator; errors are measured minus
+desired.
 """
 
 from __future__ import annotations
@@ -71,7 +66,8 @@ class Law:
         return self.torque(sample.model, q, qd, sample.q_a, sample.qd_a, sample.desired), memory
 
     def torque(self, model: Manipulator, q, qd, q_a, qd_a, desired: Desired) -> np.ndarray:
-        """Drive torques c (..., N) in N m at a pose of the model, q, qd, measured q_a, qd_a, and a desired motion.
+        """Drive torques c (..., N) in N m at a pose of the model, q, qd (..., 2N), measured q_a, qd_a (..., N), and a
+        desired motion.
 
         Raises NotImplementedError for laws that have none without a memory, such as `PID`, functions, and a filter
         around either; ValueError for open loops and at singularities of the law, where it uses the pose.
