@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-import importlib
+import pkgutil
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -87,7 +85,7 @@ class CompiledLaw(LawValue):
 
 def _function(module: str, name: str):
     """The function of a module, also where its name stands for the law that a decorator made of it."""
-    found: Any = functools.reduce(getattr, name.split("."), importlib.import_module(module))
+    found = pkgutil.resolve_name(f"{module}:{name}")
     return found.function if isinstance(found, CompiledLaw) else found
 
 

@@ -60,9 +60,8 @@ def data_path(name: str) -> Path:
 def _data_file(argument: str, value, name) -> Path:
     """A file of the folder data; the sentence names the argument that asks for it."""
     here = Path(__file__).resolve().parents[1]
-    files: dict[str, Path] = {}
-    for folder in (here.parent / "data", here / "data"):
-        files |= {p.relative_to(folder).as_posix(): p for p in folder.rglob("*.*") if p.is_file()}
+    folders = here.parent / "data", here / "data"
+    files = {p.relative_to(f).as_posix(): p for f in folders for p in f.rglob("*.*") if p.is_file()}
     if isinstance(name, str) and name in files:
         return files[name]
     ours = sorted(k for k in files if k.endswith((".toml", ".csv")) and "/" not in k)
