@@ -38,9 +38,7 @@ def real_array(name: str, value, *last: int) -> np.ndarray:
     # Beyond 1e100 products would overflow and leave a function as infinity or NaN.  One product clears a small array;
     # for a large one it would wake the threads of the linear algebra library.
     if not (np.vdot(array, array) < 1e200 if array.size <= 1000 else -1e100 < array.min() and array.max() < 1e100):
-        fine = np.abs(array) < 1e100
-        if not np.all(fine):
-            bad = np.argwhere(~fine)[0]
+        for bad in np.argwhere(~(np.abs(array) < 1e100)):
             raise ValueError(f"{name}{entry(bad)} = {array[*bad]}; allowed: finite numbers, below 1e100 in magnitude")
     return array
 
@@ -67,8 +65,9 @@ def numeric(name: str, value, *last: int) -> np.ndarray:
         raise ValueError(f"{name} = {short(value)} is too large; allowed: finite numbers, below 1e100") from None
     except Exception:
         raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers") from None
-    fits = not last or array.shape[-len(last) :] == last
-    return shaped(name, array, fits, f"({', '.join(['...', *map(str, last)])})")
+    if last and array.shape[-len(last) :] != last:
+        raise ValueError(f"{name} has shape {array.shape}; allowed: ({', '.join(['...', *map(str, last)])})")
+    return array
 
 
 def shaped(name: str, array: np.ndarray, fits: bool, allowed: Any) -> np.ndarray:
