@@ -273,9 +273,9 @@ def test_values():
         rk.compiled(ctc, memory=-1)
     with pytest.raises(ValueError, match=r"function = compiled\(pid, .*\); allowed: \(t, q_a, qd_a, d"):
         rk.compiled(pid, memory=3)
-    for wrong in ({"at": "nowhere"}, {"memory": 10**7}):
+    for wrong in ({"at": "nowhere"}, {"memory": 10**7}):  # at once, before there is a function
         with pytest.raises(ValueError, match=f"{next(iter(wrong))} = .*; allowed"):
-            rk.compiled(**wrong)(ctc)
+            rk.compiled(**wrong)
     rk.compiled(max).check()  # a built-in function, which has no signature
     poses = {source: rk.compiled(ctc, at=source).pose for source in ("desired", "measured", "true", None)}
     assert poses == {"desired": None, "measured": "measured", "true": "true", None: None}  # what a run has to find

@@ -31,9 +31,7 @@ class CompiledLaw(LawValue):
     def __post_init__(self):
         if not callable(self.function) or isinstance(self.function, type | LawValue):
             raise ValueError(f"function = {short(self.function)}; allowed: (t, q_a, qd_a, d[, at][, memory]) -> c")
-        if self.at is not None:
-            one_of("at", self.at, ("desired", "measured", "true"))
-        super().__post_init__(memory=whole_number("memory", self.memory, 0, 10**6))
+        super().__post_init__(memory=_asked(self.at, self.memory))
 
     @property
     def pose(self):
@@ -93,6 +91,13 @@ def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
     return CompiledLaw(_function(module, name), at, memory)
 
 
+def _asked(at, memory) -> int:
+    """The number of floats of a memory, where both arguments of `compiled` are what they may be."""
+    if at is not None:
+        one_of("at", at, ("desired", "measured", "true"))
+    return whole_number("memory", memory, 0, 10**6)
+
+
 def compiled(function=None, *, at: str | None = None, memory: int = 0):
     """Decorator: a law of yours runs inside the compiled loop, some fifty times as fast as in Python, more with `at`.
 
@@ -126,5 +131,6 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     compiled(pi, at=None, memory=3)
     """
     if function is None:
+        _asked(at, memory)
         return lambda f: CompiledLaw(f, at, memory)
     return CompiledLaw(function, at, memory)
