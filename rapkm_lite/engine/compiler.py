@@ -102,11 +102,8 @@ ITEMS = {operator.getitem: _take, operator.setitem: _put}
 
 
 class Processor(CPUContext):
-    """Numba's context of the processor, with items of flat arrays at hand, builtins that are looked up once, and vector
-    registers of 512 bits: on processors of Intel Numba stops at 256, with which runs side by side take a third longer.
-    """
-
-    known: ClassVar[dict] = {}
+    """Numba's context of the processor, with items of flat arrays at hand and vector registers of 512 bits: on
+    processors of Intel Numba stops at 256, with which runs side by side take a third longer."""
 
     def __init__(self, target):
         target.refresh()
@@ -125,17 +122,7 @@ class Processor(CPUContext):
         word = getattr(fn, "typing_key", None)
         if word in ITEMS and _flat(*sig.args[:2]):
             return lambda builder, values, loc=None: ITEMS[word](self, builder, sig.args, values)
-        if not isinstance(word, BuiltinFunctionType):
-            return super().get_function(fn, sig, _firstcall)
-        key = word, sig.args, sig.return_type
-        if key not in self.known:
-            self.known[key] = super().get_function(fn, sig, _firstcall)._imp
-
-        def apply(builder, values, loc=None):
-            self.add_linking_libs(getattr(self.known[key], "libs", ()))
-            return self.known[key](self, builder, sig, values, loc=loc)
-
-        return apply
+        return super().get_function(fn, sig, _firstcall)
 
 
 def _flat(array, index):
