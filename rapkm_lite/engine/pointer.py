@@ -16,15 +16,12 @@ Wanted = namedtuple("Wanted", "x xd xdd q qd qdd q_a qd_a qdd_a")
 Matrices = namedtuple("Matrices", MATRICES)
 
 
-def matrix_room(N: int) -> int:
-    """How many numbers the matrices of `engine.user` take, and the intermediate ones after them."""
-    n, r = 2 * N, 2 * N - 2
-    return 4 + 2 * n + 4 * n + 4 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + 2 * N * n + 10 * n
-
-
 def places(N: int, matrices: bool, memory: int) -> tuple[int, int, int]:
     """Where the buffer of `engine.user` holds memory and answer, and its length."""
-    start = 7 + 8 * N + (matrix_room(N) if matrices else 0)
+    n, r = 2 * N, 2 * N - 2
+    # The matrices, and ten columns of intermediate numbers after them.
+    room = 4 + 2 * n + 4 * n + 2 * N + 2 * r * n + 4 * n * n + n + 10 + 2 * n * n + n + N * n + 10 * n
+    start = 7 + 8 * N + (room if matrices else 0)
     return start, start + memory, start + memory + N
 
 
@@ -88,7 +85,6 @@ def _pointer(function, N: int, matrices: bool, memory: int):
         q, qd = buffer[o : o + n], buffer[o + n : o + 2 * n]
         F, o = take(buffer, o + 2 * n, n, 2)
         F_dot, o = take(buffer, o, n, 2)
-        A, o = take(buffer, o, N, 2)
         A_T_pinv, o = take(buffer, o, N, 2)
         J, o = take(buffer, o, r, n)
         J_dot, o = take(buffer, o, r, n)
@@ -103,10 +99,10 @@ def _pointer(function, N: int, matrices: bool, memory: int):
         Gn, o = take(buffer, o + 2, n, n)
         Cn, o = take(buffer, o, n, n)
         Qn = buffer[o : o + n]
-        A_tilde, o = take(buffer, o + n, N, n)
-        pinv, o = take(buffer, o, N, n)
+        pinv, o = take(buffer, o + n, N, n)
+        minimal, redundant = (G2, C2, Q2), (Gn, Cn, Qn)
         return Matrices(
-            x, xd, q, qd, F, F_dot, A, A_T_pinv, J, J_dot, P, P_dot, G, C, Q, (G2, C2, Q2), (Gn, Cn, Qn), A_tilde, pinv
+            x, xd, q, qd, F, F_dot, F[:N], A_T_pinv, J, J_dot, P, P_dot, G, C, Q, minimal, redundant, P[:N], pinv
         )
 
     at_hand = matrices_of if matrices else inner(lambda buffer: None)

@@ -1,7 +1,7 @@
 """What the loop hands to a law that a user compiled: one buffer with the desired motion and the model's matrices.
 
 It holds, one after the other: t; q_a, qd_a; x, xd, xdd; q, qd, qdd; the matrices of `rapkm_lite.at` in the order of
-`pointer.Matrices`; the law's memory; its answer c.
+`pointer.Matrices`, of which A and A_tilde are the first rows of F and N; the law's memory; its answer c.
 """
 
 from __future__ import annotations
@@ -117,7 +117,6 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     q, p = matrix(room, p, 2, n)
     F, p = matrix(room, p, n, 2)
     F_dot, p = matrix(room, p, n, 2)
-    A, p = matrix(room, p, N, 2)
     A_T_pinv, p = matrix(room, p, N, 2)
     J, p = matrix(room, p, r, n)
     J_dot, p = matrix(room, p, r, n)
@@ -132,7 +131,6 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     Gn, p = matrix(room, p, n, n)
     Cn, p = matrix(room, p, n, n)
     Qn, p = matrix(room, p, n, 1)
-    A_tilde, p = matrix(room, p, N, n)
     pinv, p = matrix(room, p, N, n)
     scratch = room[p : p + 10 * n].reshape(5, n, 2)
     J[:], J_dot[:], G[:], C_[:] = 0.0, 0.0, 0.0, 0.0
@@ -164,8 +162,6 @@ def fill_matrices(drives, arms, law, table, o, w, room):
         Q_[i, 0], Q_[N + i, 0] = w[m + W1 * W] * (gx * ay - gy * ax) + distal + drag, distal
         fill_loops(J, J_dot, N, i, ax, ay, dx, dy, base, link)
     U, H, T = scratch[0], scratch[1], scratch[2]
-    for i in range(N):
-        A[i, 0], A[i, 1] = F[i, 0], F[i, 1]
     # Minimal coordinates: F^T G F, F^T (C F + G Fdot), F^T Q.
     product(H, G, F, n, n, 2)
     transposed(G2, F, H, 2, n, 2)
@@ -191,14 +187,11 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     product(Cn, U, wide, n, 2, n)
     transposed(small, U, Q_, 2, n, 1)
     product(Qn, U, small, n, 2, 1)
-    for i in range(N):
-        for j in range(n):
-            A_tilde[i, j] = P[i, j]
     m11 = m12 = m22 = 0.0
     for i in range(N):
-        m11, m12, m22 = m11 + A[i, 0] * A[i, 0], m12 + A[i, 0] * A[i, 1], m22 + A[i, 1] * A[i, 1]
+        m11, m12, m22 = m11 + F[i, 0] * F[i, 0], m12 + F[i, 0] * F[i, 1], m22 + F[i, 1] * F[i, 1]
     for i in range(N):
-        u, v = solve_regular(m11, m12, m22, A[i, 0], A[i, 1])
+        u, v = solve_regular(m11, m12, m22, F[i, 0], F[i, 1])
         A_T_pinv[i, 0], A_T_pinv[i, 1] = u, v
         for j in range(n):
             pinv[i, j] = u * F[j, 0] + v * F[j, 1]
