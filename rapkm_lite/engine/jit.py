@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -43,10 +42,6 @@ SHIFT = 1.5 * 2.0**52
 """Added to a small number it leaves the nearest whole number in the last bits of the sum."""
 
 
-def _power(shifted):
-    return math.ldexp(1.0, int(shifted - SHIFT))
-
-
 def _power_by_bits(_, shifted):
     """The last bits go to where the exponent of a number stands."""
 
@@ -58,7 +53,7 @@ def _power_by_bits(_, shifted):
     return types.float64(types.float64), generate
 
 
-power: Callable[..., Any] = intrinsic(_power_by_bits) if COMPILED else _power
+power: Callable[..., Any] = intrinsic(_power_by_bits) if COMPILED else lambda shifted: 2.0 ** (shifted - SHIFT)
 """2^k of k + SHIFT."""
 
 
@@ -78,7 +73,6 @@ def _forgiving(dispatcher):
     """A cache that cannot be read or written (cut short, a full disk, lost permissions) costs time, but no run."""
 
     def quiet(access):
-        @functools.wraps(access)
         def tried(*arguments):
             try:
                 return access(*arguments)
