@@ -8,10 +8,10 @@ company it runs.
 from __future__ import annotations
 
 import math
+import traceback
 
 from . import edge, plant, single
 from .decentralized import command_filter, force_filter, integral, proportional
-from .ends import last_torque, over
 from .jit import kernel, leaf, outlined
 from .laws import computed_torque
 from .leaves import solve2
@@ -58,12 +58,6 @@ def hold(lanes, arms, extra, study, history, w, dt, far):
             edge.hold(w, len(arms), len(lanes), dt)
     if history is not None:
         single.hold(arms, extra, w, dt, far)
-
-
-@leaf
-def real(faulty, sensor):
-    """Do the encoders show anything but the true angles and rates, shifted?"""
-    return len(faulty) > 0 or sensor.quantized or sensor.filtered
 
 
 @leaf
@@ -206,6 +200,15 @@ def add_work(lanes, arms, w):
         w[OLD * P + p] = angle
 
 
+@leaf
+def over(lanes, arms, extra, history, w, k):
+    """Have all runs ended? A single one that is sound needs no judgement."""
+    if history is not None:
+        if single.sound(arms, extra, w):
+            return False
+    return plant.judge(lanes, arms, w, k) == len(lanes)
+
+
 @kernel
 def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, history, buffer):
     """Sampled runs side by side, whatever their law: a single run with its history, or a study with sums in w.
@@ -231,7 +234,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
             add_miss(lanes, arms, table, o, w)
 
         # Measure: ideal encoders have their errors from `sense`.
-        if real(faulty, sensor):
+        if len(faulty) > 0 or sensor.quantized or sensor.filtered:
             read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k)
 
         # Pose: where the controller thinks the machine is, if its law or filter asks.
@@ -247,7 +250,7 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         if history is not None:
             record(arms, history, w, k)
         if k + 1 == clock.samples:
-            last_torque(lanes, drives, arms, w, k)
+            plant.judge(lanes, arms, w, k)
             return
         if study is not None:
             add_up(lanes, drives, arms, w)
@@ -256,3 +259,15 @@ def closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults,
         hold(lanes, arms, extra, study, history, w, dt, far)
         if over(lanes, arms, extra, history, w, k):
             return
+
+
+def stopped(error):
+    """How and when a run without a compiler ended by a division by zero or at an infinite angle: status and sample.
+
+    In the hold of finite torques it is the machine that fails, before it the law.
+    """
+    frames = {frame.f_code.co_name: frame.f_locals for frame, _ in traceback.walk_tb(error.__traceback__)}
+    loop = frames["closed_loops"]
+    W, k = len(loop["kind"].arms), loop.get("k", loop["clock"].first)
+    finite = all(abs(c) < 1e300 for c in loop["w"][C * W : C * W + W])
+    return (LEFT_WORKSPACE if "hold" in frames and finite else SINGULAR), k

@@ -74,10 +74,10 @@ def many(setup: Setup, codes: dict[int, Code], offsets: np.ndarray, columns) -> 
 
 @functools.cache
 def _engine():
-    """Rows of the work table, the loop, and its ends: Numba is not imported before the first run."""
-    from ..engine import ends, loop, rows
+    """Rows of the work table, and the loop: Numba is not imported before the first run."""
+    from ..engine import loop, rows
 
-    return rows, loop, ends
+    return rows, loop
 
 
 def _sums(setup: Setup, w) -> tuple:
@@ -157,7 +157,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 
     history : None for a study; the `History` of a single run.
     """
-    rows, loop, ends = _engine()
+    rows, loop = _engine()
     robot, model, trajectory, sensors, code = setup.robot, setup.model, setup.trajectory, setup.sensors, codes[0]
     L, N, study = len(codes), robot.n_arms, () if history is None else None
     faulty, counted = setup.faults is not None, sensors.encoder is not None
@@ -178,7 +178,7 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
             try:
                 loop.closed_loops(kind, study, modelled, user, sensor, law, clock, table, faults, w, log, buffer)
             except (ArithmeticError, ValueError) as error:  # only without a compiler, where runs are alone
-                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = ends.stopped(error)
+                w[rows.BLOCKS * W + rows.STATUS], w[rows.BLOCKS * W + rows.SAMPLE] = loop.stopped(error)
             finally:
                 if history is not None and log is not None and log is not history:
                     for column, values in zip(history[:-1], log, strict=False):
