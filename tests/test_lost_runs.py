@@ -138,6 +138,27 @@ def test_an_exception_without_words():
     assert lost(ROBOT, FailsAt(0.3, stop), PATH).reason.startswith("the law raised StopIteration (line ")
 
 
+class Mute(Exception):
+    """An exception whose words fail themselves: `str` wants text."""
+
+    def __str__(self):
+        return self.args[0]
+
+
+@pytest.mark.parametrize("time", [0.0, 0.1])
+def test_an_exception_that_cannot_be_printed_loses_nothing(time):
+    def mute():
+        raise Mute(3)
+
+    law = FailsAt(time, mute)
+    study = rk.sweep(ROBOT, [pd, law], PATH, OFFSET, failed="mask")
+    assert study.failed.tolist() == [False, True] and study.reasons[1].startswith("the law raised Mute (line ")
+    if time:
+        error = lost(ROBOT, law, PATH)
+        assert error.reason.startswith("the law raised Mute (line ") and isinstance(error.__cause__, Mute)
+        consistent(error, 100)
+
+
 def test_the_first_sample_belongs_to_the_caller():
     with pytest.raises(KeyError, match="gain table"):
         rk.simulate(ROBOT, FailsAt(0.0, boom), PATH)

@@ -43,7 +43,7 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
     if status not in REASONS:
         if isinstance(cause, BadAnswer):
             return str(cause)
-        return f"the law raised {type(cause).__name__}{f': {cause}' if str(cause) else ''}{place(cause)}"
+        return f"the law raised {type(cause).__name__}{_said(cause)}{place(cause)}"
     if status == TOO_STIFF:
         friction, v0 = setup.robot.friction.max(), setup.robot.friction_velocity
         return (
@@ -59,6 +59,14 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         return f"the law {name} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
     words = next(_causes(setup, law, status, k, written is None, c), f"look at gains{_too(setup)} and the path")
     return f"{REASONS[status]} ({words})"
+
+
+def _said(error: BaseException | None) -> str:
+    """The words of an exception, after a colon; none where `str` itself fails, as where it returns no text."""
+    try:
+        return f": {error}" if str(error) else ""
+    except Exception:
+        return ""
 
 
 def place(error: BaseException | None) -> str:
