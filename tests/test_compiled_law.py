@@ -1,6 +1,7 @@
 """Laws that a user compiled: the same torques as in Python, against the textbook layer; memory, filters, studies."""
 
 import copy
+import importlib
 import linecache
 import math
 import pickle
@@ -646,3 +647,14 @@ sys.stdout.buffer.write(cloudpickle.dumps(soft))"""
     assert repr(law) == "compiled(soft, at=None, memory=3)"
     assert cloudpickle.loads(cloudpickle.dumps(pid)) == pid  # of a module: by its name
     assert rk.simulate(ROBOT, law, PATH).c.shape == (len(PATH), 3)
+
+
+@pytest.mark.parametrize("name", ["03_law", "my-law"])
+def test_a_law_of_a_file_whose_name_is_no_word_of_python_travels(name, tmp_path, monkeypatch):
+    """`importlib` reads such a module, and pickle finds a function there."""
+    (tmp_path / f"{name}.py").write_text(
+        "import rapkm_lite as rk\n\n@rk.compiled\ndef soft(t, q_a, qd_a, d):\n    return -7.0 * (q_a - d.q_a)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    law = importlib.import_module(name).soft
+    assert pickle.loads(pickle.dumps(law)) == law

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import pkgutil
+import importlib
+import operator
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -83,7 +84,7 @@ class CompiledLaw(LawValue):
 
 def _function(module: str, name: str):
     """The function of a module, also where its name stands for the law that a decorator made of it."""
-    found = pkgutil.resolve_name(f"{module}:{name}")
+    found = operator.attrgetter(name)(importlib.import_module(module))
     return found.function if isinstance(found, CompiledLaw) else found
 
 
