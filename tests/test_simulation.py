@@ -403,3 +403,31 @@ def test_a_search_for_a_pose_takes_as_long_in_both_loops(path, fault):
         except rk.SimulationError as error:
             ends.append(error.time)
     assert ends[0] == pytest.approx(ends[1], abs=2e-3)
+
+
+def test_loops_follow_the_same_samples_of_a_path_of_a_users_class():
+    """Laws in Python ask a path for its samples, compiled ones for its columns: no class may tell them two things."""
+    circle = rk.circle(ROBOT, 0.05, 0.1)
+    fields = [getattr(circle, name) for name in ("n_arms", "x", "xd", "xdd", "q", "qd", "qdd", "t", "robot")]
+
+    class Named(rk.Trajectory):
+        def __getitem__(self, k):
+            return getattr(self, k) if isinstance(k, str) else super().__getitem__(k)
+
+    class Late(rk.Trajectory):
+        def __getitem__(self, k):
+            return super().__getitem__(max(k - 20, 0))
+
+    class Turned(rk.Trajectory):
+        @property
+        def q_a(self):
+            return super().q_a + 1e-3
+
+    law = rk.PD(7.05, 0.225)
+    assert rk.simulate(ROBOT, law, Named(*fields)).c.tolist() == rk.simulate(ROBOT, law, circle).c.tolist()
+    for path in (Late(*fields), Turned(*fields)):
+        for run in (rk.simulate, lambda *given: rk.sweep(*given, np.zeros(3))):
+            with pytest.raises(
+                ValueError, match=r"trajectory\[\d+\] of the class \w+ is not the row \d+ of x, xd, xdd"
+            ):
+                run(ROBOT, law, path)

@@ -12,7 +12,7 @@ from ..machine.arguments import of_kind
 from ..machine.manipulator import Manipulator, manipulator
 from ..mechanics import cores
 from ..mechanics.kinematics import inverse_kinematics
-from ..mechanics.trajectory import Trajectory
+from ..mechanics.trajectory import Desired, Trajectory
 from .faults import Fault, FaultTable, check_faults, fault_table
 from .sensors import Sensors
 
@@ -71,6 +71,21 @@ def _reach(robot: Manipulator, x: float, y: float) -> None:
     inverse_kinematics(robot, [x, y])
 
 
+def _check_samples(path: Trajectory) -> None:
+    """Raise ValueError where the samples of a user's class, which laws in Python follow, are not its columns."""
+    if all(getattr(type(path), name) is getattr(Trajectory, name) for name in ("__getitem__", "q_a", "qd_a", "qdd_a")):
+        return
+    columns = path.x, path.xd, path.xdd, path.q, path.qd, path.qdd
+    for k in range(len(path)):
+        sample, row = path[k], Desired(path.n_arms, *(column[k] for column in columns))
+        names = "x", "xd", "xdd", "q", "qd", "qdd", "q_a", "qd_a", "qdd_a"
+        if not all(np.array_equal(getattr(sample, name), getattr(row, name)) for name in names):
+            raise ValueError(
+                f"trajectory[{k}] of the class {type(path).__name__} is not the row {k} of x, xd, xdd, q, qd and qdd, "
+                "which compiled loops follow; allowed: other rows, see follow and Trajectory.with_set_points"
+            )
+
+
 def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=None, faults=()) -> Setup:
     """The one check of the arguments of `simulate` and `sweep`.
 
@@ -79,6 +94,7 @@ def prepare(robot: Manipulator, trajectory: Trajectory, sensors: Sensors, model=
     manipulator(robot)
     model = robot if model is None else manipulator(model, "model")
     of_kind("trajectory", trajectory, Trajectory, "a Trajectory, such as triangle(robot) returns")
+    _check_samples(trajectory)
     of_kind("sensors", sensors, Sensors, "Sensors")
     if model.n_arms != robot.n_arms:
         raise ValueError(f"model has {model.n_arms} arms, the machine {robot.n_arms}; allowed: the same number")
