@@ -1201,3 +1201,15 @@ def test_texts_of_a_small_and_a_large_machine_keep_apart(times):
             for texts in (ticks, numbers if ax is not shown.axes[0] else []):
                 boxes = [t.get_window_extent().padded(-1) for t in texts]
                 assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2)), (name, texts)
+
+
+def test_a_choice_may_mean_a_list():
+    """Equal lists are the same choice, as equal numbers are; arrays, which are equal entry by entry, are refused."""
+    offsets = explore.choice("offsets", [("none", [0.0, 0.0]), ("some", [4.0, -2.0])], [4.0, -2.0])
+    assert offsets.label == "some"
+    shown = explore.explorer(
+        lambda picture, offsets: {"drive 1": f"{offsets[0]} mrad"}, {"offsets": offsets}, {"p": {}}
+    )
+    assert shown.set(offsets=[0.0, 0.0]).numbers == {"drive 1": "0.0 mrad"} and offsets.label == "none"
+    with pytest.raises(ValueError, match=r"offsets = array.*; allowed: \[0.0, 0.0\], \[4.0, -2.0\]"):
+        shown.set(offsets=np.zeros(2))

@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import time
-from collections.abc import Callable, Collection, Hashable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import ipywidgets as widgets
@@ -183,7 +183,7 @@ def check(name: str, widget, value) -> None:
     """Raise ValueError for a value that the control cannot take."""
     if isinstance(widget, widgets.Dropdown):
         allowed = [option[1] if isinstance(option, tuple | list) else option for option in widget.options]
-        if not isinstance(value, Hashable) or value not in allowed:
+        if isinstance(value, np.ndarray) or value not in allowed:
             raise ValueError(f"{name} = {short(value)}; allowed: {', '.join(map(repr, allowed))}")
     elif isinstance(widget, widgets.Checkbox):
         truth(name, value)
