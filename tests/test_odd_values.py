@@ -150,7 +150,7 @@ def test_results_that_do_not_fit_together():
     for name in ("offsets", "energies", "torque_norm", "x_final", "failure_time"):
         with pytest.raises(ValueError, match=rf"{name} has shape .*; allowed: \(3.*, a row per run"):
             changed(study, **{name: np.zeros((2, 5))})
-    for wrong in (0.5, None, [1, 2, 3], {"a": 1}):
+    for wrong in (0.5, None, [1, 2, 3], {"a": 1}, np.zeros(2)):
         with pytest.raises(ValueError, match=r"stopped = .*; allowed: a string or None for each of 3 runs"):
             changed(study, stopped=wrong)
     with pytest.raises(ValueError, match=r"failed has shape \(3, 3\); allowed: \(k,\)"):

@@ -66,7 +66,9 @@ class Sweep(Value):
         self._set(faults=check_faults(self.faults), model=self.robot if self.model is None else self.model)
         super().__post_init__()
         self._check_rows()
-        words = tuple("it failed" if failed else None for failed in self.failed) if self.stopped == () else self.stopped
+        words = self.stopped
+        if type(words) is tuple and not words:
+            words = tuple("it failed" if failed else None for failed in self.failed)
         if type(words) is not tuple or len(words) != len(self) or any(not isinstance(w, str | None) for w in words):
             raise ValueError(f"stopped = {short(words)}; allowed: a string or None for each of {len(self)} runs")
         self._set(stopped=words)
