@@ -17,6 +17,7 @@ from numpy.testing import assert_array_equal
 
 import rapkm_lite as rk
 from rapkm_lite import engine
+from rapkm_lite.engine import loop
 from rapkm_lite.simulation import compiled, pools, runs, sweeps
 from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
@@ -172,6 +173,38 @@ def test_an_interrupt_comes_through():
         rk.simulate(ROBOT, FailsAt(0.1, interrupt), PATH)
     consistent(caught.value, 100)
     assert "up to t = 0.1000 s" in caught.value.__notes__[-1]
+
+
+@pytest.mark.parametrize("law", [PD, rk.SwitchedCTC(900.0, 60.0), rk.CTC(900.0, 60.0, (0, 4))], ids=repr)
+@pytest.mark.parametrize(("before", "rows"), [(True, 49), (False, 60)], ids=["before a part", "after a part"])
+def test_an_interrupt_in_the_engine_keeps_what_it_has_done(law, before, rows, monkeypatch):
+    """A Ctrl-C is raised when a kernel returns; it did all or nothing of its part of the samples."""
+    path = rk.triangle(ROBOT, duration=0.6, dt=0.01)
+    whole, real, parts = rk.simulate(ROBOT, law, path, OFFSET), loop.closed_loops, []
+
+    def interrupted(*arguments):
+        parts.append(None)
+        if not (before and len(parts) == 2):
+            real(*arguments)
+        if len(parts) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop, "closed_loops", interrupted)
+    monkeypatch.setattr(compiled, "PART", 50)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, law, path, OFFSET)
+    consistent(caught.value, rows)
+    for name in ("t", "x", "xd", "q_a", "qd_a", "c", "pairs"):
+        assert_array_equal(getattr(caught.value.partial, name), getattr(whole, name)[:rows])
+
+
+def test_an_interrupt_before_the_first_sample_comes_through_as_it_is(monkeypatch):
+    """Nothing is lost, as nothing was done."""
+    stop = KeyboardInterrupt()
+    monkeypatch.setattr(loop, "closed_loops", lambda *arguments: (_ for _ in ()).throw(stop))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, PD, PATH, OFFSET)
+    assert caught.value is stop and vars(stop) == {}
 
 
 def test_an_interrupt_while_the_cause_is_looked_for_loses_no_run(monkeypatch):
@@ -506,6 +539,21 @@ def test_a_run_that_cannot_travel_leaves_its_time_and_reason():
             rk.sweep(ROBOT, [pd, Grows()], PATH, OFFSET, executor=pool)
     assert caught.value.run == 1 and 0.05 < caught.value.time < 0.052
     assert caught.value.sweep.failed.tolist() == [False, True]
+
+
+class Own(Exception):
+    """Its `partial` is its own."""
+
+    partial = property(lambda self: "mine")
+
+
+def test_an_exception_with_a_partial_of_its_own_is_raised_as_it_is():
+    def own():
+        raise Own("words")
+
+    with pytest.raises(Own, match="words") as caught:
+        rk.sweep(ROBOT, [pd, FailsAt(0.0, own)], PATH, OFFSET)
+    assert caught.value.partial == "mine" and not hasattr(caught.value, "__notes__")
 
 
 def test_an_interrupt_while_a_pool_ends_keeps_all_rows(monkeypatch):

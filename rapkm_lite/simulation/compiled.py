@@ -17,7 +17,7 @@ from .patience import patience
 from .setup import Outcome, Setup
 
 LAW_FAILED = -2
-"""Status beside those of the engine: the law raised."""
+"""Status beside those of the engine: the law raised, or the user pressed Ctrl-C."""
 LANES = 32
 """Runs side by side: few enough for a core's L1 cache, and enough that no register waits for another."""
 
@@ -39,19 +39,28 @@ def encode(law: Any, setup: Setup) -> Code | None:
     return None if code is None or (code.user is not None and not (compiled() and setup.suits(code.user))) else code
 
 
-def single(setup: Setup, code: Code) -> Outcome:
-    """One run with its history."""
-    samples, N = len(setup.trajectory), setup.robot.n_arms
+def single(setup: Setup, code: Code) -> tuple[Outcome, KeyboardInterrupt | None]:
+    """One run with its history, and the Ctrl-C that stopped it; one before the first sample is raised."""
+    samples, N, interrupt = len(setup.trajectory), setup.robot.n_arms, None
     spare = tables.width(N, True) - N
     flat, kept = room(2 * samples, 2 * samples, *3 * [N * samples + spare], samples)
+    # Kernels do not hear a Ctrl-C: the NaN that are left tell how far they came.
+    flat[0][:] = np.nan
     history = tables.History._make([*flat[:-1], flat[-1].view(np.int32), N])
-    w = _run(setup, [code], setup.sensors.offset[None], history)
+    try:
+        w = _run(setup, [code], setup.sensors.offset[None], history)
+        status, sample = int(w("STATUS")[0]), int(w("SAMPLE")[0])
+    except KeyboardInterrupt as stop:
+        begun = int(np.append(np.isfinite(flat[0][::2]), False).argmin())
+        if begun == 0:
+            raise
+        status, sample, interrupt = LAW_FAILED, begun - 1, stop
     if "JOINT_J" in code.run:
         # Elbows were counted after all arms of a row.
         history.joints[history.joints >= N + spare] -= spare
     kept[-1] = kept[-1].view(np.int32)
     columns = [column[: n * samples].reshape(samples, n) for column, n in zip(kept, (2, 2, N, N, N, 2), strict=True)]
-    return Outcome._make([int(w("STATUS")[0]), int(w("SAMPLE")[0]), *columns])
+    return Outcome._make([status, sample, *columns]), interrupt
 
 
 def many(setup: Setup, codes: dict[int, Code], offsets: np.ndarray, columns) -> None:

@@ -222,7 +222,7 @@ def _runs(setup: Setup, law, k: int) -> bool:
     setup = setup._replace(trajectory=trajectory).begin(k + k // 2 + 100)
     try:
         code = encode(law, setup)
-        outcome, cause = closed_loop(setup, law) if code is None else (single(setup, code), None)
+        outcome, cause = closed_loop(setup, law) if code is None else single(setup, code)
     except (ValueError, ArithmeticError):
         return False
     if cause is not None and not isinstance(cause, Exception):

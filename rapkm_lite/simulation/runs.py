@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -197,8 +198,7 @@ def simulate(
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python, or a
     `compiled` one, raises at the first sample comes through.  Whatever else stops a run, then or later, raises
     SimulationError with the run up to there: a machine that leaves the workspace, a lost pose, a singularity of the
-    law's coordinates, an error in the law.  A Ctrl-C comes through; with laws in Python the run up to there is its
-    `partial`.
+    law's coordinates, an error in the law.  A Ctrl-C comes through, with the run up to there as its `partial`.
 
     >>> import rapkm_lite as rk
     >>> spring = lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)
@@ -224,7 +224,7 @@ def attempt(setup: Setup, law) -> tuple[Run, SimulationError | None]:
     as_law(law)
     code, cause = encode(law, setup), None
     if code is not None:
-        outcome = single(setup, code)
+        outcome, cause = single(setup, code)
         if code.user is not None and outcome.status == SINGULAR:
             outcome, cause = again_in_python(setup, law, outcome)
     else:
@@ -263,5 +263,6 @@ def hand_over(error, partial, note: str) -> None:
     """Give an exception of whatever kind what is finished, and a note that says so instead of one that did."""
     if isinstance(getattr(error, "partial", None), Run):
         error.__notes__ = [text for text in getattr(error, "__notes__", []) if "`partial`" not in text]
-    error.partial = partial
-    error.add_note(note)
+    with suppress(AttributeError):  # of an exception class whose `partial` is its own
+        error.partial = partial
+        error.add_note(note)
