@@ -17,6 +17,7 @@ import numpy as np
 from ..machine.arguments import ConvergenceError, bounded, drive_values, one_of, positive_number, small_number
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, Value
+from . import cores
 from .at import at
 from .encoders import cautions, certain, changed, closure, gauge, measured, poses, rounding, unknown_names
 from .rests import angles_of_torques, fitted_gain, rests
@@ -118,8 +119,7 @@ def calibrate(
     """Encoder offsets, with link lengths and base points if asked for, from logged angles or torques.
 
     Minimizes the closure of all samples over the unknowns: Gauss-Newton with the poses eliminated, as in variable
-    projection.
-    Equal readings count once, because a rest repeats one rounding however long it lasts.
+    projection.  Equal readings count once, because a rest repeats one rounding however long it lasts.
 
     log : a `Log`, several of one machine, the path of a CSV file (`read_log`), or measured base angles (k, N) in rad.
     unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these, four motions stay unseen:
@@ -163,11 +163,11 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     N = robot.n_arms
     nominal = np.concatenate([np.zeros(N), robot.lengths.ravel(), robot.base.ravel()])
     count = N * UNKNOWNS[unknowns]
-    # Steps z of equal size: one for an angle of 1 rad or for the longest link; the gauge of the base points stands.
-    basis = np.diag(np.concatenate([np.ones(N), np.full(4 * N, robot.lengths.max())])[:count])
-    if unknowns == "all":
-        free = np.linalg.svd(gauge(robot).T)[2][4:].T
-        basis = np.block([[basis[:, : 3 * N], np.vstack([np.zeros((3 * N, 2 * N - 4)), robot.lengths.max() * free])]])
+    # Steps of equal size: one for an angle of 1 rad or for the longest link; the gauge of the base points stands.
+    basis = np.eye(5 * N, 5 * N - 4)
+    basis[3 * N :, 3 * N :] = cores.null_space(gauge(robot))
+    basis[N:] *= robot.lengths.max()
+    basis = basis[:count, :count]
     p, blur = nominal[:count], max(step, noise or 0.0)
     sure, x = certain(robot, angles)
     if basis.shape[1] < (N - 2) * sure.sum() < (N - 2) * len(angles):
@@ -227,8 +227,9 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
     along what is determined there, 2 along all, in short steps: far from the minimum what is not explained is no noise.
     Raises `CalibrationError` for too low a rank, ValueError for angles that fit no pose, and ConvergenceError.
     """
-    N, machine, size = robot.n_arms, changed(robot, p), math.inf
+    N, size = robot.n_arms, math.inf
     for _ in range(50):
+        machine = changed(robot, p)
         pose = at(machine, poses(machine, angles - p[:N], x))
         x = pose.x
         left, rows = (part / math.sqrt(len(angles)) for part in closure(pose, angles - p[:N], len(p)))
@@ -249,11 +250,10 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
             spread = noise / math.sqrt(len(angles)) / sigma[:rank]
             raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
         p, size = p + basis @ move, np.abs(move).max(initial=0.0)
-        machine = changed(robot, p)
         # No step gets smaller than its rounding error, nor than that of base points far from the origin.
         coarse = 4 * np.spacing(np.abs(robot.base).max()) / robot.lengths.max()
         if size < max(enough, 1e-13 + coarse + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
-            return p, machine, x, left, sigma, Vt
+            return p, changed(robot, p), x, left, sigma, Vt
     raise ConvergenceError(
         f"calibrate did not converge: its last step was {size:.3g} at offsets {p[:N].tolist()} rad; "
         "allowed: a log of this machine, whose angles are near a pose"

@@ -36,10 +36,9 @@ def measured(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
 
     Raises ValueError for what is neither, and for another number of drives than the machine has.
     """
-    if isinstance(log, Log | str | Path):
-        log = [log]
-    if isinstance(log, list | tuple) and log and all(isinstance(part, Log | str | Path) for part in log):
-        logs = [part if isinstance(part, Log) else read_log(part) for part in log]
+    given = log if isinstance(log, list | tuple) else [log]
+    if given and all(isinstance(part, Log | str | Path) for part in given):
+        logs = [part if isinstance(part, Log) else read_log(part) for part in given]
         for part in logs:
             if part.q_a.shape[1] != robot.n_arms:
                 raise ValueError(f"log = {part!r} has {part.q_a.shape[1]} drives; allowed: {robot.n_arms}")
@@ -143,19 +142,14 @@ def closure(pose: At, angles: np.ndarray, count: int) -> tuple[np.ndarray, np.nd
 
     At a fixed end-effector d . db + (a . d / l1) dl1 + l2 dl2 + (a x d) dq_a = 0 for each arm.
     """
-    robot, d = pose.robot, pose.d
-    N, l1, l2 = robot.n_arms, *robot.lengths.T
-    columns = np.zeros((len(d), N, 5 * N))
-    i = np.arange(N)
-    lever = cross(pose.a, d)
-    columns[:, i, i] = 1.0
-    columns[:, i, N + 2 * i] = -np.vecdot(pose.a, d) / l1 / lever
-    columns[:, i, N + 2 * i + 1] = -l2 / lever
-    for axis in (0, 1):
-        columns[:, i, 3 * N + 2 * i + axis] = -d[..., axis] / lever
-    n = cores.null_space(pose.A)
-    left = matvec(n.mT, cores.wrap(angles - pose.q[:, :N])).ravel()
-    return left, -(n.mT @ columns[..., :count]).reshape(len(left), count)
+    a, d, (l1, l2) = pose.a, pose.d, pose.robot.lengths.T
+    lever, n = cross(a, d), cores.null_space(pose.A)
+    left = matvec(n.mT, cores.wrap(angles - pose.q[:, : len(l1)])).ravel()
+    # Of each arm: offset, lengths, base point; then by kind, as p has them.
+    moved = np.stack([-lever, np.vecdot(a, d) / l1, np.broadcast_to(l2, lever.shape), d[..., 0], d[..., 1]], axis=-1)
+    rows = n.mT[..., None] * (moved / lever[..., None])[:, None]
+    kinds = [part.reshape(len(left), -1) for part in np.split(rows, [1, 3], axis=-1)]
+    return left, np.concatenate(kinds, axis=1)[:, :count]
 
 
 def gauge(robot: Manipulator) -> np.ndarray:
