@@ -79,10 +79,12 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
     N = manipulator(robot).n_arms
     if measure == "prestress" and pair is not None:
         raise ValueError(f"pair = {short(pair)} of measure = 'prestress'; allowed: None, all drives share a prestress")
+    if measure == "prestress" and N < 3:
+        raise ValueError(f"robot has {N} arms, which cannot prestress each other; allowed: 3 or more")
     drives = list(range(N) if pair is None else joint_indices("pair", pair, N, 2, "drive"))
     x, y, inside = workspace_grid(robot, n, box)
     values = _MEASURES[measure](robot, poses_inside(robot, x, y, inside, mode), drives)
-    return x, y, _on_grid(values, inside, limit=1e12)
+    return x, y, _on_grid(np.ma.masked_greater_equal(np.minimum(values, 1e12), 1e12), inside)
 
 
 def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 200, box=None):
@@ -110,7 +112,7 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
         Q = np.linalg.qr(at(robot, q).F).Q
         A_tilde = Q[..., : robot.n_arms, :] @ Q.mT
         merit = np.stack([PARTITION_RULES[rule](A_tilde[..., list(pair), :]) for pair in drive_pairs(robot)], axis=-1)
-    return x, y, _on_grid(first_best(merit), inside, limit=np.inf)
+    return x, y, _on_grid(first_best(merit), inside)
 
 
 def poses_inside(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode=None) -> np.ndarray:
@@ -120,35 +122,23 @@ def poses_inside(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.nd
     return inverse_kinematics(robot, points, mode[..., None, :])
 
 
-def _on_grid(values: np.ndarray, inside: np.ndarray, limit: float) -> np.ma.MaskedArray:
-    """Scatter values (..., points inside) to the grid; what lies outside or beyond the limit is masked."""
-    grid = np.zeros(values.shape[:-1] + inside.shape, dtype=values.dtype)
-    mask = np.ones(grid.shape, dtype=bool)
-    bad = ~(values <= limit)
-    grid[..., inside], mask[..., inside] = np.where(bad, 0, values), bad
-    return np.ma.array(grid, mask=mask)
+def _on_grid(values: np.ndarray, inside: np.ndarray) -> np.ma.MaskedArray:
+    """Values (..., points inside) scattered to the grid; what lies outside is masked."""
+    grid = np.ma.array(np.zeros(values.shape[:-1] + inside.shape, values.dtype), mask=True)
+    grid[..., inside] = values
+    return grid
 
 
 def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
     sigma = singular_values(at(robot, q).F[..., drives, :])
-    return np.divide(sigma[..., 0], sigma[..., 1], out=np.full(sigma.shape[:-1], np.inf), where=sigma[..., 1] > 0)
-
-
-def _cross(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    return np.abs(minors(at(robot, q).d[..., drives, :] / robot.lengths[drives, 1:])).max(axis=-1)
-
-
-def _prestress(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
-    if robot.n_arms < 3:
-        raise ValueError(f"robot has {robot.n_arms} arms, which cannot prestress each other; allowed: 3 or more")
-    # At an input singularity every prestress is free: no direction, so the point is masked.
-    return np.moveaxis(prestress_shares(at(robot, q).A), -1, 0)
+    return sigma[..., 0] / np.maximum(sigma[..., 1], 1e-13 * sigma[..., 0])
 
 
 _MEASURES = {
     # Of the rows of A~ = Q_a Q^T, with the columns of F made orthonormal in Q.
     "sigma_min": lambda robot, q, drives: singular_values(np.linalg.qr(at(robot, q).F).Q[..., drives, :])[..., 1],
     "condition": _condition,
-    "cross": _cross,
-    "prestress": _prestress,
+    "cross": lambda robot, q, drives: np.abs(minors((at(robot, q).d / robot.lengths[:, 1:])[..., drives, :])).max(-1),
+    # At an input singularity every prestress is free: no direction, so the point is masked.
+    "prestress": lambda robot, q, _: np.moveaxis(prestress_shares(at(robot, q).A), -1, 0),
 }
