@@ -27,7 +27,8 @@ def complement(J, independent) -> np.ndarray:
            [ 0.,  1.]])
     """
     J = _jacobian(J)
-    return cores.joint_complement(J, _independent(J, independent), of_pose=False)
+    r, n = J.shape[-2:]
+    return cores.joint_complement(J, joint_indices("independent", independent, n, n - r), of_pose=False)
 
 
 def complement_dot(J, J_dot, independent) -> np.ndarray:
@@ -41,8 +42,7 @@ def complement_dot(J, J_dot, independent) -> np.ndarray:
            [ 0.,  0.]])
     """
     J, J_dot = _jacobians(J, J_dot)
-    independent = _independent(J, independent)
-    return cores.joint_complement_dot(J, J_dot, cores.joint_complement(J, independent, of_pose=False), independent)
+    return cores.joint_complement_dot(J, J_dot, complement(J, independent), independent)
 
 
 def projector(J) -> np.ndarray:
@@ -82,7 +82,7 @@ def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray
     F, F_dot = real_array("F", F), real_array("F_dot", F_dot)
     if F.ndim < 2 or F_dot.shape != F.shape:
         raise ValueError(f"F has shape {F.shape} and F_dot {F_dot.shape}; allowed: (..., n, delta), both the same")
-    return cores.minimal(F, F_dot, *_tree(F.shape[-2], F.shape[:-2], G, C, Q))
+    return cores.minimal(F, F_dot, *_tree(F, G, C, Q))
 
 
 def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -97,7 +97,7 @@ def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarr
     N, N_dot = real_array("N", N), real_array("N_dot", N_dot)
     if N.ndim < 2 or N.shape[-1] != N.shape[-2] or N_dot.shape != N.shape:
         raise ValueError(f"N has shape {N.shape} and N_dot {N_dot.shape}; allowed: (..., n, n), both the same")
-    return cores.redundant(N, N_dot, *_tree(N.shape[-1], N.shape[:-2], G, C, Q))
+    return cores.redundant(N, N_dot, *_tree(N, G, C, Q))
 
 
 def _jacobian(J) -> np.ndarray:
@@ -111,18 +111,14 @@ def _jacobians(J, J_dot) -> tuple[np.ndarray, np.ndarray]:
     return J, shaped("J_dot", J_dot, J_dot.shape == J.shape, f"{J.shape}, as J")
 
 
-def _independent(J: np.ndarray, independent) -> list[int]:
-    n = J.shape[-1]
-    return list(joint_indices("independent", independent, n, n - J.shape[-2]))
-
-
 def _row_space(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     size = np.maximum(np.abs(J).max(axis=(-2, -1), keepdims=True), 1e-300)
     Q, R = cores.row_space(J / size, 1.0, of_pose=False)
     return Q, size * R
 
 
-def _tree(n: int, lead: tuple[int, ...], G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _tree(motion: np.ndarray, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    n = motion.shape[-2]
     G, C, Q = real_array("G", G, n, n), real_array("C", C, n, n), real_array("Q", Q, n)
-    check_leading(motion=lead, G=G.shape[:-2], C=C.shape[:-2], Q=Q.shape[:-1])
+    check_leading(motion=motion.shape[:-2], G=G.shape[:-2], C=C.shape[:-2], Q=Q.shape[:-1])
     return G, C, Q
