@@ -10,11 +10,6 @@ from .at import at
 from .kinematics import inverse_kinematics, reachable
 from .maps import poses_inside, workspace_grid
 
-# Loops are closed by stiff, critically damped springs between the tips: in the default runs gaps of 2 nm at most with
-# the default timestep, 16 nm with 1 ms, 63 nm with 2 ms, 0.4 um with 5 ms.  RK4 is unstable for springs of more than
-# 2.8 / timestep.
-_FASTEST = 1e3  # rad/s
-
 
 def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     """The machine as MJCF, a text that ``mujoco.MjModel.from_xml_string`` reads.
@@ -42,9 +37,9 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     timestep = positive_number("timestep", timestep)
     pose = _home(robot) if q is None else exact_array("q", q, robot.n_joints)
     _ = at(robot, pose)._closed
-    gx, gy = robot.gravity
     arms = "".join(_arm(robot, i, pose) for i in range(N))
-    rate = min(_FASTEST, 1.0 / timestep)
+    # Stiff, critically damped springs between the tips, rad/s; RK4 is unstable for more than 2.8 / timestep.
+    rate = min(1e3, 1.0 / timestep)
     spring = f'solref="{-(rate**2):.17g} {-2.0 * rate:.17g}" solimp="0.9999 0.9999 0.001"'
     loops = "".join(f'    <connect site1="tip{i + 1}" site2="tip2" {spring}/>\n' for i in range(N) if i != 1)
     motors = "".join(f'    <motor name="drive{i + 1}" joint="base{i + 1}"/>\n' for i in range(N))
@@ -56,8 +51,8 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     return (
         f"<mujoco model={quoteattr(name)}>\n"
         f'  <compiler angle="radian"/>\n'
-        f'  <option timestep="{timestep:.17g}" integrator="RK4" gravity="{_row([gx, gy, 0.0])}" solver="Newton" '
-        f'tolerance="1e-14" iterations="100" jacobian="dense"><flag contact="disable"/></option>\n'
+        f'  <option timestep="{timestep:.17g}" integrator="RK4" gravity="{_row([*robot.gravity, 0.0])}" '
+        f'solver="Newton" tolerance="1e-14" iterations="100" jacobian="dense"><flag contact="disable"/></option>\n'
         f"  <worldbody>\n{arms}  </worldbody>\n"
         f"  <equality>\n{loops}  </equality>\n"
         f"  <actuator>\n{motors}  </actuator>\n"
@@ -103,11 +98,10 @@ def _arm(robot: Manipulator, i: int, pose: np.ndarray) -> str:
 def _link(joint: str, angle, position, length, mass, centre, inertia, rotor, inner: str) -> str:
     # A viewer opens a model where its bodies stand in the file, which `ref` calls the angle: so they stand at the pose.
     # Moments about the other two axes do nothing in the plane, but MuJoCo wants them to fit a body.
-    moments = _row([inertia, inertia, inertia])
     return (
         f'    <body name="{joint} link" pos="{_row(position)}" euler="0 0 {angle:.17g}">\n'
         f'      <joint name="{joint}" axis="0 0 1" ref="{angle:.17g}" armature="{rotor:.17g}"/>\n'
-        f'      <inertial pos="{centre:.17g} 0 0" mass="{mass:.17g}" diaginertia="{moments}"/>\n'
+        f'      <inertial pos="{centre:.17g} 0 0" mass="{mass:.17g}" diaginertia="{_row([inertia] * 3)}"/>\n'
         f'      <geom type="capsule" size="{length / 40:.6g}" fromto="0 0 0 {length:.17g} 0 0"/>\n'
         f"{inner}    </body>\n"
     )
