@@ -10,7 +10,6 @@ import numpy as np
 from ..machine.arguments import positive_number, real_array, shaped, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import frozen
-from . import cores
 from .kinematics import inverse_kinematics
 
 Motion: TypeAlias = Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -52,10 +51,7 @@ def equidistant(t) -> np.ndarray:
 
 
 def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:
-    """Refuse other shapes than (k, 2), and rates that are no derivative of the positions; a few jumps, as of
-    set-points, are allowed."""
-    for name, v in (("x", x), ("xd", xd), ("xdd", xdd)):
-        shaped(name, v, v.shape == (len(t), 2), f"({len(t)}, 2), a row for each of the times t")
+    """Refuse rates that are no derivative of the positions; a few jumps, as of set-points, are allowed."""
     for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
         if (fastest := np.abs(v).max()) > 1e30:
             raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")
@@ -142,7 +138,7 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
     Without F: the tip of an arm moves with xd = w1 E a + w2 E d, w1 and w2 the rates of its links, so that
     w1 = d . xd / (a x d) and w2 = -a . xd / (a x d); their derivatives come likewise from xdd + w1^2 a + w2^2 d.
     """
-    tree, q, N = robot.tree, inverse_kinematics(robot, x), robot.n_arms
+    q, N = inverse_kinematics(robot, x), robot.n_arms
     base = np.concatenate([before[:, :N], q[:, :N]])
     if np.abs(np.diff(base, axis=0)).max(initial=0.0) >= np.pi:
         q[:, :N] = np.unwrap(base, axis=0)[len(base) - len(q) :]
@@ -151,8 +147,8 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
     a = l1 * np.cos(angle), l1 * np.sin(angle)
     d = [np.add.outer(-robot.base[:, i], x[:, i]) - a[i] for i in range(2)]
     lever = a[0] * d[1] - a[1] * d[0]
-    if np.any(np.abs(lever) < tree.edge[:, None]):
-        cores.inner_levers(tree, cores.link_vectors(tree, q))
+    if np.any(np.abs(lever) < robot.tree.edge[:, None]):
+        raise ValueError("an arm is stretched or folded")
 
     def rates(u0, u1) -> np.ndarray:
         """Base and elbow joints, (2N, k), when the tips move at the rate (u0, u1)."""
@@ -167,7 +163,7 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
 
 def refusal(robot: Manipulator, x, given: dict) -> ValueError:
     """The error of a path that leaves the workspace or touches its edge, with what the caller was asked for."""
-    words = ", ".join(f"{k} = {short(v.tolist() if isinstance(v, np.ndarray) else v)}" for k, v in given.items())
+    words = ", ".join(f"{k} = {short(v)}" for k, v in given.items())
     try:
         elbows = inverse_kinematics(robot, x)[:, robot.n_arms :]
     except ValueError as outside:

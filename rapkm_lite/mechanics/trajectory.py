@@ -103,9 +103,6 @@ class Trajectory(Desired):
             return sample
         return Desired(self.n_arms, *(getattr(self, name)[rows] for name in _MOTION))
 
-    def __iter__(self):
-        return map(self.__getitem__, range(len(self)))
-
     def for_robot(self, robot: Manipulator) -> Trajectory:
         """The same end-effector motion for another machine (other joint angles).
 
@@ -172,7 +169,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     Trajectory(101 samples, 1 s, 'testbed')
     """
     t = equidistant(t)
-    x, xd, xdd = (real_array(name, v, 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
+    x, xd, xdd = (exact_array(name, v, len(t), 2) for name, v in (("x", x), ("xd", xd), ("xdd", xdd)))
     check_rates(t, x, xd, xdd)
     return _follow(robot, t, lambda rows: (x[rows], xd[rows], xdd[rows]), {"samples": len(t)})
 
