@@ -93,10 +93,9 @@ def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.nd
         raise ValueError("A has lost rank (an input singularity); allowed: another pose")
     regular = (hessian[..., 0, 0] > 0.0) & (det > 1e-3 * whole) & (det > 1e-14 * size)
     hessian = np.where(regular[..., None, None], hessian, np.eye(2))
-    newton = np.linalg.solve(hessian, np.concatenate([matvec(A.mT, residual)[..., None], A.mT], axis=-1))
-    gauss = np.concatenate([matvec(over.mT, residual)[..., None], over.mT], axis=-1) / whole[..., None, None]
-    step = np.where(regular[..., None, None], newton, gauss)
-    return step[..., 0], np.abs(step[..., 1:]).sum(axis=-1).max(axis=-1)
+    newton, gauss = np.linalg.solve(hessian, A.mT), over.mT / whole[..., None, None]
+    back = np.where(regular[..., None, None], newton, gauss)
+    return matvec(back, residual), np.abs(back).sum(axis=-1).max(axis=-1)
 
 
 def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
