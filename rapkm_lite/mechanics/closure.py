@@ -7,7 +7,7 @@ import numpy as np
 from ..machine.arguments import ConvergenceError, check_leading, matvec, real_array, small_number, whole_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .at import at
+from .at import At, at
 from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
 from .linalg import by_minors, least_singular_value
@@ -44,14 +44,13 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
         gradient = q - q0
         multiplier = -np.linalg.solve(R[..., :r, :], matvec(range_.mT, gradient)[..., None])[..., 0]
         hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
-        reduced = tangent.mT @ hessian @ tangent
-        convex = np.linalg.eigvalsh(reduced)[..., 0] > 0.1
-        reduced = np.where(convex[..., None, None], reduced, np.eye(2))
+        convex = np.linalg.eigvalsh(tangent.mT @ hessian @ tangent)[..., 0] > 0.1
+        hessian = np.where(convex[..., None, None], hessian, np.eye(n))
         remainder = matvec(tangent.mT, gradient)
-        rhs = remainder + np.where(convex[..., None], matvec(tangent.mT, matvec(hessian, back)), 0.0)
+        rhs = remainder + matvec(tangent.mT, matvec(hessian, back))
         if np.abs(h).max(initial=0.0) < gap and np.abs(remainder).max(initial=0.0) < tolerance:
             return q
-        step = back - matvec(tangent, np.linalg.solve(reduced, rhs[..., None])[..., 0])
+        step = back - matvec(tangent, np.linalg.solve(tangent.mT @ hessian @ tangent, rhs[..., None])[..., 0])
         size = np.linalg.norm(step, axis=-1, keepdims=True)
         q = q + step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
     gaps = np.abs(loop_constraints(robot, q)).max(axis=-1)
@@ -77,7 +76,7 @@ def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndar
     return H
 
 
-def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pose_step(pose: At, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Newton's step in x, (..., 2) in m, to the least squares; that of A^+ where the Hessian is not well positive.
     And how far, (...,) in m/rad, the rounding of the angles moves it.
 
@@ -85,8 +84,9 @@ def _pose_step(robot: Manipulator, q: np.ndarray, A: np.ndarray, residual: np.nd
     square the singular values of A: whether they are regular is asked of A, and nothing is solved with their rounding.
     Raises ValueError at input singularities.
     """
+    A = pose.A
     square = A.mT @ A
-    hessian = square - np.einsum("...i,...ikl->...kl", residual, base_angle_hessians(robot, q))
+    hessian = square - np.einsum("...i,...ikl->...kl", residual, base_angle_hessians(pose))
     over, whole = by_minors(A)
     det, size = np.linalg.det(hessian), np.trace(square, axis1=-2, axis2=-1) ** 2
     if not np.all((whole := np.reshape(whole, size.shape)) > 1e-24 * size):
@@ -140,8 +140,7 @@ def estimate_pose(robot: Manipulator, q_a, guess, tolerance: float = 1e-13, iter
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
         if np.isinf(square).any():
             break
-        A = at(robot, q).A
-        step, lever = _pose_step(robot, q, A, residual)
+        step, lever = _pose_step(at(robot, q), residual)
         size = np.abs(step).max(axis=-1, keepdims=True)
         # Near an input singularity the rounding of angles moves x further, also of those that fit.
         rounding = 1e-15 * (1.0 + np.abs(q_a).max(axis=-1))

@@ -22,7 +22,7 @@ from ..machine.arguments import (
 from ..machine.manipulator import Manipulator
 from . import cores
 from .actuation import prestress_projector, weighted_pseudoinverse
-from .at import at
+from .at import At, at
 
 
 def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
@@ -180,25 +180,24 @@ def endeffector_stiffness(robot: Manipulator, q, K_P, c=None) -> np.ndarray:
     check_leading(q=A.shape[:-2], K_P=gain.shape[:-2], c=() if c is None else c.shape[:-1])
     K = A.mT @ gain @ A
     if c is not None:
-        K = K - np.einsum("...i,...ikl->...kl", c, base_angle_hessians(robot, pose.q))
-    return K + _weight_hessian(robot, pose) if robot.gravity.any() else K
+        K = K - np.einsum("...i,...ikl->...kl", c, base_angle_hessians(pose))
+    return K + _weight_hessian(pose) if robot.gravity.any() else K
 
 
-def _weight_hessian(robot: Manipulator, pose) -> np.ndarray:
+def _weight_hessian(pose: At) -> np.ndarray:
     """d2 V / dx2 of the potential energy, (..., 2, 2) in N/m.
 
     As d = x - base - a, only the proximal links a matter: d2 a_i / dx2 = (E a_i) d2 q_i / dx2 - a_i A_i^T A_i with the
     quarter turn E.
     """
-    gx, gy = robot.gravity
-    moment = (robot.arm_moments / robot.lengths) @ [1.0, -1.0]
+    gx, gy = pose.robot.gravity
+    moment = (pose.robot.arm_moments / pose.robot.lengths) @ [1.0, -1.0]
     along, across = moment * (pose.a @ [gx, gy]), moment * (pose.a @ [gy, -gx])
-    bent = np.einsum("...i,...ikl->...kl", across, base_angle_hessians(robot, pose.q))
+    bent = np.einsum("...i,...ikl->...kl", across, base_angle_hessians(pose))
     return pose.A.mT @ (along[..., None] * pose.A) - bent
 
 
-def base_angle_hessians(robot: Manipulator, q) -> np.ndarray:
+def base_angle_hessians(pose: At) -> np.ndarray:
     """d2 q_i / dx2 of the base angles, (..., N, 2, 2) in rad/m^2: how the rows of A change along x and along y."""
-    F = at(robot, q).F
-    columns = [at(robot, q, F[..., k]).F_dot[..., : robot.n_arms, :] for k in (0, 1)]
-    return np.stack(columns, axis=-1)
+    rates = [at(pose.robot, pose.q, pose.F[..., k]).F_dot for k in (0, 1)]
+    return np.stack(rates, axis=-1)[..., : pose.robot.n_arms, :, :]
