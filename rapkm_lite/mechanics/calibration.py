@@ -146,7 +146,7 @@ def calibrate(
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} drives, whose angles contradict nothing; allowed: three or more")
     angles, logs = measured(robot, log)
-    stand = rests(logs) if logs else None
+    stand = rests(logs)
     gain = fitted_gain(stand) if stand else None
     notes = [] if gain is None or K_P is None else gain.objections(K_P)
     step = rounding(angles)

@@ -34,8 +34,8 @@ class Rests(NamedTuple):
         """Standard errors of the torques (k, N)."""
         return np.sqrt(self.noise[..., 0, 0] / self.records[:, None])
 
-    def fit(self, i: int, *columns) -> tuple[np.ndarray, np.ndarray] | None:
-        """Coefficients b, and their covariance, of the torque -b[0] e + b[1] column + ... of drive i at error e.
+    def fit(self, i: int, *columns) -> np.ndarray | None:
+        """Coefficients b, and their standard errors, of the torque -b[0] e + b[1] column + ... of drive i at error e.
 
         Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more;
         few rests leave it uncertain how much, and five standard deviations are as sure as Student's t at a thousandth.
@@ -55,7 +55,7 @@ class Rests(NamedTuple):
             from scipy.special import stdtrit
 
             noise = max(noise, self.records @ left**2 / spare * max(1.0, stdtrit(spare, 0.9995) / 5.0) ** 2)
-        return b, np.linalg.inv(information) * noise
+        return np.stack([b, np.sqrt(np.diagonal(np.linalg.inv(information)) * noise)])
 
 
 class Gain(NamedTuple):
@@ -103,7 +103,7 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
         line = stand.fit(i, np.ones(len(stand.c)))
         if line is None:
             continue
-        aside, error = line[0][1], np.sqrt(line[1][1, 1])
+        aside, error = line[:, 1]
         if abs(aside) > 5 * error and abs(aside) > 1e-4 * K_P[i]:
             said.append(
                 f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m off -K_P times the error, as with "
@@ -121,11 +121,11 @@ def fitted_gain(stand: Rests) -> Gain | None:
     for i in range(stand.c.shape[1]):
         line, aside = stand.fit(i), stand.fit(i, np.ones(len(stand.c)))
         # Torques that all lie aside are no part of the gain.
-        if aside is not None and abs(aside[0][1]) > 5 * np.sqrt(aside[1][1, 1]):
+        if aside is not None and abs(aside[0, 1]) > 5 * aside[1, 1]:
             line = aside
         if line is None:
             return None
-        found.append((line[0][0], np.sqrt(line[1][0, 0])))
+        found.append(line[:, 0])
     return Gain(*np.array(found).T)
 
 
