@@ -8,7 +8,6 @@ from ..machine.arguments import ConvergenceError, check_leading, matvec, real_ar
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import At, at
-from .cores import wrap
 from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
 from .linalg import by_minors, least_singular_value
 from .redundancy import base_angle_hessians
@@ -101,7 +100,7 @@ def _pose_step(pose: At, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def misfit(robot: Manipulator, q_a: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q at x, the residuals of the base angles q_a there, and the sum of their squares, infinite out of reach."""
     q, _ = cores.joint_angles(robot, x, robot.mode)
-    residual = wrap(q_a - q[..., : robot.n_arms])
+    residual = cores.wrap(q_a - q[..., : robot.n_arms])
     # Where an arm is as good as stretched or folded, A has no bounds; a cosine would say so 1e-6 rad away.
     out = (np.abs(np.sin(q[..., robot.n_arms :])) < 2e-12).any(axis=-1)
     return q, residual, np.where(out, np.inf, np.vecdot(residual, residual))

@@ -108,4 +108,4 @@ def _link(joint: str, angle, position, length, mass, centre, inertia, rotor, inn
 
 
 def _row(numbers) -> str:
-    return " ".join(f"{number:.17g}" for number in np.asarray(numbers, dtype=float))
+    return " ".join(f"{number:.17g}" for number in numbers)

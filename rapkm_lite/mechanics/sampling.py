@@ -52,16 +52,14 @@ def equidistant(t) -> np.ndarray:
 
 def check_rates(t: np.ndarray, x: np.ndarray, xd: np.ndarray, xdd: np.ndarray) -> None:
     """Refuse rates that are no derivative of the positions; a few jumps, as of set-points, are allowed."""
-    for name, v, unit in (("xd", xd, "m/s"), ("xdd", xdd, "m/s^2")):
-        if (fastest := np.abs(v).max()) > 1e30:
-            raise ValueError(f"{name} has entries of {fastest:.3g} {unit}; allowed: up to 1e30 {unit}")
     # Accelerations may jump, are rough where they are differences of a recorded path, and PD does without them.
     for name, v, rate, units, share in (("x", x, xd, ("m", "m/s"), 0.1), ("xd", xd, xdd, ("m/s", "m/s^2"), 0.5)):
+        if (fastest := np.abs(rate).max()) > 1e30:
+            raise ValueError(f"{name}d has entries of {fastest:.3g} {units[1]}; allowed: up to 1e30 {units[1]}")
         moved, (before, after) = np.diff(v, axis=0), (t[1] * rate[:-1], t[1] * rate[1:])
         meant = (before + after) / 2
         if name == "xd":
-            meant = np.clip(moved, np.minimum(before, after), np.maximum(before, after))
-            meant = meant if xdd.any() else moved
+            meant = np.clip(moved, np.minimum(before, after), np.maximum(before, after)) if xdd.any() else moved
         off, made, told = (np.linalg.norm(step, axis=-1) for step in (moved - meant, moved, meant))
         wrong = off > share * max(made.max(), told.max()) + 1e-12
         if np.count_nonzero(wrong) > 2 + 0.05 * len(t):
