@@ -63,7 +63,7 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
 
 def _home(robot: Manipulator) -> np.ndarray:
     centre = robot.base.mean(axis=0)
-    if np.all(reachable(robot, centre)) and _bend(q := inverse_kinematics(robot, centre)) > 0.1:
+    if reachable(robot, centre) and _bend(q := inverse_kinematics(robot, centre)) > 0.1:
         return q
     try:
         q = poses_inside(robot, *workspace_grid(robot, 100))

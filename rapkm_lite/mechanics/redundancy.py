@@ -13,7 +13,6 @@ from ..machine.arguments import (
     check_leading,
     drive_values,
     exact_array,
-    matvec,
     positive_definite,
     real_array,
     shaped,
@@ -21,7 +20,7 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator
 from . import cores
-from .actuation import prestress_projector, weighted_pseudoinverse
+from .actuation import weighted_pseudoinverse
 from .at import At, at
 
 
@@ -48,10 +47,9 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     c0 = np.zeros(m) if prestress is None else exact_array("prestress", prestress, m)
     W = np.eye(m) if W is None else positive_definite("W", W, m)
     shaped("W", W, W.ndim == 2, f"one number, ({m},) or ({m}, {m}), one pose")
-    inverse = weighted_pseudoinverse(A, W)
-    best = matvec(inverse, wrench) + matvec(prestress_projector(A, W), c0)
-    for _ in range(3):  # near an input singularity the inverse is as inexact as A is badly conditioned, up to 1e-4
-        best += matvec(inverse, wrench - matvec(A.T, best))
+    inverse, best = weighted_pseudoinverse(A, W), c0
+    for _ in range(4):  # (11), and near an input singularity what its inverse is inexact by, up to 1e-4
+        best = best + inverse @ (wrench - A.T @ best)
     if np.all(np.abs(best) <= limit):
         return best
     edge, peak = _least_peak(A, wrench, limit)
