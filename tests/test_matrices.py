@@ -10,7 +10,7 @@ from samples import FRICTIONLESS, MACHINES, machines, random_motion
 import rapkm_lite as rk
 from rapkm_lite.mechanics.antagonism import _references
 from rapkm_lite.mechanics.cores import prestress_shares
-from rapkm_lite.mechanics.linalg import least_singular_value
+from rapkm_lite.mechanics.linalg import least_singular_value, many_inverses
 
 TREE = rk.mass_matrix, rk.coriolis_matrix, rk.generalized_forces
 
@@ -184,6 +184,22 @@ def test_lost_rank_is_seen_in_any_units_and_order_of_the_coordinates(unit, delta
                     function(stack)
         with pytest.raises(ValueError, match="J has lost rank"):
             rk.projector(A.T)
+
+
+def test_minors_are_for_stacks_of_two_columns_alone():
+    A = np.random.default_rng(4).normal(size=(5, 4, 3))
+    assert many_inverses(A) is None and many_inverses(A[0, :, :2]) is None
+    A = A[..., :2]
+    assert_allclose(many_inverses(A), np.linalg.pinv(A.mT), rtol=0, atol=1e-12)
+
+
+def test_thin_matrices_are_left_to_factorizations_whatever_their_size():
+    """Rows that are nearly parallel to a part in 1e7 lose their rank in the minors; metres or millimetres."""
+    thin = np.array([[1.0, 0.0], [1.0, 1e-7], [1.0, 0.0]])
+    for size in (1e-4, 1.0, 1e4):
+        assert many_inverses(size * thin[None]) is None
+        assert many_inverses(size * np.stack([np.eye(3, 2), thin])) is None  # one of many is enough
+        assert many_inverses(size * np.eye(3, 2)[None]) is not None
 
 
 def test_shares_of_a_prestress_are_the_rows_of_the_null_basis_in_any_unit():

@@ -23,7 +23,7 @@ from ..machine.arguments import (
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores, linalg
 from .at import at
-from .linalg import minors, product
+from .linalg import many_inverses, minors, product
 
 
 def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -160,7 +160,8 @@ def weighted_pseudoinverse(A, W=None) -> np.ndarray:
     """
     A = tall_matrix("A", A)
     if W is None:
-        return cores.right_inverse("A", A)
+        inverses = many_inverses(A)
+        return cores.right_inverse("A", A) if inverses is None else inverses
     L = np.linalg.cholesky(positive_definite("W", W, A.shape[-2]))
     check_leading(A=A.shape[:-2], W=L.shape[:-2])
     Q, R, _ = cores.uneven_rank("A weighted with W", np.linalg.solve(L, A))

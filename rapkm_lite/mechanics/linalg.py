@@ -90,6 +90,16 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.linalg.solve(matrix, right)
 
 
+def many_inverses(A: np.ndarray) -> np.ndarray | None:
+    """A (A^T A)^-1 of many matrices (..., m, 2) by their minors; None for others, and where one is nearly singular."""
+    if A.ndim < 3 or A.shape[-1] != 2:
+        return None
+    over, square = by_minors(A)
+    if not np.all(square > 1e-12 * (A * A).sum((-2, -1), keepdims=True) ** 2):
+        return None
+    return over / square
+
+
 def by_minors(A: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
     """X A E and d of A (A^T A)^-1 = X A E / d for A (..., m, 2), with the minors X_ij = a_i x a_j of its rows.
 
