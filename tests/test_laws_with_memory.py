@@ -576,8 +576,10 @@ def test_a_formula_of_a_users_is_asked_or_refused():
         rk.simulate(ROBOT, Pairs(400.0, 40.0), PATH)
     Pairs.choose = lambda self, model, q, current=None: (0, 1)
     assert set(map(tuple, rk.simulate(ROBOT, Pairs(400.0, 40.0), PATH).pairs.tolist())) == {(0, 1)}
+    named = type("Named", (rk.PD,), {})(7.0, 0.2)
+    assert_allclose(*(rk.simulate(ROBOT, rk.CommandFilter(pd), PATH, OFFSET).c for pd in (named, plain)), atol=1e-9)
     for more in (law, gained, Kicking(7.0, 0.2, 1e-3)):
-        with pytest.raises(ValueError, match="allowed: PD, whose commands are filtered, and no class on it"):
+        with pytest.raises(ValueError, match="allowed: PD, whose commands are filtered, and no more than it"):
             rk.CommandFilter(more)
 
 

@@ -179,8 +179,9 @@ class CommandFilter(LawValue):
 
     def __post_init__(self):
         self._check_pose()
-        if type(self.law) is not PD:
-            raise ValueError(f"law = {short(self.law)}; allowed: PD, whose commands are filtered, and no class on it")
+        kind = type(self.law)
+        if not issubclass(kind, PD) or any(getattr(kind, k) is not getattr(PD, k) for k in ("step", "torque", "gains")):
+            raise ValueError(f"law = {short(self.law)}; allowed: PD, whose commands are filtered, and no more than it")
         super().__post_init__()
 
     def start(self, model, dt):

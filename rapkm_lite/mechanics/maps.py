@@ -13,7 +13,7 @@ from .actuation import distal_cross_products, drive_pairs
 from .at import at
 from .cores import prestress_shares
 from .kinematics import inverse_kinematics
-from .linalg import minors, singular_values
+from .linalg import singular_values
 from .partition import PARTITION_RULES, first_best
 
 
@@ -134,11 +134,16 @@ def _condition(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarr
     return sigma[..., 0] / np.maximum(sigma[..., 1], 1e-13 * sigma[..., 0])
 
 
+def _cross(robot: Manipulator, q: np.ndarray, drives: list[int]) -> np.ndarray:
+    chosen = [k for k, pair in enumerate(drive_pairs(robot)) if set(pair) <= set(drives)]
+    return np.abs(distal_cross_products(robot, q)[..., chosen]).max(axis=-1)
+
+
 _MEASURES = {
     # Of the rows of A~ = Q_a Q^T, with the columns of F made orthonormal in Q.
     "sigma_min": lambda robot, q, drives: singular_values(np.linalg.qr(at(robot, q).F).Q[..., drives, :])[..., 1],
     "condition": _condition,
-    "cross": lambda robot, q, drives: np.abs(minors((at(robot, q).d / robot.lengths[:, 1:])[..., drives, :])).max(-1),
+    "cross": _cross,
     # At an input singularity every prestress is free: no direction, so the point is masked.
     "prestress": lambda robot, q, _: np.moveaxis(prestress_shares(at(robot, q).A), -1, 0),
 }
