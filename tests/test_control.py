@@ -462,6 +462,34 @@ def test_closed_loop_of_the_redundant_ctc():
     assert (norm(sum(terms)) / sum(map(norm, terms))).max() < 1e-10
 
 
+@pytest.mark.parametrize("law", [rk.RedundantCTC(400.0, 40.0), rk.RedundantAPD(50.0, 5.0)], ids=["CTC", "APD"])
+def test_line_2_depends_on_the_arm_that_carries_the_load(law):
+    """Symmetry: arms in another order give the same torques in line 1.  Under line 2 of (32) the load moves to an arm
+    whose tip accelerates by hdd = J v + Jdot qd more, h = tip_1 - tip_2: in torques (A^T)^+ load hdd."""
+    order = np.array([1, 0, 2])
+    joints = np.concatenate([order, 3 + order])
+    robot = ROBOT.replace(load=0.4)
+    names = ("base", "lengths", "masses", "centers", "inertias", "rotor_inertia", "mode")
+    other = robot.replace(**{name: getattr(robot, name)[order] for name in names})
+    q, qd, desired = state_and_target(robot)
+    moved = (desired.q, desired.qd, desired.qdd)
+    renamed = rk.Desired(3, desired.x, desired.xd, desired.xdd, *(part[:, joints] for part in moved))
+
+    def difference(law):
+        c = torque(law, robot, q, qd, desired)
+        return torque(law, other, q[:, joints], qd[:, joints], renamed)[:, order] - c, norm(c).max()
+
+    found, size = difference(law)
+    assert norm(found).max() < 1e-10 * size
+    if isinstance(law, rk.RedundantCTC):
+        v = desired.qdd - 40.0 * (qd - desired.qd) - 400.0 * (q - desired.q)
+        hdd = mv(rk.constraint_jacobian(robot, q), v) + mv(rk.constraint_jacobian_dot(robot, q, qd), qd)
+        expected = mv(rk.weighted_pseudoinverse(rk.control_matrix(robot, q)), robot.load * hdd[:, :2])
+        found, size = difference(dataclasses.replace(law, projected=False))
+        assert norm(expected).max() > 1e-3 * size
+        assert_allclose(found, expected, rtol=0, atol=1e-10 * size)
+
+
 def stiffness(law, robot, x):
     """-d(q2dd)/d(x) at rest in the desired pose x, in end-effector coordinates, by central differences."""
     target = rk.inverse_kinematics(robot, x)

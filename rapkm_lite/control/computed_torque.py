@@ -195,7 +195,8 @@ class RedundantAPD(LawValue):
         the driven joints (which come first in our q); one number, (2N,) or (2N, 2N) act on all joints.
     rule : partition rule of the explicit pseudoinverse (27), see `select_independent`; the torques do not depend on it.
     projected : False reads line 2 of the print, c = (A~^T)^+ N_J (G qdd^d + C qd^d + Q - K_P e - K_D ed), which is
-        another law: both agree for e = ed = 0 and for a desired pose at rest.
+        another law: both agree for e = ed = 0 and for a desired pose at rest.  Elsewhere a `load` counts in line 2 with
+        the acceleration of the arm that carries it (arm 2), in line 1 with that of the end-effector.
     At c-space and input singularities `torque` raises ValueError, and a run SimulationError.  For pose see `Law`.
 
     >>> import rapkm_lite as rk
