@@ -665,6 +665,43 @@ def test_files_of_a_student_are_written_elsewhere(tmp_path, monkeypatch):
     assert not list(Path().iterdir())
 
 
+READS = """one = np.loadtxt("data.csv")
+with open("logs/one.txt") as file:
+    one = one * float(file.read())
+with open("data.csv", "w") as file, open("logs/mine.txt", "w") as mine:
+    one = one * bool(file.write("2.0"))
+"""
+
+
+@pytest.mark.parametrize("words", [READS, "from helper import one", "%run helper.py"], ids=["cell", "import", "%run"])
+def test_a_data_file_beside_the_notebook_is_read_from_a_copy(tmp_path, words):
+    """Written to by the student, changed for nobody; a name of the standard library is not taken by a file of his."""
+    files = {
+        "data.csv": "1.0",
+        "logs/one.txt": "1.0",
+        "helper.py": f"import numpy as np\n{READS}",
+        "random.py": "1 / 0",
+    }
+    (tmp_path / "logs").mkdir()
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    assert graded_alone(tmp_path, f"import random\n{words}\n") == "ok"
+    left = {path.relative_to(tmp_path).as_posix(): path for path in tmp_path.rglob("*") if path.is_file()}
+    assert {*left} == {*files, "04_x.ipynb"} and all(left[name].read_text() == text for name, text in files.items())
+
+
+def test_a_student_finds_only_files_of_his_own(tmp_path):
+    """In a folder what lies there, beside loose notebooks what lies beside them, and no folder: it is another's."""
+    sees = "from pathlib import Path\none = 1.0 * ({} == sorted(path.name for path in Path().rglob('*')))\n"
+    answer = TORQUES.replace("return A", "return one * A") + CHECKS[0]
+    seen = {"ada/04_x": ["data.csv"], "ben/deep/04_x": [], "04_cyd": ["handed_out.csv"], "04_dan": ["handed_out.csv"]}
+    for name, files in seen.items():
+        write(tmp_path / f"{name}.ipynb", [SETUP, sees.format(files) + answer])
+    for name in ("handed_out.csv", "ada/data.csv", "ada/.hidden", "ben/above.csv"):
+        (tmp_path / name).write_text("1.0")
+    assert [one.verdict for one in grade(tmp_path) if one.exercise == NAMES[0]] == ["ok"] * 4
+
+
 COUNTER = "import sys, time\nfor _ in range(200):\n    open(sys.argv[1], 'a').write('x')\n    time.sleep(0.05)\n"
 STARTS = """import subprocess, sys, time
 from pathlib import Path
@@ -726,7 +763,7 @@ class Acted:
 
 
 def results(seconds=30.0):
-    one = Submission("ada", Path("04_x.ipynb"), "04")
+    one = Submission("ada", Path("nowhere/04_x.ipynb"), "04")
     return grader._results(one, seconds, grader.Event(), whole=False)[0]
 
 

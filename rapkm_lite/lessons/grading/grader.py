@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -132,13 +133,14 @@ def _events(
     submission: Submission, place: Path, seconds: float, ends: float, stop: Event, whole: bool, skip: list[str]
 ) -> Iterator[dict]:
     """What a worker tells, until it is done, dies, or says nothing for longer than the limit."""
-    log = place / "log.jsonl"
+    log, work = place / "log.jsonl", place / "work"
     log.touch()
+    lend(submission, work)
     command = [sys.executable, "-m", "rapkm_lite.lessons.grading.worker", str(submission.path.resolve())]
     command += [submission.lesson, str(log), *(["--whole"] if whole else [])]
     command += [word for key in skip for word in ("--skip", key)]
     quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": (place / "errors").open("w")}
-    worker = subprocess.Popen(command, cwd=place, env=_environment(), start_new_session=os.name == "posix", **quiet)
+    worker = subprocess.Popen(command, cwd=work, env=_environment(), start_new_session=os.name == "posix", **quiet)
     heard, finished = time.monotonic(), False
     try:
         with log.open(encoding="utf-8") as lines:
@@ -160,6 +162,24 @@ def _events(
     finally:
         _end(worker)
         quiet["stderr"].close()
+
+
+def lend(submission: Submission, work: Path) -> None:
+    """Copies, in a new folder, of the files that lie beside a notebook and in the folders there.
+
+    Not of Python files, which the worker finds where they are, after those that are installed; nor of notebooks, of
+    what is hidden, of links to folders and of what cannot be read.
+    """
+    work.mkdir()
+    for place, folders, files in os.walk(submission.path.parent):
+        # Beside a loose notebook a folder is another student's.
+        folders[:] = [] if submission.loose else [one for one in folders if one[0] != "."]
+        target = work / Path(place).relative_to(submission.path.parent)
+        target.mkdir(exist_ok=True)
+        for file in (Path(place, one) for one in files):
+            if file.name[0] != "." and file.suffix.lower() not in (".py", ".pyc", ".ipynb") and file.is_file():
+                with suppress(OSError):
+                    shutil.copyfile(file, target / file.name)
 
 
 def _environment() -> dict[str, str]:

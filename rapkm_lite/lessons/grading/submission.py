@@ -37,11 +37,12 @@ class Statement:
 
 @dataclass(frozen=True)
 class Submission:
-    """One notebook of one student; `lesson` is its number as text, "04"."""
+    """One notebook of one student; `lesson` is its number as text, "04"; a `loose` one lies in no student's folder."""
 
     student: str
     path: Path
     lesson: str
+    loose: bool = False
 
 
 def found(folder: Path, known: set[str]) -> list[Submission]:
@@ -63,7 +64,8 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
 def _handed_in(folder: Path, known: set[str]) -> Iterator[Submission]:
     for path, parts in _notebooks(folder):
         if numbers := [n for n in dict.fromkeys(_NUMBER.findall(path.name)) if n in known]:
-            yield Submission(parts[0] if len(parts) > 1 else path.stem, path, _told(path, numbers, known))
+            loose = len(parts) == 1
+            yield Submission(path.stem if loose else parts[0], path, _told(path, numbers, known), loose)
 
 
 def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
