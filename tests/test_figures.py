@@ -693,6 +693,41 @@ def test_a_short_run_is_drawn_to_its_end(world):
     assert len(plotting.plot_torque_plane({"idle": run}).lines[0].get_xdata()) == len(run)
 
 
+def test_energies_are_asked_for_by_the_name_that_a_run_has_for_them(world):
+    run, words = world["run"], "energies in J, one per drive, such as run.energy"
+    for energies in (run, rk.sweep(run.robot, run.law, run.trajectory, [OFFSET]), np.ones((2, 3)), [], 1.0, None):
+        with pytest.raises(ValueError, match=rf"^rows\['a'\] .*; allowed: {words}$"):
+            plotting.plot_energies({"a": energies})
+    for rows in (run, [run, run], {}):
+        with pytest.raises(ValueError, match=rf"^rows = .*; allowed: a dict of {words}, by their label$"):
+            plotting.plot_energies(rows)
+    with pytest.raises(ValueError, match=r"^rows\['a'\]\[1\] = nan; "):
+        plotting.plot_energies({"a": [1.0, np.nan]})
+
+
+def test_every_drive_of_the_largest_machine_has_its_name_below_its_bar():
+    ax = plotting.plot_energies({"three drives": [1.0, 2.0, 3.0], "two": [1.0, 2.0]})
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["drive 1", "drive 2", "drive 3"]
+
+
+@pytest.mark.parametrize("x", [[0.05, -0.03], [-0.04, 0.02], [0.03, 0.05], [0.06, 0.05]])
+def test_names_of_pairs_that_nearly_agree_do_not_touch(x):
+    """Six pairs of four arms: each name once, none on another or on a point."""
+    ax = plotting.plot_synchronization(rk.load("four_arms"), x, [4e-3, -2e-3, 5e-3, 0.0])[1]
+    ax.figure.canvas.draw()
+    words = [*ax.texts, *ax.get_legend().get_texts()]
+    names = [f"drives {j + 1}, {k + 1}" for j, k in rk.drive_pairs(rk.load("four_arms"))]
+    assert [word.get_text() for word in words] == [*names, "least squares", "true"]
+    boxes = [word.get_window_extent() for word in words]
+    assert not [1 for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)]
+    points = np.vstack([ax.transData.transform(line.get_xydata()) for line in ax.lines])
+    assert not any(box.contains(*point) for box in boxes for point in points)
+    # A square stands beside the name of the pair whose colours it has.
+    for handle, (j, k) in zip(ax.get_legend().legend_handles, rk.drive_pairs(rk.load("four_arms")), strict=False):
+        assert handle.get_color() == plotting.arm_colour(j)
+        assert handle.get_markerfacecoloralt() == plotting.arm_colour(k)
+
+
 def test_bars_of_any_size_have_their_numbers():
     for size, words in ((1e-11, "1e−11"), (1.5, "1.50"), (2e15, "2e+15")):
         ax = plotting.plot_energies({"a": [size, size / 2]})

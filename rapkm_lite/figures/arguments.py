@@ -22,6 +22,7 @@ from ..machine.arguments import (
     of_kind,
     positive_number,
     real_array,
+    shaped,
     short,
     switch,
     whole_number,
@@ -95,7 +96,7 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
         return
     if isinstance(default, bool | str | float):
         kind = type(default).__name__
-    check = _KINDS.get(kind)
+    check = _energies if (name, kind) == ("rows", "dict") else _KINDS.get(kind)
     if check is not None:
         check(name, value)
     elif kind.startswith("int"):
@@ -114,6 +115,18 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
 def _dictionary(name: str, value) -> None:
     if not isinstance(value, dict) or not value:
         raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
+
+
+def _energies(name: str, value: Any) -> None:
+    words = "energies in J, one per drive, such as run.energy"
+    if not isinstance(value, dict) or not value:
+        raise ValueError(f"{name} = {short(value)}; allowed: a dict of {words}, by their label")
+    for label, energies in value.items():
+        where = f"{name}[{label!r}]"
+        if hasattr(energies, "energy") or not hasattr(energies, "__len__"):
+            raise ValueError(f"{where} = {short(energies)}; allowed: {words}")
+        array = real_array(where, energies)
+        shaped(where, array, array.ndim == 1 and array.size > 0, words)
 
 
 def _trajectory(name: str, value, known: Known) -> None:

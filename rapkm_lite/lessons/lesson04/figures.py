@@ -22,10 +22,7 @@ from ...simulation.energy import antagonistic_torque
 
 
 def _pair_poses(robot, q_a, guess, pairs) -> dict:
-    """What each equivalent five-bar (fig. 3) makes of measured base angles q_a (N,) in rad, by pair of drives.
-
-    Each value is the configuration (4,) in rad of ``robot.with_arms(pair)``, found from the point `guess` (2,) in m.
-    """
+    """Each pair's five-bar (fig. 3), as its configuration (4,) in rad, at base angles q_a (N,); found from `guess`."""
     return {pair: estimate_pose(robot.with_arms(pair), np.asarray(q_a)[list(pair)], guess) for pair in pairs}
 
 
@@ -72,15 +69,19 @@ def _plot_beliefs(robot, x, points: dict, estimate, ax) -> None:
     apart = len(corners) == 1 or np.ptp(corners, axis=0).max() > LEAST
     if len(corners) == 3:
         ax.fill(*corners.T, color="#EEF2F6", ec=BEFORE, lw=1, zorder=1)
-    for (j, k), corner in zip(points, corners, strict=True):
+    names = [*(f"drives {j + 1}, {k + 1}" for j, k in points), "least squares", "true"]
+    for (j, k), corner, name in zip(points, corners, names, strict=False):
         ax.plot(*corner, "s", ms=10, color=arm_colour(j), markerfacecoloralt=arm_colour(k), fillstyle="left", mec="k")
-        if apart and len(corners) <= 6:
+        if apart and len(corners) <= 3:
             side = 1 if corner[1] >= corners[:, 1].mean() else -1  # the name stands outside the triangle
-            ax.annotate(f"drives {j + 1}, {k + 1}", corner, xytext=(0, 14 * side), **centred)
+            ax.annotate(name, corner, xytext=(0, 14 * side), **centred)
     ax.plot(*(1e3 * (estimate - x)), "D", color=NEUTRAL, ms=7)
-    ax.annotate("least squares" if apart else "all drives agree", 1e3 * (estimate - x), xytext=(0, -13), **centred)
     ax.plot(0, 0, "+", color=AFTER, ms=14, mew=1.6)
-    ax.annotate("true", (0, 0), xytext=(10, -4), **words)
+    if apart and 3 < len(corners) <= 6:  # some nearly agree, and their names would lie on one another
+        ax.legend(ax.lines[-len(names) :], names, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    else:
+        ax.annotate("least squares" if apart else "all drives agree", 1e3 * (estimate - x), xytext=(0, -13), **centred)
+        ax.annotate("true", (0, 0), xytext=(10, -4), **words)
     shown = np.vstack([corners, 1e3 * (estimate - x), [0.0, 0.0]])
     ends = np.array([[-0.85], [0.85]]) * max(np.ptp(shown, axis=0).max(), 2 * LEAST)  # room for the names
     left_right, low_high = ((shown.min(axis=0) + shown.max(axis=0)) / 2 + ends).T
@@ -218,8 +219,7 @@ def plot_filter_share(run, share: float, axes=None):
     axes[1].plot((1 - share) * along, moving, ".", color=AFTER, ms=5)
     axes[1].axvline(0, color="#BBBBBB", lw=0.8, zorder=0)
     least = min(10.0, 0.2 * reach)
-    wide, high = 1.1 * max(np.abs(along).max(), least), 1.15 * moving.max()
-    low = min(-least, 1.1 * along.min())
+    wide, high, low = 1.1 * max(np.abs(along).max(), least), 1.15 * moving.max(), min(-least, 1.1 * along.min())
     axes[1].set(xlim=(low, max(least, 1.1 * along.max())), ylim=(0, max(high, 0.5 * wide)))
     axes[1].set(xlabel="antagonism, ηᵀc, in mN m", ylabel="torque that moves, in mN m")
     return axes
@@ -261,7 +261,7 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
             ax.text(at, max(energy, 0.0), f"{energy:{digits}}".replace("-", "−"), **words)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
-    ax.set_xticks(range(len(energies)), [f"drive {i + 1}" for i in range(len(energies))])
+    ax.set_xticks(range(N := max(map(len, rows.values()))), [f"drive {i + 1}" for i in range(N)])
     ax.set(ylabel="electric energy in J", title=title)
     ax.set_ylim(min(0.0, 1.25 * low), max(1.3 * high, 0.1 * size))
     ax.grid(axis="x", visible=False)
