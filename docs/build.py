@@ -6,6 +6,7 @@ Needs no network.  --lessons takes the notebooks from another folder; --strict f
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import re
 import shutil
 import sys
@@ -18,7 +19,6 @@ ROOT = HERE.parent
 sys.path.insert(0, str(HERE))
 
 from pages import drawing, lessons, reference, start  # noqa: E402
-from sphinx.cmd.build import build_main  # noqa: E402
 
 WORK, SITE = HERE / "_work", HERE / "_site"
 PLAN = """\
@@ -163,6 +163,10 @@ def main() -> int:
     options = parser.parse_args()
     if not (options.lessons / "equations.md").exists():
         parser.error(f"--lessons {options.lessons}: no equations.md there; allowed: a copy of notebooks")
+    if not importlib.util.find_spec("sphinx"):
+        parser.error("Sphinx is not installed; needed: python -m pip install -r docs/requirements.txt")
+    from sphinx.cmd.build import build_main
+
     prepare(options.lessons.resolve(), options.repository)
     shutil.rmtree(SITE, ignore_errors=True)
     with tempfile.TemporaryDirectory() as doctrees:

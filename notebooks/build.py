@@ -77,7 +77,9 @@ def main(wanted: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["new"]:
+    if {"-h", "--help"} & {*sys.argv}:
+        print(__doc__)
+    elif sys.argv[1:2] == ["new"]:
         try:
             new(*sys.argv[2:3] or [""])
         except ValueError as error:

@@ -11,6 +11,7 @@ turn the pages, the browser prints one page per slide while answers are closed. 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -44,4 +45,7 @@ def main(number: str, target: str = "") -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:3]) if sys.argv[1:] else main(""))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("number", nargs="?", default="", help="of the lesson, such as 04")
+    parser.add_argument("target", nargs="?", default="", help="file to write (slides_04.html)")
+    sys.exit(main(**vars(parser.parse_args())))

@@ -139,6 +139,8 @@ def table(path: Path) -> str:
 
 
 if __name__ == "__main__":
+    if {"-h", "--help"} & {*sys.argv}:
+        sys.exit(print(__doc__))
     for lesson in lessons():
         if not sys.argv[1:] or lesson.stem[:2] in sys.argv[1:]:
             print(table(lesson), end="\n\n")

@@ -1,6 +1,7 @@
 """The teachers' pages against the lessons: what is generated is up to date, numbers are right, nothing is left out."""
 
 import itertools
+import os
 import re
 import subprocess
 import sys
@@ -316,12 +317,25 @@ def test_formula_sheet_is_one_page_without_overflow(tmp_path):
     assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)], "text over text"
 
 
-@pytest.mark.parametrize("target", ["--help", "nowhere/sheet.pdf"])
-def test_pages_for_teachers_are_written_or_refused_by_a_sentence(tmp_path, target):
-    scripts = [(TEACHING / "formula_sheet.py", target), (ROOT / "notebooks" / "slides.py", "04", "nowhere/slides.html")]
-    for script in scripts:
+@pytest.mark.parametrize(
+    ("target", "said"), [("--nothing", "unrecognized arguments: --nothing"), ("nowhere/a", "allowed")]
+)
+def test_pages_for_teachers_are_written_or_refused_by_a_sentence(tmp_path, target, said):
+    for script in (TEACHING / "formula_sheet.py", target), (ROOT / "notebooks" / "slides.py", "04", target):
         done = subprocess.run([sys.executable, *map(str, script)], capture_output=True, text=True, cwd=tmp_path)
-        assert done.returncode == 2 and "Traceback" not in done.stderr and ("allowed" in done.stderr)
+        assert done.returncode == 2 and "Traceback" not in done.stderr and said in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+WITH_ARGUMENTS = ["docs/teaching/formula_sheet.py", "notebooks/slides.py", "notebooks/build.py", "docs/build.py"]
+
+
+@pytest.mark.parametrize("script", [*WITH_ARGUMENTS, "docs/lite.py", "tests.bench", "tests.minutes"])
+def test_a_script_says_how_it_is_called(tmp_path, script):
+    start = [ROOT / script] if script.endswith(".py") else ["-m", script]
+    here = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(ROOT)}}
+    done = subprocess.run([sys.executable, *start, "--help"], capture_output=True, text=True, **here)
+    assert done.returncode == 0 and not done.stderr and Path(script).name in done.stdout
     assert not list(tmp_path.iterdir())
 
 

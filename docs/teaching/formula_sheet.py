@@ -8,6 +8,7 @@ Numbers are the chapter's; a star marks a formula that is corrected against the 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -117,8 +118,6 @@ def main(target: str = "formula_sheet.pdf") -> int:
     """Write the page; 2 where it cannot be written."""
     path = Path(target)
     try:
-        if target.startswith("-"):
-            raise OSError(None, "an option")
         sheet().savefig(path, format="pdf", metadata={"Title": "Formula sheet", "CreationDate": None})
     except OSError as error:
         print(f"target = {target!r} ({error.strerror}); allowed: a file in a folder that exists", file=sys.stderr)
@@ -128,4 +127,6 @@ def main(target: str = "formula_sheet.pdf") -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:2]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("target", nargs="?", default="formula_sheet.pdf", help="file to write (formula_sheet.pdf)")
+    sys.exit(main(**vars(parser.parse_args())))

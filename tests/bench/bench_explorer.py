@@ -1,6 +1,6 @@
 """By hand: latency of the decentralized-run explorer in a real JupyterLab, next to `interact` with inline figures.
 
-    python tests/bench/bench_explorer.py
+    python tests/bench/bench_explorer.py [names]
 
 Prints for each: median time from the key press to the next painted picture, pictures per second while a slider is
 dragged, and, where a picture has a handle, the same two for a hand that moves it.
@@ -138,4 +138,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    print(__doc__) if {"-h", "--help"} & {*sys.argv} else main(sys.argv[1:])

@@ -74,4 +74,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    print(__doc__) if {"-h", "--help"} & {*sys.argv} else main(sys.argv[1:])
