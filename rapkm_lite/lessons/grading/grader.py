@@ -135,7 +135,7 @@ def _events(
     """What a worker tells, until it is done, dies, or says nothing for longer than the limit."""
     log, work = place / "log.jsonl", place / "work"
     log.touch()
-    lend(submission, work)
+    _lend(submission, work)
     command = [sys.executable, "-m", "rapkm_lite.lessons.grading.worker", str(submission.path.resolve())]
     command += [submission.lesson, str(log), *(["--whole"] if whole else [])]
     command += [word for key in skip for word in ("--skip", key)]
@@ -164,7 +164,7 @@ def _events(
         quiet["stderr"].close()
 
 
-def lend(submission: Submission, work: Path) -> None:
+def _lend(submission: Submission, work: Path) -> None:
     """Copies, in a new folder, of the files that lie beside a notebook and in the folders there.
 
     Not of Python files, which the worker finds where they are, after those that are installed; nor of notebooks, of
@@ -177,7 +177,7 @@ def lend(submission: Submission, work: Path) -> None:
         target = work / Path(place).relative_to(submission.path.parent)
         target.mkdir(exist_ok=True)
         for file in (Path(place, one) for one in files):
-            if file.name[0] != "." and file.suffix.lower() not in (".py", ".pyc", ".ipynb") and file.is_file():
+            if file.name[0] != "." and file.suffix.lower() not in (".py", ".pyc", ".ipynb") and os.path.isfile(file):
                 with suppress(OSError):
                     shutil.copyfile(file, target / file.name)
 
