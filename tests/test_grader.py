@@ -510,10 +510,22 @@ def test_what_is_awaited_is_waited_for(tmp_path):
 
 def test_a_number_in_a_name_that_is_no_lesson_is_corrected_by_the_exercises(tmp_path):
     """A team, or the month of a date, has a number like a lesson."""
-    for name in ("team_07_lesson_04.ipynb", "filter_2026_03_12.ipynb"):
+    for name in (
+        "team_07_lesson_04.ipynb",
+        "filter_2026_03_12.ipynb",
+        "Abgabe 12.03.ipynb",
+        "04-filter-2026-03-12.ipynb",
+    ):
         write(tmp_path / "ada" / name, checked(RIGHT))
         assert [(one.lesson, one.path.name) for one in found(tmp_path, {"03", "04", "07"})] == [("04", name)]
         (tmp_path / "ada" / name).unlink()
+
+
+@pytest.mark.parametrize("name", ["04 Übung – Lösung", "Übung 04", "lesson04", "04", "04-filter (1)", "x_04 (gültig)"])
+def test_a_lesson_is_told_by_its_number_whatever_stands_around_it(tmp_path, name):
+    write(tmp_path / "Jörg Müßig" / f"{name}.ipynb", [SETUP])
+    write(tmp_path / "Jörg Müßig" / "04a 2026 1004 homework.ipynb", [SETUP])
+    assert [(one.student, one.lesson) for one in found(tmp_path, {"04", "10"})] == [("Jörg Müßig", "04")]
 
 
 INDIRECT = [

@@ -24,6 +24,7 @@ from .setup import prepare
 class Sweep(Value):
     """Result of `sweep`, one row per run; rows of failed runs are masked, and zero under the mask: use `compressed`.
 
+    A file keeps no mask, so `np.savez` and `np.savetxt` write the zeros: save ``study.energies[~study.failed]``.
     law : the law, or a tuple of k.  offsets : (k, N) rad; robot and trajectory were the same for all runs.
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.

@@ -16,7 +16,7 @@ from ...machine.arguments import short
 from ..exercise import Exercise
 
 _EXERCISE = re.compile(r"\d\d\.\w+")
-_NUMBER = re.compile(r"(?<!\d)(\d\d)_")
+_NUMBER = re.compile(r"(?<!\d)\d\d(?![^\W_])")  # whatever stands behind it, but for letters and digits
 _BUILT_IN = {*dir(builtins), "display"}
 # A notebook may await outside a function; nothing of this module's own way to be compiled is passed on.
 RULES = {"flags": ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, "dont_inherit": True}
