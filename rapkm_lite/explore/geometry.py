@@ -131,7 +131,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         if path == "triangle":
             t = shared.central_triangle(robot, size, dt=0.01)
         else:
-            t = circle(robot, 5e-4 * size, dt=0.01, centre=marks.middle(robot))
+            t = circle(robot, 5e-4 * size, dt=0.01, centre=shared.place(robot)[0])
         A = act.control_matrix(robot, t.q)
         # Without a single null vector: how much of each drive's torque the projector onto the null space keeps.
         share = np.diagonal(act.prestress_projector(A), axis1=-2, axis2=-1)
@@ -181,7 +181,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "place": slider("place on the path in %", 0.0, 100.0, 0.5, 12.0),
         "path": choice("path", ["triangle", "circle"]),
-        "size": shared.length_slider(robot, "side or diameter in mm", 40, 320, 5, 240),
+        "size": shared.path_slider(robot, "side or diameter in mm", 40, 320, 5, 240),
         "torque": slider("torque limit in mN m", 20, 200, 5, 85),
     }
     layout = [["plane", "sigma"], ["force", "null"]]
@@ -198,6 +198,7 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
     '0 mN m'
     """
     robot = shared.frictionless(robot)
+    strong = shared.torque_scale(robot)
 
     @lru_cache(maxsize=8)
     def along(side: int):
@@ -219,14 +220,14 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
             "with": marks.per_drive(sign_changes(c), 0),
             "heat without": f"{energy[0]:.2f} J",
             "heat with": f"{energy[1]:.2f} J",
-            "largest prestress": f"{1e3 * np.abs(stress).max():.0f} mN m",
+            "largest prestress": f"{1e3 * np.abs(stress).max():.{shared.decimals(0.01 / strong)}f} mN m",
         }
 
     without, also = shared.over_time("torque in mN m", robot=robot), shared.over_time("torque in mN m")
     panels = {"without": without | {"title": "No prestress"}, "with": also | {"title": "With prestress"}}
     controls = {
-        "level": slider("prestress wished for in mN m", -100, 100, 2, 40),
-        "side": shared.length_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
+        "level": slider("prestress wished for in mN m", -100 * strong, 100 * strong, 2 * strong, 40 * strong),
+        "side": shared.path_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
     }
     return explorer(draw, controls, panels, live=True)
 

@@ -34,18 +34,15 @@ OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, k
 
 @shared.ready_made
 def imperfections(robot: Manipulator | None = None) -> Explorer:
-    """Distance from the wanted place and torques that act, with links too long, weak drives and one fault.
+    """Distance from the wanted place and torques that act (dotted: limits), with links too long and one fault.
 
     >>> imperfections().set(longer=0).numbers["largest torque"]
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
-    needed = np.abs(act.inverse_dynamics(robot, path.q, path.qd, path.qdd)).max(axis=1)
-    # Beside a place that two arms cannot cross no limit is wide enough.
-    needed = min(needed.max(), 10 * np.median(needed))
-    usual = shared.usual_gains(robot)
-    strong = 10 ** max(0, int(np.ceil(np.log10(needed / 0.15))))  # so that the limit can be passed and be held
+    usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
+    form = f".{shared.decimals(0.01 / strong)}f"
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(**{name: (1 + 1e-3 * longer) * getattr(robot, name) for name in ("lengths", "centers")})
@@ -57,12 +54,15 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
             if error.partial is None:
                 raise
             run, lost = error.partial, f", lost at {error.time:.2f} s"
-        off, torque = shared.draw_distance(picture, run, (1.0, 20.0))
+        off, torque = shared.draw_distance(picture, run, (1.0, shared.least_torque(robot, 20.0)))
+        picture.fit("torque", torque, limit)
+        for side in (-limit, limit):
+            picture.line("torque", picture.xlim("torque"), [side, side], color=ALARM, linestyle=":", linewidth=1.5)
         if lost:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
             "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
-            "largest torque": f"{np.abs(torque).max():.0f} of {limit:.0f} mN m",
+            "largest torque": f"{np.abs(torque).max():{form}} of {limit:{form}} mN m",
             "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1) + " mN m",
             "electric energy": f"{run.energy.sum():.2f} J",
         }
@@ -70,7 +70,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "longer": slider("links too long in ‰", -10.0, 10.0, 0.5, 5.0),
         "K_P": shared.gain_slider(robot, low=2.0),
-        "limit": slider("torque limit in mN m", 40 * strong, 400 * strong, 10 * strong, 150 * strong),
+        "limit": slider("torque limit in mN m", 40 * strong, 200 * strong, 5 * strong, 150 * strong),
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),
     }
@@ -86,7 +86,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = shared.frictionless(robot)
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
-    mass = shared.carried(robot)
+    mass, heavier = shared.carried(robot), shared.rounded(robot.masses.sum() / 0.67)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
         "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),
@@ -102,7 +102,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
         w, offset = 2 * np.pi * frequency, marks.offset_values(offsets, robot.n_arms)
         sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
         run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
-        off, torque = shared.draw_distance(picture, run, (2.0, 60.0))
+        off, torque = shared.draw_distance(picture, run, (2.0, shared.least_torque(robot, 60.0)))
         return {
             "largest error": f"{off.max():.2f} mm",
             "largest jump of a torque": f"{np.abs(np.diff(torque, axis=0)).max():.1f} mN m",
@@ -112,7 +112,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     controls = {
         "law": choice("law", laws.keys(), "PD"),
         "frequency": slider("speed of the loop in Hz", 1, 8, 0.5, 5),
-        "load": slider("unknown payload in g", 0, 200, 20, 0),
+        "load": slider("unknown payload in g", 0, 200 * heavier, 20 * heavier, 0),
         "coarse": switch("2000 counts per turn"),
     } | offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     return explorer(draw, controls, shared.distance_panels(robot, 2.5), size=(9.2, 3.8))

@@ -18,9 +18,9 @@ from ..mechanics.actuation import control_matrix, prestress_projector
 from ..mechanics.calibration import CalibrationError, calibrate
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.redundancy import allocate_torques, minimax_torques
+from . import shared
 from .controls import choice, slider
 from .explorer import Explorer, explorer
-from .shared import draw_forces, force_panel, frictionless, held_machine, length_slider, place_sliders, ready_made, size
 
 RULES = {
     "least size": lambda A, f, limit: smallest(A, f),
@@ -30,19 +30,19 @@ RULES = {
 }
 
 
-@ready_made
+@shared.ready_made
 def allocation(robot: Manipulator | None = None) -> Explorer:
     """The torques that make one force: of least size (pale bars) and by the chosen rule; dotted: the limits.
 
     >>> allocation().numbers["largest"]
     '100 % of the limit'
     """
-    robot = frictionless(robot)
+    robot = shared.frictionless(robot)
 
     def draw(picture, x, y, f_x, f_y, limit, rule):
-        _, q, stop = held_machine(picture, "machine", robot, x, y)
+        _, q, stop = shared.held_machine(picture, "machine", robot, x, y)
         A, f = control_matrix(robot, q), np.array([f_x, f_y])
-        picture.fit("force", draw_forces(picture, A, limit), f, least=1.7 / times)
+        picture.fit("force", shared.draw_forces(picture, A, limit), f, least=1.7 / times)
         picture.limits("force", x=picture.ylim("force"))
         inner = shortest_reach(A, 1e-3 * limit, 181)
         picture.line("force", *np.vstack([inner, inner[:1]]).T, color=AFTER, linewidth=1.2, linestyle="--")
@@ -59,20 +59,20 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
             "largest": f"{np.abs(torques).max() / limit * 1e5:.0f} % of the limit",
         } | stop
 
-    times = size(robot)
+    times = shared.size(robot)
     # It begins with three quarters of a newton on the testbed, elsewhere with less than the drives can do.
     first = 0.0
-    with suppress(ValueError):  # where the middle is out of reach, or the drives let go
-        A = control_matrix(robot, inverse_kinematics(robot, marks.middle(robot)))
+    with suppress(ValueError):  # where the middle is a drive, or the drives let go
+        A = control_matrix(robot, inverse_kinematics(robot, shared.place(robot)[0]))
         reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
         first = min(0.75, 0.05 * np.floor(18 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},
-        "force": force_panel(1.8 / times) | {"legend": reaches},
+        "force": shared.force_panel(1.8 / times) | {"legend": reaches},
         "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
     }
-    controls = place_sliders(robot, 0, 0, -150, 150, 5) | {
+    controls = shared.place_sliders(robot, 0, 0, -150, 150, 5) | {
         "f_x": slider("force f_x in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.0),
         "f_y": slider("force f_y in N", -1.5 / times, 1.5 / times, 0.05 / times, first),
         "limit": slider("limit in mN m", 20, 200, 5, 85),
@@ -82,7 +82,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
     return explorer(draw, controls, panels, size=(10.4, 3.8), setup=space)
 
 
-@ready_made
+@shared.ready_made
 def calibration(robot: Manipulator | None = None) -> Explorer:
     """Places on a circle, what each drive contributes to the equation there, and the error of the offsets found.
 
@@ -91,8 +91,8 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
     >>> calibration().set(turn=60).numbers["condition"]
     '1.36'
     """
-    robot = frictionless(robot)
-    N, centre = robot.n_arms, marks.middle(robot)
+    robot = shared.frictionless(robot)
+    N, centre = robot.n_arms, shared.place(robot)[0]
     offset = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     degrees = np.arange(361)
 
@@ -101,7 +101,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         """The circle, and the length of each drive's row of the null basis of A^T, a degree apart."""
         way = centre + ring(degrees, 1e-3 * radius)
         A = control_matrix(robot, inverse_kinematics(robot, way))
-        return way, np.sqrt(np.diagonal(prestress_projector(A), axis1=-2, axis2=-1))
+        return way, np.sqrt(np.maximum(np.diagonal(prestress_projector(A), axis1=-2, axis2=-1), 0.0))
 
     @lru_cache(maxsize=128)
     def found(radius: int, turn: int, places: int, counts: int):
@@ -145,7 +145,7 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         "error": {"ylabel": "error in mrad", "legend": both, **marks.drive_axis(N)},
     }
     controls = {
-        "radius": length_slider(robot, "radius in mm", 10, 125, 5, 120),
+        "radius": shared.path_slider(robot, "radius in mm", 10, 125, 5, 120, 1.0),
         "turn": slider("turn of the first place in °", 0, 120, 5, 0),
         "places": choice("places on the circle", [1, 2, 3, 6, 24, 1000], 3),
         "counts": choice("counts a turn", [("2000", 2000), ("20 000", 20_000), ("200 000", 200_000)], 20_000),

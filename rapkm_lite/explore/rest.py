@@ -53,7 +53,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
         marks.bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
         marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".1f")
-        picture.fit("torque", 1.25 * torque, 1.25 * held, least=10.0)
+        picture.fit("torque", 1.25 * torque, 1.25 * held, least=shared.least_torque(robot, 10.0))
         return {
             "error at rest, theory": marks.per_drive(theory, 2) + " mrad",
             "simulated": marks.per_drive(error[-1], 2) + " mrad" + ", not at rest yet" * moves,
@@ -127,7 +127,7 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
             words = f"at rest outside, {np.hypot(*rest):.1f} mm away"
             picture.text("opinions", 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
         marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
-        picture.fit("torque", 1.25 * torque, least=10.0)
+        picture.fit("torque", 1.25 * torque, least=shared.least_torque(robot, 10.0))
         return {
             "rest": f"({rest[0]:z.2f}, {rest[1]:z.2f}) mm beside the desired point",
             "distances from the lines": marks.per_drive(np.abs(normal @ rest - level), 2) + " mm",
@@ -160,7 +160,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=64)
     def form(side: int, shift: int) -> np.ndarray:
-        path = triangle(robot, 1e-3 * side, dt=0.01, centre=marks.middle(robot) + [1e-3 * shift, 0.0])
+        path = triangle(robot, 1e-3 * side, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
     def trace(side: float, shift: float) -> float:
@@ -240,7 +240,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
     controls |= {
         "K_P": shared.gain_slider(robot, high=30.0),
-        "side": shared.length_slider(robot, "side of the triangle in mm", 20, 240, 10, 120),
-        "shift": shared.length_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40),
+        "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
+        "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),
     }
     return explorer(draw, controls, panels, size=(9.4, 3.8))

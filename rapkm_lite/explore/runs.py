@@ -14,7 +14,6 @@ from ..figures.style import AFTER, ALARM, NEUTRAL, arm_colour, arm_line
 from ..lessons.lesson07.tasks import set_points
 from ..machine.manipulator import Manipulator, load
 from ..mechanics import actuation as act
-from ..mechanics.kinematics import reachable
 from ..mechanics.trajectory import polygon
 from ..simulation.energy import antagonistic_torque, copper_loss
 from ..simulation.experiments import experiment, measured_energies
@@ -46,7 +45,7 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         offset = marks.offset_values(offsets, N)
         run = simulate(machines[friction], LAWS[filter](PD(K_P, K_D)), paths[path], offset, encoder or None)
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
-        shared.curves(picture, "torque", run.t, torque, 50.0)
+        shared.curves(picture, "torque", run.t, torque, shared.least_torque(robot, 50.0))
         shared.curves(picture, "error", run.t, error, 5.0)
         groups = [(energy, {})]
         if table is not None:
@@ -110,6 +109,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     if largest > 4 * unit:
         unit = 2 * shared.rounded(largest / 4)
     scale, wide = 0.1 * times / unit, 0.009 * times
+    least = {"torque": shared.least_torque(robot, 0.5), "error": 0.5 * times}
 
     def draw(picture, time, filter, offsets):
         run, force, error = recorded(filter, offsets)
@@ -124,7 +124,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
                 style = arm_line(i) if panel == "torque" else {"color": AFTER}
                 picture.trace(panel, run.t, column, **style)
                 picture.line(panel, run.t[k], column[k], marker="o", markersize=6, color=style["color"], zorder=5)
-            picture.fit(panel, values, symmetric=panel == "torque", least=0.5 if panel == "torque" else 0.5 * times)
+            picture.fit(panel, values, symmetric=panel == "torque", least=least[panel])
             picture.line(panel, run.t[[k, k]], picture.ylim(panel), color=NEUTRAL, linewidth=0.9, zorder=1)
             picture.handle(panel, run.t[k], None, time=(1e3, 0))
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
@@ -162,17 +162,14 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 def via_points(robot: Manipulator | None = None) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
 
-    Raises ValueError where not even a tenth of the edge lies within the reach of all arms.
-
     >>> via_points().set(filter=True).numbers["largest torque that only presses"]
     '0.0 mN m'
     """
     robot = shared.frictionless(robot)
     # The lower edge of the triangle of `fitting_triangle`, or as much of it as all arms reach.
     wide = shared.size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
-    line, middle = wide * np.linspace([-0.12, -0.07], [0.12, -0.07], 49), marks.middle(robot)
-    parts = (part for part in np.linspace(1.0, 0.1, 19) if reachable(robot, middle + 1.1 * part * line).all())
-    ends = middle + next(parts, 0.1) * line[[0, -1]]
+    line, (middle, room) = wide * np.array([[-0.12, -0.07], [0.12, -0.07]]), shared.place(robot)
+    ends = middle + min(1.0, room / (0.16 * wide)) * line
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
@@ -194,7 +191,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
         for values, (_, look) in zip(off.T, axes, strict=True):
             picture.trace("way", way[:there], values, **look)
         picture.fit("way", off, least=shared.size(robot))
-        shared.curves(picture, "torque", done.t, pressing, 5.0)
+        shared.curves(picture, "torque", done.t, pressing, shared.least_torque(robot, 5.0))
         energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
         return {
             "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
-from functools import wraps
+from functools import lru_cache, wraps
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..figures import marks
 from ..figures.maps import grid_points
 from ..figures.style import AFTER, ALARM
 from ..machine.manipulator import Manipulator, load
-from ..mechanics.actuation import control_matrix, force_polygon
+from ..mechanics.actuation import control_matrix, force_polygon, inverse_dynamics
 from ..mechanics.dynamics import minimal_dynamics
 from ..mechanics.kinematics import inverse_kinematics
 from ..mechanics.maps import sampling_box
@@ -77,10 +76,16 @@ def carried(robot: Manipulator) -> float:
         return float(np.median(mean(grid_points(robot, 41)[3])))
 
 
+@lru_cache(maxsize=8)
 def usual_gains(robot: Manipulator) -> tuple[float, float]:
     """K_P in N m/rad and K_D in N m s/rad that make a machine about as fast as the testbed's make the testbed."""
     heavier = rounded(carried(robot) / carried(load()))
     return heavier * 7.05, heavier * 0.225
+
+
+def least_torque(robot: Manipulator, torque: float) -> float:
+    """How far a panel of torques goes at least: the testbed's number, less where the usual gains are lower."""
+    return torque * min(1.0, usual_gains(robot)[0] / 7.05)
 
 
 def gain_slider(robot: Manipulator, label: str = "K_P in N m/rad", low: float = 1.0, high: float = 50.0):
@@ -97,30 +102,51 @@ def length_slider(robot, label: str, low: float, high: float, step: float, value
 
 
 def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
-    """Sliders x and y in mm for the end-effector's place; the numbers are the testbed's, from `marks.middle` on."""
-    right, up = marks.middle(robot)
+    """Sliders x and y in mm around `marks.middle`, which begin (x, y) from `place`; the numbers are the testbed's."""
+    right, up = middle = marks.middle(robot)
+    away = step * np.rint(1e3 / step / size(robot) * (place(robot)[0] - middle))
+    x, y = np.clip(away + [x, y], low, [-low, high]).astype(int).tolist()
     return {
         "x": length_slider(robot, f"{which}x in mm", low, -low, step, x, right),
         "y": length_slider(robot, f"{which}y in mm", low, high, step, y, up),
     }
 
 
+@lru_cache(maxsize=8)
+def place(robot: Manipulator) -> tuple[np.ndarray, float]:
+    """Where paths lie, (2,) in m, and the radius in m of a circle about it that all arms reach.
+
+    The middle of the drives, or, where that has less room than 30 mm on the testbed, the place with the most.
+    """
+    point = marks.middle(robot)
+    if marks.room(robot, point) < 0.03 * size(robot):
+        point = max(point, marks.roomiest(robot), key=lambda x: marks.room(robot, x))
+    return point, float(marks.room(robot, point))
+
+
+def path_slider(robot, label: str, low: int, high: int, step: int, value: int, times: float = 1.6):
+    """A `length_slider` of a path that begins with `value`, or, if less, with `times` the radius of `place`."""
+    value = min(value, max(step, step * math.floor(1e3 * times * place(robot)[1] / size(robot) / step)))
+    return length_slider(robot, label, min(low, value), high, step, value)
+
+
 def central_triangle(robot: Manipulator, side: float, **times) -> Trajectory:
-    """The triangle of `side` in mm about the middle of the drives."""
-    return triangle(robot, 1e-3 * side, centre=marks.middle(robot), **times)
+    """The triangle of `side` in mm about the `place` of paths."""
+    return triangle(robot, 1e-3 * side, centre=place(robot)[0], **times)
 
 
 def fitting_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
-    """The central triangle where no slider changes it, 240 mm on the testbed and 160 on two of its arms.
-
-    Where an arm does not reach it, a smaller one, or one at the place with the most room.
-    """
+    """The central triangle where no slider changes it, 240 mm on the testbed, 160 on two of its arms, or smaller."""
     side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
-    for place in (marks.middle, marks.roomiest):
-        for part in (1.0, 0.8, 0.6, 0.4, 0.2):
-            with suppress(ValueError):
-                return triangle(robot, 1e-3 * part * side, centre=place(robot), **times)
-    return central_triangle(robot, 0.2 * side, **times)
+    return central_triangle(robot, min(side, 1.6e3 * place(robot)[1]), **times)
+
+
+def torque_scale(robot: Manipulator) -> float:
+    """How many times the testbed's torques a triangle takes, 1, 2 or 5 times a power of ten."""
+    path = fitting_triangle(robot, 120 * size(robot), duration=2.5, dt=2e-3)
+    needed = np.abs(inverse_dynamics(robot, path.q, path.qd, path.qdd)).max(axis=1)
+    # Beside a place that two arms cannot cross no limit is wide enough.
+    return rounded(min(needed.max(), 10 * np.median(needed)) / 0.055)
 
 
 def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mode=None):
@@ -176,7 +202,7 @@ def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN 
 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of a run from the wanted place (k,) in mm, and torques (k, N) in mN m; least: limits on the testbed."""
+    """Distance of a run from the wanted place (k,) in mm, and torques (k, N) in mN m; least: testbed's limit, limit."""
     off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
     picture.fit("error", off, symmetric=False, least=least[0] * size(run.robot))

@@ -17,7 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, length_slider, over_time, ready_made, size, usual_gains
+from .shared import central_triangle, curves, frictionless, over_time, path_slider, ready_made, size, usual_gains
 
 
 def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
@@ -86,7 +86,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         # What a failing law does leaves the picture, so that what a working one does stays seen.
         some = path(side)[::50]
         needed = 1e3 * float(np.abs(act.inverse_dynamics(robot, some.q, some.qd, some.qdd)).max())
-        curves(picture, "torque", run.t, torque, 50.0, most=max(1000.0, 1.5 * needed))
+        curves(picture, "torque", run.t, torque, 50.0 * min(1.0, heavier), most=max(1000.0, 1.5 * needed))
         curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
@@ -117,7 +117,7 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     }
     controls = {
         "law": choice("law", laws),
-        "side": length_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
+        "side": path_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
         "rate": slider("poles at −1/s times", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
     layout = [["plane", "map"], ["torque", "error"]]

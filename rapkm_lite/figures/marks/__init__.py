@@ -23,5 +23,5 @@ from .parts import (
     zero_line,
 )
 from .picture import Picture
-from .plane import clamped, middle, roomiest, singular_curves, workspace_outline, zero_lines
+from .plane import clamped, middle, room, roomiest, singular_curves, workspace_outline, zero_lines
 from .stored import bundle, figure, png

@@ -17,12 +17,12 @@ def workspace_outline(robot) -> np.ndarray:
     left, right, low, high = sampling_box(robot)
     wide, tall = 0.01 * (right - left), 0.01 * (high - low)
     x, y = np.linspace(left - wide, right + wide, 161), np.linspace(low - tall, high + tall, 161)
-    rings = contour_generator(x, y, _room(robot, np.stack(np.meshgrid(x, y), axis=-1))).lines(0.0)
+    rings = contour_generator(x, y, room(robot, np.stack(np.meshgrid(x, y), axis=-1))).lines(0.0)
     parts = [part for ring in rings for part in (np.asarray(ring), np.full((1, 2), np.nan))]
     return np.concatenate([*parts, np.empty((0, 2))])[:-1]
 
 
-def _room(robot: Manipulator, points) -> np.ndarray:
+def room(robot: Manipulator, points) -> np.ndarray:
     """How far points (..., 2) are from where an arm is stretched or folded, (...,) in m; negative outside."""
     reach = np.linalg.norm(points[..., None, :] - robot.base, axis=-1)
     l1, l2 = robot.lengths.T
@@ -47,7 +47,7 @@ def middle(robot: Manipulator) -> np.ndarray:
 def roomiest(robot: Manipulator) -> np.ndarray:
     """The place (2,) in m of a grid from which all arms can go on farthest; ValueError where there is none."""
     points = grid_points(robot, 41)[3]
-    return points[np.argmax(_room(robot, points))]
+    return points[np.argmax(room(robot, points))]
 
 
 def clamped(robot: Manipulator, point) -> np.ndarray:
@@ -55,7 +55,7 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
 
     The way begins in the middle of the drives, or, where that is out of reach, in `roomiest`.
     """
-    if reachable(robot, point):
+    if room(robot, point) > 1e-9 * robot.lengths.max():  # where an arm is stretched or folded it is no pose
         return np.asarray(point)
     start = robot.base.mean(axis=0)
     start = start if reachable(robot, start) else roomiest(robot)
@@ -65,8 +65,8 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
         inside = reachable(robot, start + half * (point - start))
         low, high = (half, high) if inside else (low, half)
     # A little inside (a millimetre of the testbed), where no arm is quite stretched.
-    room = 5e-3 * robot.lengths.max() / max(np.linalg.norm(point - start), 1e-300)
-    return start + max(low - room, 0.0) * (point - start)
+    back = 5e-3 * robot.lengths.max() / max(np.linalg.norm(point - start), 1e-300)
+    return start + max(low - back, 0.0) * (point - start)
 
 
 def singular_curves(robot: Manipulator) -> dict:
