@@ -61,9 +61,10 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
 
     times = shared.size(robot)
     # It begins with three quarters of a newton on the testbed, elsewhere with less than the drives can do.
-    first = 0.0
+    first, place = 0.0, shared.place_sliders(robot, 0, 0, -150, 150, 5)
     with suppress(ValueError):  # where the middle is a drive, or the drives let go
-        A = control_matrix(robot, inverse_kinematics(robot, shared.place(robot)[0]))
+        point = marks.clamped(robot, 1e-3 * np.array([axis.value for axis in place.values()]))
+        A = control_matrix(robot, inverse_kinematics(robot, point))
         reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
         first = min(0.75, 0.05 * np.floor(18 * reach * times)) / times
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
@@ -72,7 +73,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
         "force": shared.force_panel(1.8 / times) | {"legend": reaches},
         "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
     }
-    controls = shared.place_sliders(robot, 0, 0, -150, 150, 5) | {
+    controls = place | {
         "f_x": slider("force f_x in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.0),
         "f_y": slider("force f_y in N", -1.5 / times, 1.5 / times, 0.05 / times, first),
         "limit": slider("limit in mN m", 20, 200, 5, 85),

@@ -202,7 +202,7 @@ def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN 
 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of a run from the wanted place (k,) in mm, torques (k, N) in mN m; least: limits, that in mm the testbed's."""
+    """Distance of a run from the wanted place (k,) in mm, torques (k, N) in mN m; least: limits, mm on the testbed."""
     off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
     picture.fit("error", off, symmetric=False, least=least[0] * size(run.robot))
