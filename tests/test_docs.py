@@ -54,6 +54,8 @@ def test_the_drawing_of_the_rooms_is_that_of_the_imports():
     for _ in ROOMS + DOORS:
         reach |= {(a, d) for a, b in reach for c, d in drawn if b == c}
     assert real <= reach, f"imported, but not to be seen in the drawing: {real - reach}"
+    follows = {(a, d) for a, b in reach for c, d in reach if b == c}
+    assert not drawn & follows, f"drawn, though it follows from two arrows: {drawn & follows}"
 
 
 def test_the_picture_of_the_rooms_has_them_all_and_no_arrow_runs_through_one():
