@@ -123,4 +123,5 @@ def new(name: str) -> None:
         cell.source = with_row(cell.source, r"\| \[\d\d [^]]+\]\(\d\d_", row)
     nbformat.write(first, start)
     (PACKAGE / "plotting.py").write_text(figure_list(), encoding="utf-8")
-    print(f"Write solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/, then run build.py {number} teaching")
+    print(f"Edit notebooks/solutions/{name}.ipynb and rapkm_lite/lessons/lesson{number}/,")
+    print(f"then run: python notebooks/build.py {number} teaching")
