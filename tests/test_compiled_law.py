@@ -249,6 +249,20 @@ def test_what_was_measured_is_the_laws_own_to_write():
             assert_allclose(run.q_a, expected.q_a, rtol=0, atol=1e-11)
 
 
+@pytest.mark.skipif(not COMPILED, reason="Python refuses to write into them")
+def test_what_a_law_writes_into_its_motion_and_matrices_lasts_for_one_sample():
+    """It is PD: trees of two arms share no entry of G and C in (2), and no loop is cut from arms 1 and 3 at once."""
+
+    @rk.compiled(at="desired")
+    def law(t, q_a, qd_a, d, at):
+        c = -7.05 * (q_a - d.q_a) - 0.225 * (qd_a - d.qd_a)
+        c[0] += at.G[0, 1] + at.C[0, 1] + at.J[0, 2] + at.J_dot[0, 2]
+        at.G[0, 1] = at.C[0, 1] = at.J[0, 2] = at.J_dot[0, 2] = d.q_a[0] = 9.0
+        return c
+
+    assert_allclose(rk.simulate(ROBOT, law, PATH, OFFSET).c, rk.simulate(ROBOT, PD, PATH, OFFSET).c, rtol=0, atol=1e-11)
+
+
 def test_a_law_that_writes_into_what_was_measured_is_lost_as_any_other():
     """The run is repeated in Python to say what the law answered: with its time, words and samples."""
 
