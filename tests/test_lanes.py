@@ -239,6 +239,18 @@ def test_other_machines(machine, name):
     agree(robot, laws(robot.n_arms)[name], rk.circle(robot, radius=0.03, duration=0.12))
 
 
+def test_five_arms_that_fill_up_two_vector_registers():
+    """Sums run over eight arms, three of which weigh nothing: SciPy knows none of them."""
+    turn, offset = 0.3 + 1.25 * np.arange(5), np.array([4e-3, -2e-3, 5e-3, -3e-3, 1e-3])
+    base, lengths = 0.24 * np.stack([np.cos(turn), np.sin(turn)], axis=-1), np.linspace(0.2, 0.23, 10).reshape(5, 2)
+    robot = rk.Manipulator(base=base, lengths=lengths, masses=[0.12, 0.15], mode=[1, -1, 1, 1, -1], friction=0.0)
+    law, path = laws(5)["PD"], cut(rk.circle(robot, radius=0.05, duration=0.5), 100, 12)
+    states, angles, torques = reference(robot, law, path, offset)
+    run = rk.simulate(robot, law, path, offset)
+    for found, true in ((run.x, states[:, :2]), (run.q_a, angles), (run.c, torques)):
+        assert_allclose(found, true, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("law", [rk.CTC(400.0, 40.0, (3, 4)), rk.RedundantCTC(400.0, 40.0), rk.RedundantAPD(5.0, 0.2)])
 def test_elbows_far_from_their_path(law):
     """Readings that are wrong by half a radian, and with them elbows: too far for a series of the arcsine."""
@@ -435,6 +447,21 @@ def test_friction_of_neighbours_changes_no_bit():
         assert_array_equal(together.energies[i], alone.energies[0])
         run = rk.simulate(robot, PD, path, offsets[i])
         assert_allclose(alone.energies[0], run.energy, rtol=0, atol=1e-11 * np.abs(run.energy).max())
+
+
+def test_a_run_that_is_beyond_its_reach_waits_for_its_neighbour_as_it_is():
+    """Thrown out across a drive with friction, which it passes in one step, beside a run that stops this drive in many:
+    it is lost with the sample with which it is lost alone.  No step leads nowhere, also where inertia has no end."""
+    robot = MACHINES["testbed"].replace(friction=[4e-3, 0.0, 0.0], friction_velocity=1e-3)
+    law, path = rk.PD(1.0, 0.1), cut(rk.circle(robot, 0.05, 0.2), 60, 6)
+    at = rk.at(robot, path.q[0], path.qd[0])
+    along = at.A[0] / np.linalg.norm(at.A[0])
+    across = np.array([-along[1], along[0]])
+    # No error but that of the encoders: it is the torque.
+    thrown, stopped = (-at.A_T_pinv @ at.minimal[0] @ xdd for xdd in (3.5e5 * across, -6e3 * along))
+    alone, beside = (rk.sweep(robot, law, path, rows, failed="mask") for rows in ([thrown], [thrown, stopped]))
+    assert alone.failed.all() and beside.failed.tolist() == [True, False]
+    assert beside.failure_time[0] == alone.failure_time[0] > 0.0
 
 
 def test_friction_beyond_all_measure():
