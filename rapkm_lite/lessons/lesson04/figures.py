@@ -251,7 +251,8 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
     """
     ax = axes_or_new(ax)
     low, high = min(np.min(e) for e in rows.values()), max(np.max(e) for e in rows.values())
-    count, size = len(rows), max(high, -low, 1e-18)  # below is rounding, with mg and mm, too
+    count, N = len(rows), max(map(len, rows.values()))
+    size = max(high, -low, 1e-18)  # below is rounding, with mg and mm, too
     width, digits = 0.8 / count, "z.2f" if 0.1 <= size < 1e4 else "z.2g"
     words: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 9 if count < 3 else 8}
     fills = [{"alpha": 1.0}, {"alpha": 0.45}, {"alpha": 1.0, "hatch": "///"}, {"alpha": 0.45, "hatch": "///"}]
@@ -261,9 +262,8 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
             ax.text(at, max(energy, 0.0), f"{energy:{digits}}".replace("-", "−"), **words)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
-    ax.set_xticks(range(N := max(map(len, rows.values()))), [f"drive {i + 1}" for i in range(N)])
-    ax.set(ylabel="electric energy in J", title=title)
-    ax.set_ylim(min(0.0, 1.25 * low), max(1.3 * high, 0.1 * size))
+    ax.set_xticks(range(N), [f"drive {i + 1}" for i in range(N)])
+    ax.set(ylabel="electric energy in J", title=title, ylim=(min(0.0, 1.25 * low), max(1.3 * high, 0.1 * size)))
     ax.grid(axis="x", visible=False)
     ax.legend(ncols=2, loc="upper left")
     return ax
