@@ -88,9 +88,10 @@ def geometry(base_x, base_y, l1sq, half, mode, x, y):
     # Arms that only fill up a row have mode 0: all of theirs is zero.
     across = mode * inside * quotient
     scale = root * quotient
-    near, far, inv = kappa * scale, (rho2 - kappa) * scale, rho2 * scale
-    bx, by = far * X - across * Y, far * Y + across * X
-    lx, ly = near * X + across * Y, near * Y - across * X
+    inv, far, turnX, turnY = rho2 * scale, (rho2 - kappa) * scale, across * X, across * Y
+    near = inv - far  # for a + d = r
+    bx, by = far * X - turnY, far * Y + turnX
+    lx, ly = near * X + turnY, near * Y - turnX
     return (bx, by, lx, ly, kappa - l1sq, inv, mode * root), area2
 
 
