@@ -699,7 +699,7 @@ def test_energies_are_asked_for_by_the_name_that_a_run_has_for_them(world):
         with pytest.raises(ValueError, match=rf"^rows\['a'\] .*; allowed: {words}$"):
             plotting.plot_energies({"a": energies})
     for rows in (run, [run, run], {}):
-        with pytest.raises(ValueError, match=rf"^rows = .*; allowed: a dict of {words}, by their label$"):
+        with pytest.raises(ValueError, match=rf"^rows = .*; allowed: a dict that is not empty, {words}, by its label$"):
             plotting.plot_energies(rows)
     with pytest.raises(ValueError, match=r"^rows\['a'\]\[1\] = nan; "):
         plotting.plot_energies({"a": [1.0, np.nan]})

@@ -96,7 +96,7 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
         return
     if isinstance(default, bool | str | float):
         kind = type(default).__name__
-    check = _energies if (name, kind) == ("rows", "dict") else _KINDS.get(kind)
+    check = _KINDS.get(kind)
     if check is not None:
         check(name, value)
     elif kind.startswith("int"):
@@ -113,20 +113,15 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
 
 
 def _dictionary(name: str, value) -> None:
+    words = "energies in J, one per drive, such as run.energy," if name == "rows" else "what is drawn"
     if not isinstance(value, dict) or not value:
-        raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, what is drawn by its label")
-
-
-def _energies(name: str, value: Any) -> None:
-    words = "energies in J, one per drive, such as run.energy"
-    if not isinstance(value, dict) or not value:
-        raise ValueError(f"{name} = {short(value)}; allowed: a dict of {words}, by their label")
-    for label, energies in value.items():
+        raise ValueError(f"{name} = {short(value)}; allowed: a dict that is not empty, {words} by its label")
+    for label, energies in value.items() if name == "rows" else ():
         where = f"{name}[{label!r}]"
         if hasattr(energies, "energy") or not hasattr(energies, "__len__"):
-            raise ValueError(f"{where} = {short(energies)}; allowed: {words}")
+            raise ValueError(f"{where} = {short(energies)}; allowed: {words[:-1]}")
         array = real_array(where, energies)
-        shaped(where, array, array.ndim == 1 and array.size > 0, words)
+        shaped(where, array, array.ndim == 1 and array.size > 0, words[:-1])
 
 
 def _trajectory(name: str, value, known: Known) -> None:
