@@ -134,7 +134,7 @@ def count_steps(lanes, arms, extra, w, dt):
         n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = max(1.0, n)
         w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else sharpness
-        w[of(STEP, j, W, L)] = dt / max(1.0, n) if n <= MOST_STEPS else dt
+        w[of(STEP, j, W, L)] = dt / max(1.0, n)
         # A run beyond the limit takes one step and is judged afterwards.
         most = max(most, n if w[of(STATUS, j, W, L)] == DONE and n <= MOST_STEPS else min(n, 1.0))
     return most
