@@ -1,6 +1,7 @@
 """A class with everything that goes wrong in one: each student gets the points of what is right, and a sentence."""
 
 import csv
+import errno
 import itertools
 import json
 import os
@@ -700,6 +701,21 @@ def test_a_data_file_beside_the_notebook_is_read_from_a_copy(tmp_path, words):
     assert graded_alone(tmp_path, f"import random\n{words}\n") == "ok"
     left = {path.relative_to(tmp_path).as_posix(): path for path in tmp_path.rglob("*") if path.is_file()}
     assert {*left} == {*files, "04_x.ipynb"} and all(left[name].read_text() == text for name, text in files.items())
+
+
+def test_a_folder_that_cannot_be_copied_costs_nobody_a_grade(tmp_path, monkeypatch):
+    """The disk is full, or the name would be too long below the working folder."""
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "one.txt").write_text("1.0")
+    made = Path.mkdir
+
+    def full(folder, *words, **named):
+        if folder.name == "logs":
+            raise OSError(errno.ENOSPC, "No space left on device", str(folder))
+        made(folder, *words, **named)
+
+    monkeypatch.setattr(Path, "mkdir", full)
+    assert graded_alone(tmp_path, "one = 1.0") == "ok"
 
 
 def test_a_student_finds_only_files_of_his_own(tmp_path):

@@ -168,14 +168,15 @@ def _lend(submission: Submission, work: Path) -> None:
     """Copies, in a new folder, of the files that lie beside a notebook and in the folders there.
 
     Not of Python files, which the worker finds where they are, after those that are installed; nor of notebooks, of
-    what is hidden, of links to folders and of what cannot be read.
+    what is hidden, of links to folders and of what cannot be read or written.
     """
     work.mkdir()
     for place, folders, files in os.walk(submission.path.parent):
         # Beside a loose notebook a folder is another student's.
         folders[:] = [] if submission.loose else [one for one in folders if one[0] != "."]
         target = work / Path(place).relative_to(submission.path.parent)
-        target.mkdir(exist_ok=True)
+        with suppress(OSError):  # where the disk is full, or the name would be too long
+            target.mkdir(exist_ok=True)
         for file in (Path(place, one) for one in files):
             if file.name[0] != "." and file.suffix.lower() not in (".py", ".pyc", ".ipynb") and os.path.isfile(file):
                 with suppress(OSError):
