@@ -920,6 +920,23 @@ def test_a_place_on_the_boundary_is_left_by_a_hair():
     )
 
 
+def test_a_circle_as_large_as_the_room_is_not_the_first_of_a_calibration():
+    """At |x - B| = 2 l an arm is stretched, where control matrices have no end: 0.34 + 0.06 m = 2 x 0.2 m."""
+    robot = rk.Manipulator(
+        base=0.34 * np.array([[1, 0], [-0.5, 0.75**0.5], [-0.5, -(0.75**0.5)]]), lengths=0.2, masses=0.1
+    )
+    assert abs(shared.place(robot)[1] - 0.06) < 1e-12
+    assert not explore.calibration(robot).problem
+
+
+def test_a_machine_that_reaches_a_single_point_is_refused_by_a_sentence():
+    robot = rk.Manipulator(
+        base=0.3 * np.array([[1, 0], [-0.5, 0.75**0.5], [-0.5, -(0.75**0.5)]]), lengths=0.15, masses=0.1
+    )
+    with pytest.raises(ValueError, match="all arms reach a single point, or hardly more"):
+        explore.machine(robot)
+
+
 def test_a_share_that_is_none_is_a_number():
     """Diagonal entries of a projector are 0 to 1; rounded below zero they have no square root."""
     robot = rk.Manipulator(
@@ -1223,12 +1240,14 @@ def laid_out(explorer):
 
 @pytest.mark.parametrize("N", [4, 6])
 @pytest.mark.parametrize(
-    "name, panel", [("actuation", "sigma"), ("computed_torque", "plane"), ("prestress", "without")]
+    "name, panel",
+    [("actuation", "sigma"), ("computed_torque", "plane"), ("prestress", "without"), ("imperfections", "torque")],
 )
 def test_every_curve_is_named_and_no_legend_covers_a_title(N, name, panel):
     explorer = getattr(explore, name)(many_arms(N))
     named = next(m.words for m in explorer.picture.fixed if m.kind == "legend" and m.panel == panel)
-    assert len(named) == (N if name == "prestress" else N * (N - 1) // 2)
+    # Of imperfections the limit, too.
+    assert len(named) == {"prestress": N, "imperfections": N + 1}.get(name, N * (N - 1) // 2)
     for ax in laid_out(explorer).axes:
         title = next(t for t in ax.findobj(Text) if t.get_text() == ax.get_title("left")).get_window_extent()
         if ax.get_legend() is not None and title.width:

@@ -42,7 +42,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
-    form = f".{shared.decimals(0.01 / strong)}f"
+    form, dotted = f".{shared.decimals(0.01 / strong)}f", {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(**{name: (1 + 1e-3 * longer) * getattr(robot, name) for name in ("lengths", "centers")})
@@ -57,7 +57,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         off, torque = shared.draw_distance(picture, run, (1.0, shared.least_torque(robot, 20.0)))
         picture.fit("torque", torque, limit)
         for side in (-limit, limit):
-            picture.line("torque", picture.xlim("torque"), [side, side], color=ALARM, linestyle=":", linewidth=1.5)
+            picture.line("torque", picture.xlim("torque"), [side, side], **dotted)
         if lost:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
@@ -74,7 +74,9 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         "fault": choice("what breaks", FAULTS.keys()),
         "filter": switch("antagonism filter"),
     }
-    return explorer(draw, controls, shared.distance_panels(robot, 2.5, "torque that acts in mN m"), size=(9.2, 3.8))
+    panels = shared.distance_panels(robot, 2.5, "torque that acts in mN m")
+    panels["torque"]["legend"].append(("limit", dotted))
+    return explorer(draw, controls, panels, size=(9.2, 3.8))
 
 
 @shared.ready_made
@@ -86,6 +88,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = shared.frictionless(robot)
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
+    # Up to 200 g on three of the testbed's arms, of 0.27 kg each, and on two.
     mass, heavier = shared.carried(robot), shared.rounded(robot.masses.sum() / 0.67)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),

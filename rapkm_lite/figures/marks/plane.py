@@ -47,6 +47,8 @@ def middle(robot: Manipulator) -> np.ndarray:
 def roomiest(robot: Manipulator) -> np.ndarray:
     """The place (2,) in m of a grid from which all arms can go on farthest; ValueError where there is none."""
     points = grid_points(robot, 41)[3]
+    if not len(points):
+        raise ValueError("all arms reach a single point, or hardly more")
     return points[np.argmax(room(robot, points))]
 
 
