@@ -898,6 +898,10 @@ def test_torques_of_sliders_go_with_what_a_machine_needs(heavier):
     shown, stress = explore.imperfections(robot), explore.prestress(robot)
     limit, acts = shown.controls["limit"], 1e3 * np.abs(shown_run(robot).c).max()
     assert limit.min < acts < limit.max
+    # Numbers of which a reader sees two figures, not 0.0.
+    pressing = rk.antagonistic_torque(shown_run(robot))[-1]
+    said = re.findall(r"-?[\d.]+", shown.numbers["torque that only presses, at the end"])
+    assert np.allclose([float(word) for word in said], 1e3 * pressing, rtol=0.05)
     other = drawn(shown)
     assert drawn(shown.set(limit=limit.min)) != other and shown.numbers["largest torque"].split(" ")[0] != "0"
     without = [m.data[:, 1] for m in stress.picture.marks if (m.kind, m.panel) == ("line", "without")]

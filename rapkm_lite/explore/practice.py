@@ -42,7 +42,8 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
-    form, dotted = f".{shared.decimals(0.01 / strong)}f", {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
+    form, fine = f".{shared.decimals(0.01 / strong)}f", shared.decimals(0.1 / strong)
+    dotted = {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
 
     def draw(picture, longer, K_P, limit, fault, filter):
         built = robot.replace(**{name: (1 + 1e-3 * longer) * getattr(robot, name) for name in ("lengths", "centers")})
@@ -63,7 +64,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         return {
             "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
             "largest torque": f"{np.abs(torque).max():{form}} of {limit:{form}} mN m",
-            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1) + " mN m",
+            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], fine) + " mN m",
             "electric energy": f"{run.energy.sum():.2f} J",
         }
 
