@@ -1321,3 +1321,77 @@ def test_a_choice_may_mean_a_list():
     assert shown.set(offsets=[0.0, 0.0]).numbers == {"drive 1": "0.0 mrad"} and offsets.label == "none"
     with pytest.raises(ValueError, match=r"offsets = array.*; allowed: \[0.0, 0.0\], \[4.0, -2.0\]"):
         shown.set(offsets=np.zeros(2))
+
+
+@pytest.mark.parametrize("heavier", [1e-4, 1e5])
+def test_numbers_of_light_and_heavy_machines_are_those_of_the_testbed_times_the_mass(heavier):
+    """Without friction (2) and (12) are linear in masses, gains and torques; heat in a winding goes with the square."""
+    robot = rk.load().replace(friction=0.0)
+    inertia = {name: heavier * getattr(robot, name) for name in ("masses", "inertias", "rotor_inertia")}
+    other = robot.replace(**inertia)
+    for make, told in (
+        ("steady_state", {"rest torque": 1, "heat at rest": 2}),
+        ("three_opinions", {"torque at rest": 1, "heat at rest": 2}),
+        ("prestress", {"heat with": 2, "largest prestress": 1}),
+        ("decentralized_run", {"torque at the end": 1, "largest torque": 1}),
+        ("animation", {"force on the end-effector": 1, "torque that moves nothing": 1}),
+        ("via_points", {"largest torque that only presses": 1}),
+        ("controller_choice", {"largest jump of a torque": 1}),
+    ):
+        one, times = getattr(explore, make)(robot).numbers, getattr(explore, make)(other).numbers
+        for name, power in told.items():
+            ours, theirs = ([float(v) for v in re.findall(r"-?[\d.]+(?:e[+-]\d+)?", n[name])] for n in (one, times))
+            slack = 0.5 * 10.0 ** -len(one[name].split(" ")[0].partition(".")[2])
+            for a, b in zip(ours, theirs, strict=True):
+                assert abs(a - b / heavier**power) <= 1.01 * slack + 5.1e-3 * abs(a), (
+                    make,
+                    name,
+                    one[name],
+                    times[name],
+                )
+
+
+def test_a_small_machine_shows_its_bars_and_arrows():
+    """5 cm and 10 g: no bar reads zero, energies fill their panel, and the longest arrow is seen beside its scale."""
+    home = rk.load()
+    robot = rk.Manipulator(base=home.base / 8, lengths=home.lengths / 8, masses=0.01 / 6)
+    for name in ("steady_state", "three_opinions", "decentralized_run"):
+        shown = getattr(explore, name)(robot)
+        words = [m.words for m in shown.picture.marks if m.kind == "label" and m.panel in ("torque", "energy")]
+        assert len(words) >= 3 and sum(not re.search("[1-9]", w) for w in words) < 2, (name, words)
+        bars = [np.ptp(m.data[:, 1]) for m in shown.picture.marks if m.kind == "bar"]
+        assert max(bars) > 0.0
+    # What the numbers below call zero is no more beside its bar.
+    energies = shown.numbers["energy"].split(" J")[0].replace("-", "−").split(" / ")
+    assert [
+        m.words.replace("-", "−") for m in shown.picture.marks if m.kind == "label" and m.panel == "energy"
+    ] == energies
+    low, high = shown.picture.ylim("energy")
+    assert max(bars) > 0.2 * (high - low)
+    moved = explore.animation(robot)
+    (unit,) = (float(m.words.removesuffix(" N")) for m in moved.picture.fixed if m.words and " N" in str(m.words))
+    path = shared.fitting_triangle(robot)
+    run = rk.simulate(robot, rk.PD(*usual_gains(robot)), path, 1e-3 * np.array([4.0, -2.0, 5.0]))
+    largest = np.linalg.norm(rk.control_matrix(robot, run.q) * run.c[..., None], axis=-1).max()
+    assert 0.4 < largest / unit < 5.0
+
+
+@pytest.mark.parametrize("base, lengths", [ODD["a ring"], ODD["a crescent"]], ids=["a ring", "a crescent"])
+def test_sliders_of_places_reach_around_the_place_of_paths_and_a_point_beyond_reach_is_told(base, lengths):
+    """Where the middle is out of reach, a place between both would be all that its sliders could say."""
+    robot = rk.Manipulator(base=base, lengths=lengths, masses=0.2)
+    where, room = (1e3 * v for v in shared.place(robot))
+    for name in ("three_opinions", "machine", "steady_state", "allocation"):
+        shown = getattr(explore, name)(robot)
+        for axis, at in zip("xy", where, strict=True):
+            ends = shown.controls[axis].min, shown.controls[axis].max
+            assert ends[0] <= at - 0.5 * room and at + 0.5 * room <= ends[1], (name, axis)
+    for side in (350, 410):  # 1e-3 * 350 is 0.35000000000000003
+        problem = explore.prestress(robot).set(side=side).problem
+        assert not problem or f"side = {side / 1e3:g}," in problem
+    shown = explore.three_opinions(robot)
+    start = [1e-3 * shown.values[axis] for axis in "xy"]
+    assert ("desired point" in shown.numbers) != np.allclose(clamped(robot, np.array(start)), start)
+    x, y = np.rint(1e3 * middle(robot) / shown.controls["x"].step).astype(int) * shown.controls["x"].step
+    told = shown.set(x=x, y=y).numbers["desired point"]
+    assert told.endswith(" mm: an arm reaches no further") and not told.startswith(f"({x}, {y})")

@@ -81,7 +81,7 @@ def machine(robot: Manipulator | None = None) -> Explorer:
             picture.line("machine", *curve.T, **pair_line(robot, which[drives]) | {"linewidth": 2.2}, zorder=2)
         A = act.control_matrix(robot, q)
         numbers = {
-            "end-effector": f"({1e3 * point[0]:z.0f}, {1e3 * point[1]:z.0f}) mm",
+            "end-effector": marks.in_mm(point, 2e-3 * times),
             "degree of actuation": f"{act.degree_of_actuation(robot, q)} of 2 ({act.actuation_type(robot, q)})",
             "σ_min of all drives": f"{act.singular_values(A)[1]:.{digits}f} rad/m",
         }
@@ -162,7 +162,7 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
         picture.limits("force", x=picture.ylim("force"))
         worst = np.unravel_index(np.argmin(sigma), sigma.shape)
         return {
-            "point": f"({1e3 * t.x[k, 0]:z.0f}, {1e3 * t.x[k, 1]:z.0f}) mm",
+            "point": marks.in_mm(t.x[k], 2e-3 * shared.size(robot)),
             "σ_min of all drives": f"{act.singular_values(A[k])[1]:.{digits}f} rad/m",
             "σ_min of the pairs": marks.per_drive(sigma[k], digits) + " rad/m",
             "worst on this path": f"{sigma[worst]:.{digits + 1}f} rad/m, pair {pair_name(pairs[worst[1]])}",
@@ -218,9 +218,9 @@ def prestress(robot: Manipulator | None = None) -> Explorer:
         return {
             "changes of sign without": marks.per_drive(sign_changes(least), 0),
             "with": marks.per_drive(sign_changes(c), 0),
-            "heat without": f"{energy[0]:.2f} J",
-            "heat with": f"{energy[1]:.2f} J",
-            "largest prestress": f"{1e3 * np.abs(stress).max():.{shared.decimals(0.01 / strong)}f} mN m",
+            "heat without": marks.told(energy[0], 2, strong**2) + " J",
+            "heat with": marks.told(energy[1], 2, strong**2) + " J",
+            "largest prestress": marks.told(1e3 * np.abs(stress).max(), 0, strong) + " mN m",
         }
 
     without, also = shared.over_time("torque in mN m", robot=robot), shared.over_time("torque in mN m")

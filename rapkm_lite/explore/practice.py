@@ -42,7 +42,6 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
-    form, fine = f".{shared.decimals(0.01 / strong)}f", shared.decimals(0.1 / strong)
     dotted = {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
 
     def draw(picture, longer, K_P, limit, fault, filter):
@@ -63,9 +62,10 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
             "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
-            "largest torque": f"{np.abs(torque).max():{form}} of {limit:{form}} mN m",
-            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], fine) + " mN m",
-            "electric energy": f"{run.energy.sum():.2f} J",
+            "largest torque": " of ".join(marks.told(v, 0, strong) for v in (np.abs(torque).max(), limit)) + " mN m",
+            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1, strong)
+            + " mN m",
+            "electric energy": marks.told(run.energy.sum(), 2, strong**2) + " J",
         }
 
     controls = {
@@ -90,7 +90,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     robot = shared.frictionless(robot)
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
     # Up to 200 g on three of the testbed's arms, of 0.27 kg each, and on two.
-    mass, heavier = shared.carried(robot), shared.rounded(robot.masses.sum() / 0.67)
+    mass, strong, heavier = shared.carried(robot), shared.heavier(robot), shared.rounded(robot.masses.sum() / 0.67)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
         "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),
@@ -107,10 +107,11 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
         sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
         run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
         off, torque = shared.draw_distance(picture, run, (2.0, shared.least_torque(robot, 60.0)))
+        both = run.energy.sum(), antagonistic_energy(run)
         return {
             "largest error": f"{off.max():.2f} mm",
-            "largest jump of a torque": f"{np.abs(np.diff(torque, axis=0)).max():.1f} mN m",
-            "energy": f"{run.energy.sum():.2f} J, of which antagonism {antagonistic_energy(run):.2f} J",
+            "largest jump of a torque": marks.told(np.abs(np.diff(torque, axis=0)).max(), 1, strong) + " mN m",
+            "energy": " J, of which antagonism ".join(marks.told(v, 2, strong**2) for v in both) + " J",
         }
 
     controls = {

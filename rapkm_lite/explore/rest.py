@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache, partial
 
 import numpy as np
@@ -31,7 +30,7 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
     '-23.6 / -23.4 / -23.6 mN m'
     """
     robot = shared.frictionless(robot)
-    N, usual = robot.n_arms, shared.usual_gains(robot)
+    N, usual, heavier = robot.n_arms, shared.usual_gains(robot), shared.heavier(robot)
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
@@ -52,14 +51,14 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
         marks.bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
-        marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".1f")
+        marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".1f", times=heavier)
         picture.fit("torque", 1.25 * torque, 1.25 * held, least=shared.least_torque(robot, 10.0))
         return {
             "error at rest, theory": marks.per_drive(theory, 2) + " mrad",
             "simulated": marks.per_drive(error[-1], 2) + " mrad" + ", not at rest yet" * moves,
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
-            "rest torque": marks.per_drive(held, 1) + " mN m",
-            "heat at rest": f"{copper_loss(robot, 1e-3 * held[None], 1.0).sum():.3f} W",
+            "rest torque": marks.per_drive(held, 1, heavier) + " mN m",
+            "heat at rest": marks.told(copper_loss(robot, 1e-3 * held[None], 1.0).sum(), 3, heavier**2) + " W",
         } | stop
 
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
@@ -86,11 +85,12 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
     '0.65 / 0.88 / 0.72 mm'
     """
     robot = shared.frictionless(robot)
-    N = robot.n_arms
+    N, heavier = robot.n_arms, shared.heavier(robot)
 
     def draw(picture, x, y, K_P, **offsets):
         offset = marks.offset_values(offsets, N)
-        q = inverse_kinematics(robot, marks.clamped(robot, 1e-3 * np.array([x, y])))
+        point, words = marks.reached(robot, 1e-3 * np.array([x, y]), 2e-3 * shared.size(robot))
+        q = inverse_kinematics(robot, point)
         A, weight = act.control_matrix(robot, q), act.required_wrench(robot, q, 0 * q, 0 * q)
         torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
         # Drive i is content on the line A_i p = -offset_i of points p about the desired one; all lengths in mm.
@@ -126,14 +126,14 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         if np.abs(rest).max() > half:
             words = f"at rest outside, {np.hypot(*rest):.1f} mm away"
             picture.text("opinions", 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
-        marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f")
+        marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f", times=heavier)
         picture.fit("torque", 1.25 * torque, least=shared.least_torque(robot, 10.0))
         return {
             "rest": f"({rest[0]:z.2f}, {rest[1]:z.2f}) mm beside the desired point",
             "distances from the lines": marks.per_drive(np.abs(normal @ rest - level), 2) + " mm",
-            "torque at rest": marks.per_drive(torque, 1) + " mN m",
-            "heat at rest": f"{copper_loss(robot, 1e-3 * torque[None], 1.0).sum():.3f} W",
-        }
+            "torque at rest": marks.per_drive(torque, 1, heavier) + " mN m",
+            "heat at rest": marks.told(copper_loss(robot, 1e-3 * torque[None], 1.0).sum(), 3, heavier**2) + " W",
+        } | ({"desired point": words} if words else {})
 
     seen = (-3 * shared.size(robot), 3 * shared.size(robot))
     away = {"xlabel": "x − desired x in mm", "ylabel": "y − desired y in mm", "xlim": seen, "ylim": seen}
@@ -160,7 +160,7 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
 
     @lru_cache(maxsize=64)
     def form(side: int, shift: int) -> np.ndarray:
-        path = triangle(robot, 1e-3 * side, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
+        path = triangle(robot, side / 1e3, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
     def trace(side: float, shift: float) -> float:
@@ -173,11 +173,6 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     # J/mrad^2 where controls start, or on a smaller triangle in the middle.
     cost = shared.usual_gains(robot)[0] ** 2 * (trace(120, 40) or trace(20, 0) or 1e-3)
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
-    digits = max(0, 2 - math.ceil(math.log10(2.0 * levels[0])))
-
-    def energy(value: float, more: int = 0) -> str:
-        return f"{value:.{digits + more}f}" if digits < 5 and levels[0] < 1e5 else f"{value:.2g}"
-
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
@@ -212,7 +207,9 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         shares = costs * (directions.T @ dq) ** 2
         for k, share in enumerate(shares):
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
-            picture.text("shares", k + 1, share, energy(share), ha="center", va="bottom", fontsize=9)
+            picture.text(
+                "shares", k + 1, share, marks.told(share, 2, 2 * levels[0]), ha="center", va="bottom", fontsize=9
+            )
         picture.fit("shares", 1.2 * shares, symmetric=False, least=levels[0])
         step = min(0.22, 0.88 / robot.n_arms)
         directions *= np.where(directions.sum(axis=0) < 0, -1, 1)
@@ -223,9 +220,9 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
             picture.text("directions", at, component, str(i + 1), ha="center", va=va, fontsize=9)
         marks.zero_line(picture, "directions")
         return {
-            "antagonistic energy": energy(dq @ S @ dq) + " J",
-            "trace of S": energy(np.trace(S), 1) + " J/mrad²",
-            "principal costs": " / ".join(energy(c, 1) for c in np.maximum(costs, 0)) + " J/mrad²",
+            "antagonistic energy": marks.told(dq @ S @ dq, 2, 2 * levels[0]) + " J",
+            "trace of S": marks.told(np.trace(S), 3, 2 * levels[0]) + " J/mrad²",
+            "principal costs": marks.per_drive(np.maximum(costs, 0), 3, 2 * levels[0]) + " J/mrad²",
         }
 
     arms = [(words, {"color": look["color"], "linewidth": 7}) for words, look in marks.drive_lines(robot)]

@@ -33,8 +33,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
     '37 mN m'
     """
     robot = shared.frictionless(robot)
-    N = robot.n_arms
-    damping = shared.usual_gains(robot)[1]
+    N, damping, heavier = robot.n_arms, shared.usual_gains(robot)[1], shared.heavier(robot)
+    heat = heavier**2
     friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
     paths, table = {"centred triangle": shared.fitting_triangle(robot)}, None
@@ -50,15 +50,16 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         groups = [(energy, {})]
         if table is not None:
             groups.append((table[int(filter != "off")], {"alpha": 0.4}))
-        marks.bars(picture, "energy", groups)
-        picture.fit("energy", *(1.15 * v for v, _ in groups), symmetric=False, least=0.5)
-        numbers = {"energy": marks.per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J"}
+        marks.bars(picture, "energy", groups, times=heat)
+        picture.fit("energy", *(1.15 * v for v, _ in groups), symmetric=False, least=min(0.5, heat))
+        numbers = {"energy": f"{marks.per_drive(energy, 2, heat)} J, in all {marks.told(energy.sum(), 2, heat)} J"}
         if filter != "off":
             before = simulate(machines[friction], PD(K_P, K_D), paths[path], offset, encoder or None).energy.sum()
-            numbers["saved by the filter"] = f"{100 * (1 - energy.sum() / before):.0f} % of {before:.2f} J"
+            saved = 100 * (1 - energy.sum() / before)
+            numbers["saved by the filter"] = f"{saved:.0f} % of {marks.told(before, 2, heat)} J"
         return numbers | {
-            "torque at the end": marks.per_drive(torque[-1], 1) + " mN m",
-            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "torque at the end": marks.per_drive(torque[-1], 1, heavier) + " mN m",
+            "largest torque": marks.told(np.abs(torque).max(), 0, heavier) + " mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
         }
 
@@ -90,7 +91,7 @@ def animation(robot: Manipulator | None = None) -> Explorer:
     '0.1 mN m'
     """
     robot = shared.frictionless(robot)
-    N = robot.n_arms
+    N, heavier = robot.n_arms, shared.heavier(robot)
     path, times = shared.fitting_triangle(robot), shared.size(robot)
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     said = ", ".join(f"{v:.0f}" for v in 1e3 * some).replace("-", "−")
@@ -102,13 +103,13 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         return run, A * run.c[..., None], np.linalg.norm(1e3 * (run.x - path.x), axis=-1)
 
     # Newtons of the arrow that shows the scale, metres of arrow for 1 N; forces of equal torques go with one over the
-    # length, and weight may need more.
+    # length, and weight may need more, or light arms less.
     unit, largest = 0.25 / times, 0.0
     with suppress(SimulationError):
         largest = np.linalg.norm(recorded("off", True)[1], axis=-1).max()
-    if largest > 4 * unit:
+    if largest > 4 * unit or 0.0 < largest < 0.4 * unit:
         unit = 2 * shared.rounded(largest / 4)
-    scale, wide = 0.1 * times / unit, 0.009 * times
+    scale, wide, light = 0.1 * times / unit, 0.009 * times, heavier / times
     least = {"torque": shared.least_torque(robot, 0.5), "error": 0.5 * times}
 
     def draw(picture, time, filter, offsets):
@@ -130,9 +131,9 @@ def animation(robot: Manipulator | None = None) -> Explorer:
         antagonism = act.prestress_projector(act.control_matrix(robot, run.q[k])) @ run.c[k]
         return {
             "time": f"{run.t[k]:.2f} s",
-            "force on the end-effector": f"{np.hypot(*total):.2f} N",
-            "sizes of the drives' forces, added": f"{np.linalg.norm(force[k], axis=-1).sum():.2f} N",
-            "torque that moves nothing": f"{1e3 * np.linalg.norm(antagonism):.1f} mN m",
+            "force on the end-effector": marks.told(np.hypot(*total), 2, light) + " N",
+            "sizes of the drives' forces, added": marks.told(np.linalg.norm(force[k], axis=-1).sum(), 2, light) + " N",
+            "torque that moves nothing": marks.told(1e3 * np.linalg.norm(antagonism), 1, heavier) + " mN m",
             "path error": f"{error[k]:.2f} mm",
         }
 
@@ -171,7 +172,7 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     line, (middle, room) = wide * np.array([[-0.12, -0.07], [0.12, -0.07]]), shared.place(robot)
     ends = middle + min(1.0, room / (0.16 * wide)) * line
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
-    edge = 1e3 * np.linalg.norm(ends[1] - ends[0])
+    edge, heavier = 1e3 * np.linalg.norm(ends[1] - ends[0]), shared.heavier(robot)
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
     axes = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
     between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1)))
@@ -192,12 +193,13 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
             picture.trace("way", way[:there], values, **look)
         picture.fit("way", off, least=shared.size(robot))
         shared.curves(picture, "torque", done.t, pressing, shared.least_torque(robot, 5.0))
-        energy, lost = done.energy.sum(), copper_loss(robot, null[:-1], done.dt).sum()
+        energy = marks.told(done.energy.sum(), 2, heavier**2)
+        lost = marks.told(copper_loss(robot, null[:-1], done.dt).sum(), 3, heavier**2)
         return {
-            "largest torque that only presses": f"{np.abs(pressing).max():.1f} mN m",
+            "largest torque that only presses": marks.told(np.abs(pressing).max(), 1, heavier) + " mN m",
             "farthest from the wanted place": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
-            "electric energy": f"{energy:.2f} J, of which antagonism {lost:.3f} J",
-            "at the end": marks.per_drive(pressing[-1], 1) + " mN m",
+            "electric energy": f"{energy} J, of which antagonism {lost} J",
+            "at the end": marks.per_drive(pressing[-1], 1, heavier) + " mN m",
         }
 
     along = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, edge)}

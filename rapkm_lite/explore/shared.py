@@ -83,15 +83,19 @@ def usual_gains(robot: Manipulator) -> tuple[float, float]:
     return heavier * 7.05, heavier * 0.225
 
 
+def heavier(robot: Manipulator) -> float:
+    """How many times the testbed's torques those of PD are; heat goes with its square."""
+    return usual_gains(robot)[0] / 7.05
+
+
 def least_torque(robot: Manipulator, torque: float) -> float:
     """How far a panel of torques goes at least: the testbed's number, less where the usual gains are lower."""
-    return torque * min(1.0, usual_gains(robot)[0] / 7.05)
+    return torque * min(1.0, heavier(robot))
 
 
 def gain_slider(robot: Manipulator, label: str = "K_P in N m/rad", low: float = 1.0, high: float = 50.0):
     """A slider of K_P; the numbers are the testbed's."""
-    K_P = usual_gains(robot)[0]
-    return log_slider(label, K_P / 7.05 * low, K_P / 7.05 * high, K_P)
+    return log_slider(label, *(heavier(robot) * K_P for K_P in (low, high, 7.05)))
 
 
 def length_slider(robot, label: str, low: float, high: float, step: float, value: float, middle: float = 0.0):
@@ -102,13 +106,12 @@ def length_slider(robot, label: str, low: float, high: float, step: float, value
 
 
 def place_sliders(robot, x: int, y: int, low: int = -200, high: int = 230, step: int = 2, which: str = "") -> dict:
-    """Sliders x and y in mm around `marks.middle`, which begin (x, y) from `place`; the numbers are the testbed's."""
+    """Sliders x and y in mm around `marks.middle` and `place`, (x, y) from which they begin; numbers of the testbed."""
     right, up = middle = marks.middle(robot)
-    away = step * np.rint(1e3 / step / size(robot) * (place(robot)[0] - middle))
-    x, y = np.clip(away + [x, y], low, [-low, high]).astype(int).tolist()
+    x0, y0 = (step * round(v / (1e-3 * step * size(robot))) for v in place(robot)[0] - middle)
     return {
-        "x": length_slider(robot, f"{which}x in mm", low, -low, step, x, right),
-        "y": length_slider(robot, f"{which}y in mm", low, high, step, y, up),
+        "x": length_slider(robot, f"{which}x in mm", low + min(x0, 0), max(x0, 0) - low, step, x0 + x, right),
+        "y": length_slider(robot, f"{which}y in mm", low + min(y0, 0), max(y0, 0) + high, step, y0 + y, up),
     }
 
 
@@ -132,7 +135,7 @@ def path_slider(robot, label: str, low: int, high: int, step: int, value: int, t
 
 def central_triangle(robot: Manipulator, side: float, **times) -> Trajectory:
     """The triangle of `side` in mm about the `place` of paths."""
-    return triangle(robot, 1e-3 * side, centre=place(robot)[0], **times)
+    return triangle(robot, side / 1e3, centre=place(robot)[0], **times)  # 0.35, where 1e-3 * 350 is not
 
 
 def fitting_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
@@ -154,14 +157,11 @@ def held_machine(picture, panel: str, robot: Manipulator, x: float, y: float, mo
 
     Its place (2,) in m, its pose (2N,), and where it stops, in words, when the arms do not reach (x, y).
     """
-    point = marks.clamped(robot, 1e-3 * np.array([x, y]))
+    point, words = marks.reached(robot, 1e-3 * np.array([x, y]), 2e-3 * size(robot))
     q = inverse_kinematics(robot, point, mode)
     marks.draw_machine(picture, panel, robot, q)
     picture.handle(panel, *point, x=(1e3, 0), y=(0, 1e3))
-    there, step = 1e3 * point, size(robot)
-    short, digits = np.abs(there - [x, y]).max() > 0.5 * step, max(0, -math.floor(math.log10(step)))
-    words = f"({there[0]:z.{digits}f}, {there[1]:z.{digits}f}) mm: an arm reaches no further"
-    return point, q, {"end-effector": words} if short else {}
+    return point, q, {"end-effector": words} if words else {}
 
 
 def force_panel(limit: float) -> dict:

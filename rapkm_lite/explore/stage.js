@@ -245,14 +245,15 @@ function words(panel, { kind, points, words }, style) {
   const { box } = panel, right = box.left + box.width, foot = box.top + box.height, [u, v] = points;
   const [x, y] = kind === "words" ? [box.left + u * box.width, foot - v * box.height] : panel.at(u, v);
   if (x < box.left - 1 || x > right + 1 || y < box.top - 1 || y > foot + 1) return;
-  const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold), left = x - wide * SHARE[style.ha];
+  const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold);
+  const left = Math.max(Math.min(x - wide * SHARE[style.ha], panel.room[0] - wide), 0); // on the canvas
   // Words that would cover others step aside, away from what they name.
   const near = ([a, b, c, s], up) => left - 3 < c && left + wide + 3 > a && Math.abs(y + up - b) < 0.6 * (s + size);
   const way = (style.va === "top" ? 0.25 : -0.25) * size;
   let up = 0;
   while (Math.abs(up) < 3 * size && panel.taken.some((t) => near(t, up))) up += way;
   panel.taken.push([left, y + up, left + wide, size]);
-  panel.write({ ...style, words, x, y: y + up, size, halo: style.color !== "#ffffff" });
+  panel.write({ ...style, words, x: left, ha: "left", y: y + up, size, halo: style.color !== "#ffffff" });
 }
 
 /** A map in classes: bilinear between its samples, decided anew at every pixel of the screen. */

@@ -91,9 +91,9 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {
-            "largest torque": f"{np.abs(torque).max():.0f} mN m",
+            "largest torque": per_drive([np.abs(torque).max()], 0, heavier) + " mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
-            "energy": per_drive(energy, 2) + f" J, in all {energy.sum():.2f} J",
+            "energy": f"{per_drive(energy, 2, heavier**2)} J, in all {per_drive([energy.sum()], 2, heavier**2)} J",
         }
 
     def setup(picture):

@@ -19,9 +19,10 @@ from .parts import (
     pair_legend,
     pair_lines,
     per_drive,
+    told,
     traces,
     zero_line,
 )
 from .picture import Picture
-from .plane import clamped, middle, room, roomiest, singular_curves, workspace_outline, zero_lines
+from .plane import clamped, in_mm, middle, reached, room, roomiest, singular_curves, workspace_outline, zero_lines
 from .stored import bundle, figure, png

@@ -89,8 +89,10 @@ def drive_axis(n: int) -> dict:
     return {"xlabel": "drive", "xticks": range(1, n + 1), "xlim": (0.4, n + 0.6)}
 
 
-def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") -> None:
+def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f", times: float = 1.0) -> None:
     """One or more bars per drive with their numbers; groups are (values per drive, keywords of the bar).
+
+    times : how many times the testbed's the numbers are, as for `told`.
 
     >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}})
     >>> bars(picture, "a", [([1.0, 2.0, 1.5], {})])
@@ -98,7 +100,7 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
     width = positive_number("width", width)
     zero_line(picture, panel)
     size = 9 if sum(len(values) for values, _ in groups) < 8 else 7
-    said = [[_bar_words(value, form) for value in values] for values, _ in groups]
+    said = [[_bar_words(value, form, times) for value in values] for values, _ in groups]
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
             at, words = i + 1 + (k - (len(groups) - 1) / 2) * width, said[k][i]
@@ -110,23 +112,43 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f") ->
                 picture.text(panel, i + 1 if once else at, value, words, ha="center", fontsize=size, va=va)
 
 
-def _bar_words(value: float, form: str) -> str:
+def _bar_words(value: float, form: str, times: float = 1.0) -> str:
     """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart.
 
     >>> _bar_words(-11750.04, ".1f"), _bar_words(23517667.0, ".1f")
     ('−11750', '2.35e+07')
     """
+    if _far(times):
+        return told(value, 2, times).replace("-", "−")
     form = form if abs(value) < 1000 else ".0f" if abs(value) < 1e6 else ".3g"
     return re.sub("^−(?=[0.]+$)", "", format(np.round(value, 9), form).replace("-", "−"))
 
 
-def per_drive(values, digits: int) -> str:
-    """Numbers of all drives in one text, without a negative zero.
+def _far(times: float) -> bool:
+    return not 0.03 < times < 30
+
+
+def told(value: float, digits: int, times: float = 1.0) -> str:
+    """A number with so many decimals and no negative zero; three digits that count where it is far from the testbed's.
+
+    times : how many times the testbed's such numbers are; what would be zero there is zero here.
+
+    >>> told(-0.001, 2), told(1234.5678, 2), told(1.2345e-7, 2, 4e-8), told(1e-12, 2, 4e-8), told(7654321.0, 1, 1e5)
+    ('0.00', '1234.57', '1.23e-07', '0', '7.65e+06')
+    """
+    if _far(times):
+        value = value if abs(value / times) > 0.5 * 10**-digits else 0.0
+        return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
+    return f"{np.round(np.round(value, digits + 6), digits) + 0.0:.{digits}f}"
+
+
+def per_drive(values, digits: int, times: float = 1.0) -> str:
+    """Numbers of all drives in one text, each as `told`.
 
     >>> per_drive([0.25, -0.001], 2)
     '0.25 / 0.00'
     """
-    return " / ".join(f"{np.round(np.round(v, digits + 6), digits) + 0.0:.{digits}f}" for v in values)
+    return " / ".join(told(v, digits, times) for v in values)
 
 
 def offset_values(values: dict, n: int) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from contourpy import contour_generator
 
@@ -69,6 +71,23 @@ def clamped(robot: Manipulator, point) -> np.ndarray:
     # A little inside (a millimetre of the testbed), where no arm is quite stretched.
     back = 5e-3 * robot.lengths.max() / max(np.linalg.norm(point - start), 1e-300)
     return start + max(low - back, 0.0) * (point - start)
+
+
+def reached(robot: Manipulator, point, step: float) -> tuple[np.ndarray, str]:
+    """Where `clamped` ends, (2,) in m, and words that say so where it is more than a quarter of a step (m) away."""
+    there = clamped(robot, point)
+    short = bool(np.abs(there - point).max() > 0.25 * step)
+    return there, (in_mm(there, step) + ": an arm reaches no further") * short
+
+
+def in_mm(point, step: float) -> str:
+    """A point (2,) in m as words, in mm, with the decimals of a step (m).
+
+    >>> in_mm([0.0123, -0.004], 1e-4), in_mm([0.0123, -0.004], 1e-3)
+    ('(12.3, -4.0) mm', '(12, -4) mm')
+    """
+    digits = max(0, -math.floor(math.log10(1e3 * step) + 1e-9))
+    return "({:z.{n}f}, {:z.{n}f}) mm".format(1e3 * point[0], 1e3 * point[1], n=digits)
 
 
 def singular_curves(robot: Manipulator) -> dict:
