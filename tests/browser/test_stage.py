@@ -32,7 +32,11 @@ def shy(picture, slope):
     picture.line("a", [0, 1], [0, slope])
 slopes = {"slope": explore.slider("slope in m", 0.0, 4.0, 0.1, 1.0)}
 explore.explorer(shy, slopes, {"a": {"ylim": (0, 4), "ylabel": "y in m"}})"""
-CELLS = {name: f"from rapkm_lite import explore\nexplore.{name}()" for name in NAMES} | {"shy": FAILING}
+# Long words in a corner.
+SMALL = """import rapkm_lite as rk
+from rapkm_lite import explore
+explore.animation(rk.Manipulator(base=rk.load().base / 8, lengths=0.025, masses=0.002))"""
+CELLS = {name: f"from rapkm_lite import explore\nexplore.{name}()" for name in NAMES} | {"shy": FAILING, "small": SMALL}
 # Most tests share one notebook and its kernel; what ends a kernel or a page has a notebook of its own.
 NOTEBOOKS = {"all": list(CELLS.values())} | {name: [source] for name, source in CELLS.items()}
 NOTEBOOKS["twice"] = ["from rapkm_lite import explore\ne = explore.machine()\ndisplay(e)", "display(e)"]
@@ -307,6 +311,21 @@ def test_slow_answer_is_announced_and_awaited(shown):
     notebook.wait("() => stage.box().classList.contains('rapkm-busy')", 5)
     notebook.wait("() => stage.places().slope < 4 && !stage.box().classList.contains('rapkm-busy')", 15)
     assert notebook.ask("() => stage.root().querySelector('.rapkm-problem').hidden")
+
+
+def test_words_of_a_picture_stay_on_its_canvas(shown):
+    notebook = shown("small")
+    notebook.page.set_viewport_size({"width": 390, "height": 800})
+    still(notebook)
+    notebook.ask("""() => { const paint = CanvasRenderingContext2D.prototype; window.ends = {};
+        const fill = paint.fillText; paint.fillText = function (words, x, y) {
+          ends[words] = [x, x + this.measureText(words).width, this.canvas.clientWidth];
+          fill.call(this, words, x, y); }; }""")
+    changed(notebook, lambda: notebook.press(0, times=1))
+    ends = notebook.ask("() => ends")
+    assert any(words.endswith(" N") for words in ends)
+    for words, (left, right, wide) in ends.items():
+        assert -1 <= left and right <= wide + 1, (words, left, right, wide)
 
 
 def test_a_finger_on_a_line_takes_it_and_beside_it_scrolls(shown):
