@@ -55,6 +55,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
                 raise
             run, lost = error.partial, f", lost at {error.time:.2f} s"
         off, torque = shared.draw_distance(picture, run, (1.0, shared.least_torque(robot, 20.0)))
+        press = 1e3 * antagonistic_torque(run)[-1]
         picture.fit("torque", torque, limit)
         for side in (-limit, limit):
             picture.line("torque", picture.xlim("torque"), [side, side], **dotted)
@@ -63,8 +64,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
         return {
             "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
             "largest torque": " of ".join(marks.told(v, 0, strong) for v in (np.abs(torque).max(), limit)) + " mN m",
-            "torque that only presses, at the end": marks.per_drive(1e3 * antagonistic_torque(run)[-1], 1, strong)
-            + " mN m",
+            "torque that only presses, at the end": marks.per_drive(press, 1, strong) + " mN m",
             "electric energy": marks.told(run.energy.sum(), 2, strong**2) + " J",
         }
 
@@ -89,7 +89,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     """
     robot = shared.frictionless(robot)
     path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
-    # Up to 200 g on three of the testbed's arms, of 0.27 kg each, and on two.
+    # 0.27 kg weighs an arm of the testbed: up to 200 g on three of them, and on two.
     mass, strong, heavier = shared.carried(robot), shared.heavier(robot), shared.rounded(robot.masses.sum() / 0.67)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
