@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import MACHINES, TESTBED
 
 import rapkm_lite as rk
+from rapkm_lite.mechanics import sampling
 
 
 def paths():
@@ -226,6 +227,51 @@ def test_rates_may_err_by_a_tenth_of_the_larger_one_of_the_steps_made_and_meant(
     else:
         with pytest.raises(ValueError, match="does not fit x"):
             rk.follow(*given)
+
+
+@pytest.mark.parametrize(("factor", "taken"), [(0.49, False), (0.51, True), (1.99, True), (2.01, False)])
+def test_accelerations_may_err_by_half_of_the_larger_one_of_the_steps_made_and_meant(factor, taken):
+    """Steps of 1 that are said to be f: |1 - f| <= max(1, f) / 2 is 1/2 <= f <= 2."""
+    t, a = np.linspace(0.0, 1.0, 101), np.array([0.08, -0.06])
+    given = TESTBED, t, np.outer(t**2 / 2, a), np.outer(t, a), np.tile(factor * a, (101, 1))
+    if taken:
+        assert_allclose(rk.follow(*given).xdd[50], factor * a, rtol=1e-12)
+    else:
+        with pytest.raises(ValueError, match="does not fit xd"):
+            rk.follow(*given)
+
+
+@pytest.mark.parametrize(("samples", "most"), [(11, 2), (101, 7), (501, 27)])
+def test_rates_may_be_wrong_at_two_samples_and_a_twentieth_of_them(samples, most):
+    """A run of k samples with thrice the rate makes k + 1 steps wrong: half of it counts at both ends."""
+    t = np.linspace(0.0, 1.0, samples)
+    for wrong in (most, most + 1):
+        xd = np.tile([0.05, 0.0], (samples, 1))
+        xd[3 : 3 + wrong - 1] *= 3.0
+        given = TESTBED, t, np.outer(t, [0.05, 0.0]), xd, 0.0 * xd
+        if wrong == most:
+            assert_array_equal(rk.follow(*given).xd, xd)
+        else:
+            with pytest.raises(ValueError, match=r"xd\[\d+\] = .* does not fit x"):
+                rk.follow(*given)
+
+
+@pytest.mark.parametrize("part", [1, 50, 128])
+def test_a_path_is_the_same_in_whatever_parts_it_is_looked_at(part, monkeypatch):
+    """Base angles go on from part to part, a part of one sample is one, and an error counts samples from the start."""
+
+    def outside():
+        with pytest.raises(ValueError, match=r"^x\[\d+\] = ") as caught:
+            rk.circle(TESTBED, 0.1, 0.128, centre=(-0.1, 0.0))
+        return str(caught.value)
+
+    whole, words = rk.circle(TESTBED, 0.12, 0.128), outside()
+    assert len(whole) == 129 and whole.q_a.min() < -np.pi
+    monkeypatch.setattr(sampling, "PART", part)
+    path = rk.circle(TESTBED, 0.12, 0.128)
+    for name in ("x", "xd", "xdd", "q", "qd", "qdd"):
+        assert_allclose(getattr(path, name), getattr(whole, name), rtol=1e-12, atol=1e-12)
+    assert outside() == words
 
 
 @pytest.mark.parametrize("factor", [0.001, -1.0, 1000.0])
