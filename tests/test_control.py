@@ -567,6 +567,22 @@ def test_controller_uses_the_least_squares_pose_of_the_measurement():
         rk.Law().torque(FRICTIONLESS, None, None, None, None, None)
 
 
+def test_a_controller_that_found_no_pose_begins_again_like_a_new_one():
+    """It forgets where it was, and starts at the desired place; what it tells of a place belongs to who asks."""
+    path, law = rk.hold(FRICTIONLESS, [0.0, 0.0], 0.01), rk.AntagonismFilter(rk.PD(7.05, 0.225))
+    controller, turned = rk.Controller(law, FRICTIONLESS), 2.5 * np.array([1.0, -1.0, 1.0])
+    near = 0.0, path.q_a[0] + [0.004, -0.002, 0.005], path.qd_a[0], path[0]
+    far = 0.0, path.q_a[0] + turned, path.qd_a[0], path[0]
+    assert controller.x is None
+    first, x = controller(*near), controller.x
+    controller.x[:] = 9.0
+    assert_allclose(controller.x, x, rtol=0, atol=0)
+    with pytest.raises(rk.ConvergenceError):
+        controller(*far)
+    assert controller.x is None
+    assert_allclose(controller(*near), first, rtol=0, atol=0)
+
+
 PLAIN = rk.PD(7.0, 0.2)
 MEMORYLESS = [PLAIN, rk.AntagonismFilter(PLAIN), rk.CommandFilter(PLAIN), *[LAWS[k] for k in LAWS if k != "switched"]]
 
