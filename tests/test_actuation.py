@@ -638,6 +638,9 @@ def test_a_folded_arm_is_not_inside():
     box = (-0.11, -0.09, -0.01, 0.01)
     inside = rk.workspace_grid(robot, 3, box)[2]
     assert not inside[1, 1] and inside.sum() == 8
+    for empty in ((0.1, 0.1, -0.1, 0.1), (-0.1, 0.1, 0.1, 0.1)):
+        with pytest.raises(ValueError, match="x_min, x_max, y_min, y_max"):
+            rk.workspace_grid(robot, 3, empty)
     assert np.all(np.isfinite(rk.actuation_map(robot, n=3, box=box)[2].compressed()))
 
 
@@ -801,6 +804,8 @@ def test_weights_and_gains_of_very_different_drives_cost_no_digits(name, ratio):
         K = rational(W)
         pinv, springs = exactly(A_, 1 / K), exactly(A_, K)
         near(rk.weighted_pseudoinverse(A, W), pinv)
+        beside = np.stack([A, A * np.sqrt(W)[:, None]])  # a neighbour whose rows are alike once they are weighted
+        near(rk.weighted_pseudoinverse(beside, W)[0], pinv)
         near(rk.prestress_projector(A, W), one - pinv @ A_.T)
         near(rk.allocate_torques(A, force, 1e30, W=W), pinv @ f)
         # Springs of the stiffness K share a force as weights 1 / K do.

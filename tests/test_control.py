@@ -574,9 +574,9 @@ def test_a_controller_that_found_no_pose_begins_again_like_a_new_one():
     near = 0.0, path.q_a[0] + [0.004, -0.002, 0.005], path.qd_a[0], path[0]
     far = 0.0, path.q_a[0] + turned, path.qd_a[0], path[0]
     assert controller.x is None
-    first, x = controller(*near), controller.x
+    first = controller(*near)
     controller.x[:] = 9.0
-    assert_allclose(controller.x, x, rtol=0, atol=0)
+    assert np.abs(controller.x).max() < 0.01
     with pytest.raises(rk.ConvergenceError):
         controller(*far)
     assert controller.x is None
