@@ -95,7 +95,10 @@ def test_explicit_pseudoinverse_for_three_degrees_of_freedom():
     assert_allclose(np.linalg.svd(A_tilde[best])[1][2], max(sigma))
     many = np.stack([A_tilde, A_tilde[::-1]])
     rows = np.stack([best, [0, 1, 2]])
-    assert_allclose(rk.explicit_pseudoinverse(many, rows)[0], truth, atol=1e-10)
+    for kind in (int, np.uint8):
+        assert_allclose(rk.explicit_pseudoinverse(many, rows.astype(kind))[0], truth, atol=1e-10)
+    with pytest.raises(ValueError, match=r"rows holds \[0, 1, 0\]; allowed: different indices"):
+        rk.explicit_pseudoinverse(many, np.array([[0, 1, 2], [0, 1, 0]]))
 
 
 def test_the_filter_of_three_degrees_of_freedom_leaves_nothing():
