@@ -86,7 +86,6 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
     if not ours:
         yield from _seen(setup, _suspects(setup, begun, status, k), c)
         return
-    factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
     wrong = _difference(setup.model, setup.robot)
     if wrong and _runs(setup._replace(model=setup.robot), law, k):
         yield f"the controller's model has {wrong}; with the machine's own it is not lost"
@@ -94,6 +93,7 @@ def _causes(setup: Setup, law, status: int, k: int, ours: bool, c: np.ndarray) -
     if status == NO_POSE and not len(c):  # nor are the coordinates of the law
         yield from _sensors(setup, law, k)
     yield from _singular(setup, law, slice(k, k + 1), 0.3)
+    factor = growth(setup, law, k) if len(c) else None  # where no torque has acted, no gain is to blame
     if factor is not None and (factor > 1.05 or k * math.log(max(factor, 1.0)) > math.log(100.0)):
         yield f"unstable gain: near the desired state the sampled loop {magnified(factor, setup.trajectory.dt)}"
     yield from _sensors(setup, law, k)
