@@ -59,12 +59,18 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         # The points of a line are as far apart as those of a grid: twenty on each piece that may be the nearest.
         room = apart.min() + np.linalg.norm(pieces[1] - pieces[0], axis=-1).max()
         start, end = pieces[:, apart.min(axis=0) <= room]
-        gap = cdist(coarse(side).x, np.linspace(start, end, 20).reshape(-1, 2)).min()
+        near = coarse(side).x[apart.min(axis=1) <= room]
+        gap = cdist(near, np.linspace(start, end, 20).reshape(-1, 2)).min()
         return f"{float(f'{1e3 * gap:.2g}'):g} mm"
 
     # The redundant law has no peaks, so that fewer places show it.
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
     norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, laws[word](1.0, 2.0), coarse(side).q))
+
+    def needed(side: int) -> float:
+        """The largest torque in mN m that the path takes."""
+        t = path(side)[::50]
+        return 1e3 * float(np.abs(act.inverse_dynamics(robot, t.q, t.qd, t.qdd)).max())
 
     def draw(picture, law, side, rate, **offsets):
         t = coarse(side)
@@ -83,15 +89,15 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         # Two equal real poles at -rate.
         run = simulate(robot, laws[law](rate**2, 2.0 * rate), path(side), offset_values(offsets, N))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
+        largest = np.abs(torque).max()
         # What a failing law does leaves the picture, so that what a working one does stays seen.
-        some = path(side)[::50]
-        needed = 1e3 * float(np.abs(act.inverse_dynamics(robot, some.q, some.qd, some.qdd)).max())
-        curves(picture, "torque", run.t, torque, 50.0 * min(1.0, heavier), most=max(1000.0, 1.5 * needed))
+        most = 1000.0 if largest < 900.0 else max(1000.0, 1.5 * needed(side))
+        curves(picture, "torque", run.t, torque, 50.0 * min(1.0, heavier), most=most)
         curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {
-            "largest torque": per_drive([np.abs(torque).max()], 0, heavier) + " mN m",
+            "largest torque": per_drive([largest], 0, heavier) + " mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
             "energy": f"{per_drive(energy, 2, heavier**2)} J, in all {per_drive([energy.sum()], 2, heavier**2)} J",
         }
