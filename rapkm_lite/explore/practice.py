@@ -40,7 +40,7 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
     '59 of 150 mN m'
     """
     robot = load() if robot is None else robot
-    path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5, dt=2e-3)
+    path = shared.fitting_triangle(robot, 120, duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
     dotted = {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
 
@@ -88,7 +88,7 @@ def controller_choice(robot: Manipulator | None = None) -> Explorer:
     '1.19 mm'
     """
     robot = shared.frictionless(robot)
-    path = shared.fitting_triangle(robot, 120 * shared.size(robot), duration=2.5)
+    path = shared.fitting_triangle(robot, 120, duration=2.5)
     # 0.27 kg weighs an arm of the testbed: up to 200 g on three of them, and on two.
     mass, strong, heavier = shared.carried(robot), shared.heavier(robot), shared.rounded(robot.masses.sum() / 0.67)
     laws = {

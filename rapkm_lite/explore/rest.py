@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache, partial
 
 import numpy as np
@@ -163,15 +164,16 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         path = triangle(robot, side / 1e3, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    def trace(side: float, shift: float) -> float:
-        try:
-            return float(np.trace(form(times * side, times * shift)))
-        except ValueError:  # beyond reach
-            return 0.0
-
-    times = shared.size(robot)
-    # J/mrad^2 where controls start, or on a smaller triangle in the middle.
-    cost = shared.usual_gains(robot)[0] ** 2 * (trace(120, 40) or trace(20, 0) or 1e-3)
+    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
+    controls |= {
+        "K_P": shared.gain_slider(robot, high=30.0),
+        "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
+        "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),
+    }
+    trace = 1e-3
+    with suppress(ValueError):  # hardly any room, or two arms
+        trace = np.trace(form(controls["side"].value, controls["shift"].value)) or trace
+    cost = shared.usual_gains(robot)[0] ** 2 * trace  # J/mrad^2 where controls start
     levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
@@ -233,11 +235,5 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
         "map": {"title": "Energy in J", "xlabel": "offset 1 in mrad", "ylabel": "offset 2 in mrad"} | frame,
         "shares": {"ylabel": "energy in J", "ylim": (0, 5), **ticks},
         "directions": {"ylabel": "share of each drive's offset", "ylim": (-1.2, 1.2), "legend": arms, **ticks},
-    }
-    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
-    controls |= {
-        "K_P": shared.gain_slider(robot, high=30.0),
-        "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
-        "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),
     }
     return explorer(draw, controls, panels, size=(9.4, 3.8))

@@ -175,11 +175,10 @@ def via_points(robot: Manipulator | None = None) -> Explorer:
     edge, heavier = 1e3 * np.linalg.norm(ends[1] - ends[0]), shared.heavier(robot)
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
     axes = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
-    between = lru_cache(maxsize=32)(lambda legs: set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1)))
 
     @lru_cache(maxsize=128)
     def run(legs: int, late: int, filter: bool):
-        q_a, law = between(legs).copy(), PD(*shared.usual_gains(robot))
+        q_a, law = set_points(robot, path, *ends, np.linspace(0, 1, legs + 1)), PD(*shared.usual_gains(robot))
         q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
         done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
         return done, antagonistic_torque(done)

@@ -138,15 +138,15 @@ def central_triangle(robot: Manipulator, side: float, **times) -> Trajectory:
     return triangle(robot, side / 1e3, centre=place(robot)[0], **times)  # 0.35, where 1e-3 * 350 is not
 
 
-def fitting_triangle(robot: Manipulator, side: float | None = None, **times) -> Trajectory:
-    """The central triangle where no slider changes it, 240 mm on the testbed, 160 on two of its arms, or smaller."""
-    side = (240 if robot.n_arms > 2 else 160) * size(robot) if side is None else side
+def fitting_triangle(robot: Manipulator, side: float = 240, **times) -> Trajectory:
+    """The triangle where no slider changes it; `side` in mm of the testbed, up to 160 on two arms, or what fits."""
+    side = min(side, 240 if robot.n_arms > 2 else 160) * size(robot)
     return central_triangle(robot, min(side, 1.6e3 * place(robot)[1]), **times)
 
 
 def torque_scale(robot: Manipulator) -> float:
     """How many times the testbed's torques a triangle takes, 1, 2 or 5 times a power of ten."""
-    path = fitting_triangle(robot, 120 * size(robot), duration=2.5, dt=2e-3)
+    path = fitting_triangle(robot, 120, duration=2.5, dt=2e-3)
     needed = np.abs(inverse_dynamics(robot, path.q, path.qd, path.qdd)).max(axis=1)
     # Beside a place that two arms cannot cross no limit is wide enough.
     return rounded(min(needed.max(), 10 * np.median(needed)) / 0.055)
