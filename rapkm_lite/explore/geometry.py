@@ -34,13 +34,12 @@ MAP = marks.Palette(
 
 
 @shared.ready_made
-def machine(robot: Manipulator | None = None) -> Explorer:
+def machine(robot: Manipulator) -> Explorer:
     """The end-effector by hand in every working mode, a map of sigma_min, and the five-bar of each pair.
 
     >>> machine().numbers["degree of actuation"]
     '2 of 2 (redundantly actuated)'
     """
-    robot = shared.frictionless(robot)
     # A goes with one over the lengths.
     times = shared.size(robot)
     digits = shared.decimals(times)
@@ -113,13 +112,12 @@ def machine(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def actuation(robot: Manipulator | None = None) -> Explorer:
+def actuation(robot: Manipulator) -> Explorer:
     """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce.
 
     >>> actuation().numbers["σ_min of all drives"]
     '4.62 rad/m'
     """
-    robot = shared.frictionless(robot)
     pairs, digits = act.drive_pairs(robot), shared.decimals(shared.size(robot))
     name, shown, about = "Null vector", "component", ""
     if robot.n_arms != 3:
@@ -191,13 +189,12 @@ def actuation(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def prestress(robot: Manipulator | None = None) -> Explorer:
+def prestress(robot: Manipulator) -> Explorer:
     """Prestress along the path: torques with and without it, and the changes of sign that let backlash act.
 
     >>> prestress().set(level=0).numbers["largest prestress"]
     '0 mN m'
     """
-    robot = shared.frictionless(robot)
     strong = shared.torque_scale(robot)
 
     @lru_cache(maxsize=8)

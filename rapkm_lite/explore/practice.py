@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -32,14 +32,13 @@ FAULTS = {
 OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, kg/m
 
 
-@shared.ready_made
-def imperfections(robot: Manipulator | None = None) -> Explorer:
+@partial(shared.ready_made, friction=True)
+def imperfections(robot: Manipulator) -> Explorer:
     """Distance from the wanted place and torques that act (dotted: limits), with links too long and one fault.
 
     >>> imperfections().set(longer=0).numbers["largest torque"]
     '59 of 150 mN m'
     """
-    robot = load() if robot is None else robot
     path = shared.fitting_triangle(robot, 120, duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
     dotted = {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
@@ -81,13 +80,12 @@ def imperfections(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def controller_choice(robot: Manipulator | None = None) -> Explorer:
+def controller_choice(robot: Manipulator) -> Explorer:
     """Distance from the wanted place and torques under a law of choice, with offsets, a payload and coarse encoders.
 
     >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
     '1.19 mm'
     """
-    robot = shared.frictionless(robot)
     path = shared.fitting_triangle(robot, 120, duration=2.5)
     # 0.27 kg weighs an arm of the testbed: up to 200 g on three of them, and on two.
     mass, strong, heavier = shared.carried(robot), shared.heavier(robot), shared.rounded(robot.masses.sum() / 0.67)
@@ -129,7 +127,7 @@ def _nearest(lengths, low: int, high: int) -> int:
 
 
 @shared.ready_made
-def own_machine(robot: Manipulator | None = None) -> Explorer:
+def own_machine(robot: Manipulator) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
 
     It begins with the layout of the base joints and the working mode of the given machine, and with the mean of each of
@@ -138,7 +136,6 @@ def own_machine(robot: Manipulator | None = None) -> Explorer:
     >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
     """
-    robot = shared.frictionless(robot)
     N, centre = robot.n_arms, robot.base.mean(axis=0)
     along = robot.base - centre
     away = np.linalg.norm(along, axis=1)

@@ -31,13 +31,12 @@ RULES = {
 
 
 @shared.ready_made
-def allocation(robot: Manipulator | None = None) -> Explorer:
+def allocation(robot: Manipulator) -> Explorer:
     """The torques that make one force: of least size (pale bars) and by the chosen rule; dotted: the limits.
 
     >>> allocation().numbers["largest"]
     '100 % of the limit'
     """
-    robot = shared.frictionless(robot)
 
     def draw(picture, x, y, f_x, f_y, limit, rule):
         _, q, stop = shared.held_machine(picture, "machine", robot, x, y)
@@ -84,7 +83,7 @@ def allocation(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def calibration(robot: Manipulator | None = None) -> Explorer:
+def calibration(robot: Manipulator) -> Explorer:
     """Places on a circle, what each drive contributes to the equation there, and the error of the offsets found.
 
     For three arms or more.
@@ -92,7 +91,6 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
     >>> calibration().set(turn=60).numbers["condition"]
     '1.36'
     """
-    robot = shared.frictionless(robot)
     N, centre = robot.n_arms, shared.place(robot)[0]
     offset = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
     degrees = np.arange(361)
@@ -104,17 +102,13 @@ def calibration(robot: Manipulator | None = None) -> Explorer:
         A = control_matrix(robot, inverse_kinematics(robot, way))
         return way, np.sqrt(np.maximum(np.diagonal(prestress_projector(A), axis1=-2, axis2=-1), 0.0))
 
-    @lru_cache(maxsize=128)
-    def found(radius: int, turn: int, places: int, counts: int):
+    def draw(picture, radius, turn, places, counts):
         angles = turn + 360 * np.arange(places) / places
         q_a = inverse_kinematics(robot, centre + ring(angles, 1e-3 * radius))[:, :N] + offset
         try:
-            return angles, calibrate(robot, counted(q_a, counts), noise=2 * np.pi / counts / np.sqrt(12))
+            result = calibrate(robot, counted(q_a, counts), noise=2 * np.pi / counts / np.sqrt(12))
         except CalibrationError as refused:
-            return angles, refused
-
-    def draw(picture, radius, turn, places, counts):
-        angles, result = found(radius, turn, places, counts)
+            result = refused
         (way, share), seen = around(radius), np.unique(np.round(angles).astype(int) % 360)
         marks.draw_machine(picture, "plane", robot, inverse_kinematics(robot, way[turn]))
         picture.line("plane", *way.T, color=NEUTRAL, linewidth=1, zorder=2)

@@ -24,13 +24,12 @@ from .explorer import Explorer, explorer
 
 
 @shared.ready_made
-def steady_state(robot: Manipulator | None = None) -> Explorer:
+def steady_state(robot: Manipulator) -> Explorer:
     """Offsets and gains of each drive: the error at rest of theory (14) beside a simulation that settles there.
 
     >>> steady_state().numbers["rest torque"]
     '-23.6 / -23.4 / -23.6 mN m'
     """
-    robot = shared.frictionless(robot)
     N, usual, heavier = robot.n_arms, shared.usual_gains(robot), shared.heavier(robot)
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
@@ -79,13 +78,12 @@ def steady_state(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def three_opinions(robot: Manipulator | None = None) -> Explorer:
+def three_opinions(robot: Manipulator) -> Explorer:
     """Where each drive wants the end-effector: drag a line, the triangle of disagreement closes, the torques vanish.
 
     >>> three_opinions().set(offset_2=0).numbers["distances from the lines"]
     '0.65 / 0.88 / 0.72 mm'
     """
-    robot = shared.frictionless(robot)
     N, heavier = robot.n_arms, shared.heavier(robot)
 
     def draw(picture, x, y, K_P, **offsets):
@@ -142,14 +140,13 @@ def three_opinions(robot: Manipulator | None = None) -> Explorer:
         "opinions": away | {"aspect": "equal", "title": "Where each drive is content"},
         "torque": {"ylabel": "torque at rest in mN m", **marks.drive_axis(N)},
     }
-    controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12)
-    controls |= {"K_P": shared.gain_slider(robot)}
+    controls = offset_sliders(robot, (5.0, -3.0, 8.0), 12) | {"K_P": shared.gain_slider(robot)}
     controls |= shared.place_sliders(robot, 20, 30, -100, 100, 5, "desired ")
     return explorer(draw, controls, panels, widths=[1.4, 1], size=(9.2, 5.0), live=True)
 
 
 @shared.ready_made
-def landscape(robot: Manipulator | None = None) -> Explorer:
+def landscape(robot: Manipulator) -> Explorer:
     """Level lines of the antagonistic energy over two offsets, and the share of each principal direction.
 
     For three arms or more.
@@ -157,15 +154,13 @@ def landscape(robot: Manipulator | None = None) -> Explorer:
     >>> landscape().numbers["antagonistic energy"]
     '2.83 J'
     """
-    robot = shared.frictionless(robot)
 
     @lru_cache(maxsize=64)
     def form(side: int, shift: int) -> np.ndarray:
         path = triangle(robot, side / 1e3, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10)
-    controls |= {
+    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10) | {
         "K_P": shared.gain_slider(robot, high=30.0),
         "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
         "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),

@@ -26,13 +26,12 @@ LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command fo
 
 
 @shared.ready_made
-def decentralized_run(robot: Manipulator | None = None) -> Explorer:
+def decentralized_run(robot: Manipulator) -> Explorer:
     """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1.
 
     >>> decentralized_run().set(filter="force form (16)").numbers["largest torque"]
     '37 mN m'
     """
-    robot = shared.frictionless(robot)
     N, damping, heavier = robot.n_arms, shared.usual_gains(robot)[1], shared.heavier(robot)
     heat = heavier**2
     friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
@@ -70,9 +69,8 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
         "error": shared.over_time("angle error in mrad", robot=robot),
         "energy": {"ylabel": "electric energy in J", "legend": both, **marks.drive_axis(N)},
     }
-    controls = offset_sliders(robot, (-3.0, -4.0, 7.0))
     counts = [("ideal", 0), *((str(n), n) for n in (500, 2000, 8000))]
-    controls |= {
+    controls = offset_sliders(robot, (-3.0, -4.0, 7.0)) | {
         "K_P": shared.gain_slider(robot),
         "K_D": log_slider("K_D in N m s/rad", damping / 0.225 * 0.02, damping / 0.225, damping),
         "filter": choice("antagonism filter", LAWS.keys()),
@@ -84,13 +82,12 @@ def decentralized_run(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def animation(robot: Manipulator | None = None) -> Explorer:
+def animation(robot: Manipulator) -> Explorer:
     """The machine moves along the triangle; arrows are the forces of the drives at the end-effector.
 
     >>> animation().set(filter="force form (16)").numbers["torque that moves nothing"]
     '0.1 mN m'
     """
-    robot = shared.frictionless(robot)
     N, heavier = robot.n_arms, shared.heavier(robot)
     path, times = shared.fitting_triangle(robot), shared.size(robot)
     some = 1e-3 * np.resize([4.0, -2.0, 5.0], N)
@@ -160,36 +157,31 @@ def animation(robot: Manipulator | None = None) -> Explorer:
 
 
 @shared.ready_made
-def via_points(robot: Manipulator | None = None) -> Explorer:
+def via_points(robot: Manipulator) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
 
     >>> via_points().set(filter=True).numbers["largest torque that only presses"]
     '0.0 mN m'
     """
-    robot = shared.frictionless(robot)
     # The lower edge of the triangle of `fitting_triangle`, or as much of it as all arms reach.
     wide = shared.size(robot) / (1.0 if robot.n_arms > 2 else 1.5)
     line, (middle, room) = wide * np.array([[-0.12, -0.07], [0.12, -0.07]]), shared.place(robot)
     ends = middle + min(1.0, room / (0.16 * wide)) * line
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge, heavier = 1e3 * np.linalg.norm(ends[1] - ends[0]), shared.heavier(robot)
-    way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)
+    way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)[: len(path) // 2 + 1]  # there, not back
     axes = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
 
-    @lru_cache(maxsize=128)
-    def run(legs: int, late: int, filter: bool):
-        q_a, law = set_points(robot, path, *ends, np.linspace(0, 1, legs + 1)), PD(*shared.usual_gains(robot))
-        q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
-        done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
-        return done, antagonistic_torque(done)
-
     def draw(picture, legs, late, filter):
-        done, null = run(legs, late, filter)
-        there = len(path) // 2 + 1
-        off = 1e3 * (done.x - path.x)[:there]
+        q_a = set_points(robot, path, ends[0], ends[1], np.linspace(0, 1, legs + 1))
+        q_a[:, 0] = q_a[np.maximum(np.arange(len(q_a)) - late // 2, 0), 0]
+        law = PD(*shared.usual_gains(robot))
+        done = simulate(robot, AntagonismFilter(law) if filter else law, path.with_set_points(q_a))
+        null = antagonistic_torque(done)
+        off = 1e3 * (done.x - path.x)[: len(way)]
         pressing = 1e3 * null
         for values, (_, look) in zip(off.T, axes, strict=True):
-            picture.trace("way", way[:there], values, **look)
+            picture.trace("way", way, values, **look)
         picture.fit("way", off, least=shared.size(robot))
         shared.curves(picture, "torque", done.t, pressing, shared.least_torque(robot, 5.0))
         energy = marks.told(done.energy.sum(), 2, heavier**2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache, wraps
+from inspect import signature
 
 import numpy as np
 
@@ -21,21 +22,20 @@ from .controls import log_slider, slider
 from .explorer import Explorer
 
 
-def ready_made(make: Callable) -> Callable[..., Explorer]:
-    """An explorer of the package, whose line of code has its name; a machine that was given is called robot there."""
+def ready_made(make: Callable, friction: bool = False) -> Callable[..., Explorer]:
+    """An explorer of the package, of the testbed, with its friction or without, where no machine is given.
 
-    @wraps(make)
+    Its line of code has its name; a machine that was given is called robot there.
+    """
+
     def made(robot: Manipulator | None = None) -> Explorer:
-        shown = make(robot)
+        testbed = load() if friction else load().replace(friction=0.0)
+        shown = make(testbed if robot is None else robot)
         shown.made = f"explore.{make.__name__}({'' if robot is None else 'robot'})"
         return shown
 
-    return made
-
-
-def frictionless(robot: Manipulator | None) -> Manipulator:
-    """The given machine, or the testbed without friction."""
-    return load().replace(friction=0.0) if robot is None else robot
+    made.__dict__["__signature__"] = signature(made)  # `wraps` would take that of `make`
+    return wraps(make)(made)
 
 
 def size(robot: Manipulator) -> float:

@@ -17,7 +17,7 @@ from ..mechanics import actuation as act
 from ..simulation.runs import simulate
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, frictionless, over_time, path_slider, ready_made, size, usual_gains
+from .shared import central_triangle, curves, over_time, path_slider, ready_made, size, usual_gains
 
 
 def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
@@ -32,14 +32,12 @@ def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
 
 
 @ready_made
-def computed_torque(robot: Manipulator | None = None) -> Explorer:
+def computed_torque(robot: Manipulator) -> Explorer:
     """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves.
 
     >>> computed_torque().numbers["largest feedback map"]
     '0.0476 N m s²/rad'
     """
-    robot = frictionless(robot)
-    N = robot.n_arms
     pairs = act.drive_pairs(robot)
     singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
@@ -67,11 +65,6 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
     redundant = lru_cache(maxsize=64)(lambda side: feedback_norm(robot, coarse(side).q[::5]))
     norms = lru_cache(maxsize=64)(lambda word, side: feedback_along(robot, laws[word](1.0, 2.0), coarse(side).q))
 
-    def needed(side: int) -> float:
-        """The largest torque in mN m that the path takes."""
-        t = path(side)[::50]
-        return 1e3 * float(np.abs(act.inverse_dynamics(robot, t.q, t.qd, t.qdd)).max())
-
     def draw(picture, law, side, rate, **offsets):
         t = coarse(side)
         picture.line("plane", *t.x.T, color=AFTER, linewidth=2, zorder=3)
@@ -87,11 +80,14 @@ def computed_torque(robot: Manipulator | None = None) -> Explorer:
         picture.line("map", at, np.minimum(norm, 1e6 * heavier), color=AFTER)
         numbers["largest feedback map"] = f"{norm.max():.3g} N m s²/rad"
         # Two equal real poles at -rate.
-        run = simulate(robot, laws[law](rate**2, 2.0 * rate), path(side), offset_values(offsets, N))
+        run = simulate(robot, laws[law](rate**2, 2.0 * rate), path(side), offset_values(offsets, robot.n_arms))
         torque, error, energy = 1e3 * run.c, 1e3 * run.error, run.energy
         largest = np.abs(torque).max()
         # What a failing law does leaves the picture, so that what a working one does stays seen.
-        most = 1000.0 if largest < 900.0 else max(1000.0, 1.5 * needed(side))
+        most = 1000.0
+        if largest > 0.9 * most:
+            some = path(side)[::50]
+            most = max(most, 1.5e3 * float(np.abs(act.inverse_dynamics(robot, some.q, some.qd, some.qdd)).max()))
         curves(picture, "torque", run.t, torque, 50.0 * min(1.0, heavier), most=most)
         curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
