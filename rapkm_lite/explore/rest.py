@@ -160,7 +160,7 @@ def landscape(robot: Manipulator) -> Explorer:
         path = triangle(robot, side / 1e3, dt=0.01, centre=shared.place(robot)[0] + [1e-3 * shift, 0.0])
         return 1e-6 * antagonism_form(robot, path, 1.0)
 
-    controls = offset_sliders(robot, (4.0, -2.0, 5.0), 10) | {
+    controls: dict = offset_sliders(robot, (4.0, -2.0, 5.0), 10) | {
         "K_P": shared.gain_slider(robot, high=30.0),
         "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
         "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),
