@@ -130,7 +130,7 @@ def animation(robot: Manipulator) -> Explorer:
             "time": f"{run.t[k]:.2f} s",
             "force on the end-effector": marks.told(np.hypot(*total), 2, light) + " N",
             "sizes of the drives' forces, added": marks.told(np.linalg.norm(force[k], axis=-1).sum(), 2, light) + " N",
-            "torque that moves nothing": marks.told(1e3 * np.linalg.norm(antagonism), 1, heavier) + " mN m",
+            "torque that moves nothing": marks.told(1e3 * float(np.linalg.norm(antagonism)), 1, heavier) + " mN m",
             "path error": f"{error[k]:.2f} mm",
         }
 

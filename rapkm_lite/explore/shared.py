@@ -95,7 +95,7 @@ def least_torque(robot: Manipulator, torque: float) -> float:
 
 def gain_slider(robot: Manipulator, label: str = "K_P in N m/rad", low: float = 1.0, high: float = 50.0):
     """A slider of K_P; the numbers are the testbed's."""
-    return log_slider(label, *(heavier(robot) * K_P for K_P in (low, high, 7.05)))
+    return log_slider(label, heavier(robot) * low, heavier(robot) * high, heavier(robot) * 7.05)
 
 
 def length_slider(robot, label: str, low: float, high: float, step: float, value: float, middle: float = 0.0):
