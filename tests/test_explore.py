@@ -445,6 +445,14 @@ def test_number_of_a_line_stands_beside_no_other_line():
             assert np.linalg.norm(knobs - place, axis=1).min() > 0.19 * half and np.abs(place).max() < 0.95 * half
 
 
+def test_number_of_a_line_stands_on_the_same_side_on_every_computer():
+    robot, places = rk.load().replace(friction=0.0), []
+    for shift in 1e-16 * np.arange(-6, 7):
+        shown = explore.three_opinions(robot.replace(base=robot.base + shift))
+        places.append([mark.data[0] for mark in marks(shown) if (mark.kind, mark.panel) == ("label", "opinions")])
+    assert np.ptp(places, axis=0).max() < 1e-6
+
+
 def test_moving_a_slider_redraws_and_set_redraws_once():
     explorer, calls = light(), []
     inner = explorer.draw
