@@ -25,7 +25,7 @@ from rapkm_lite import explore, plotting
 from rapkm_lite.explore import shared
 from rapkm_lite.explore.controls import moved, snap
 from rapkm_lite.explore.shared import usual_gains
-from rapkm_lite.figures.marks import clamped, encode, figure, middle, workspace_outline
+from rapkm_lite.figures.marks import clamped, encode, figure, middle, roomiest, workspace_outline
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
@@ -450,6 +450,13 @@ def test_number_of_a_line_stands_on_the_same_side_on_every_computer():
     for shift in 1e-16 * np.arange(-6, 7):
         shown = explore.three_opinions(robot.replace(base=robot.base + shift))
         places.append([mark.data[0] for mark in marks(shown) if (mark.kind, mark.panel) == ("label", "opinions")])
+    assert np.ptp(places, axis=0).max() < 1e-6
+
+
+def test_of_two_places_with_as_much_room_rounding_does_not_choose():
+    """Two arms mirror each other at the line through their drives; none of them reaches the middle."""
+    robot = rk.Manipulator(base=[[0.2, 0.0], [-0.2, 0.0]], lengths=[0.12, 0.4], masses=0.2)
+    places = [roomiest(robot.replace(base=robot.base + shift)) for shift in 1e-16 * np.arange(-6, 7)]
     assert np.ptp(places, axis=0).max() < 1e-6
 
 

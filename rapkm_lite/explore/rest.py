@@ -15,6 +15,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
 from ..mechanics.kinematics import cross, inverse_kinematics
+from ..mechanics.partition import first_best
 from ..mechanics.trajectory import hold, triangle
 from ..simulation.energy import antagonism_form, copper_loss
 from ..simulation.runs import simulate
@@ -107,13 +108,12 @@ def three_opinions(robot: Manipulator) -> Explorer:
             seen.append(places[np.argmin(np.maximum(np.abs(places).max(axis=1), 0.88 * half))])
             picture.handle("opinions", *seen[-1], grip=ends, **{f"offset_{i + 1}": (-A[i, 0], -A[i, 1])})
         for i, knob in enumerate(seen[1:]):
-            # Its number is beside it, where there is room for it between the lines and all else that is seen;
-            # of two sides as good rounding does not choose.
+            # Its number is beside it, where there is room for it between the lines and all else that is seen.
             way, side = half * np.outer(np.linspace(-1, 1, 41), along[i]), 0.14 * half * normal[i]
             spots = np.concatenate([knob + way + side, knob + way - side])
             far = 0.7 * np.linalg.norm(spots[:, None] - seen, axis=-1)
             room = np.hstack([far, np.abs(spots @ normal.T - level), 2 * half - 2 * np.abs(spots)]).min(axis=1)
-            seen.append(spots[np.argmin(np.round((far[:, i + 1] - 20 * room) / half, 9))])
+            seen.append(spots[first_best(20 * room - far[:, i + 1])])
             look = {"color": arm_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
             picture.text("opinions", *seen[-1], f"{i + 1}", **look)
         if N == 3 and np.abs(cross(normal, np.roll(normal, 1, axis=0))).min() > 1e-9:

@@ -11,6 +11,7 @@ from ...machine.manipulator import Manipulator
 from ...mechanics.actuation import distal_cross_products, drive_pairs
 from ...mechanics.kinematics import inverse_kinematics, reachable
 from ...mechanics.maps import sampling_box
+from ...mechanics.partition import first_best
 from ..maps import grid_points, on_grid, touching_arcs
 
 
@@ -51,7 +52,7 @@ def roomiest(robot: Manipulator) -> np.ndarray:
     points = grid_points(robot, 41)[3]
     if not len(points):
         raise ValueError("all arms reach a single point, or hardly more")
-    return points[np.argmax(room(robot, points))]
+    return points[first_best(room(robot, points))]
 
 
 def clamped(robot: Manipulator, point) -> np.ndarray:
