@@ -930,6 +930,45 @@ def test_few_rests_that_scatter_show_no_other_gain(count):
     assert wrong <= 4
 
 
+def short_rests(seconds: float, law, friction: float, **sensors) -> list[rk.Log]:
+    """Logs of rests at six places, too short for the machine to settle after its start at the desired pose."""
+    robot = TESTBED.replace(friction=friction)
+    places = [[0.0, 0.0], [0.06, 0.02], [-0.05, 0.05], [0.02, -0.06], [-0.04, -0.04], [0.05, -0.03]]
+    return [rk.simulate(robot, law, rk.hold(robot, x, seconds), OFFSET[:3], **sensors).log() for x in places]
+
+
+@pytest.mark.parametrize(("seconds", "friction"), [(0.2, 0.0), (0.3, 0.05), (0.5, 0.005), (1.0, 0.05)])
+def test_the_rates_of_short_rests_are_neither_gain_nor_friction(seconds, friction):
+    """The law's own gains, of each drive another: K_P e + K_D de/dt at every instant, and of its means, too."""
+    K_P = np.array([6.0, 7.0, 9.0])
+    logs = short_rests(seconds, rk.PD(K_P, [0.3, 0.4, 0.2]), friction)
+    # They do creep: torques and errors are not proportional.
+    off = np.concatenate([log.c[-1:] + K_P * log.error[-1:] for log in logs])
+    assert np.abs(off).max() > 5e-5
+    found = rk.calibrate(TESTBED, logs, use="torques")
+    assert_allclose(found.K_P, K_P, rtol=3e-3)
+    assert_allclose(found.offset, OFFSET[:3], rtol=0, atol=2e-5)
+    given = rk.calibrate(TESTBED, logs, use="torques", K_P=K_P)
+    assert_allclose(given.offset, OFFSET[:3], rtol=0, atol=2e-5)
+    assert not any(word in given.note for word in ("the rests show", "lie", "creep")), given.note
+
+
+def test_drives_that_creep_are_named_where_counts_hide_their_rates_and_silent_where_they_rest():
+    law = rk.PD(4.0, 0.5)
+    hidden = rk.calibrate(TESTBED, short_rests(0.5, law, 0.05, encoder=4096), use="torques", K_P=4.0)
+    assert "drives still creep in the rests (" in hidden.note and "rest longer" in hidden.note
+    at_rest = rk.calibrate(TESTBED, short_rests(4.0, law, 0.0, encoder=4096), use="torques", K_P=4.0)
+    assert "creep" not in at_rest.note
+
+
+def test_rates_that_are_zero_leave_the_torques_of_rests_as_they_are():
+    rng, count = np.random.default_rng(0), np.full(6, 50)
+    stand = Rests(*rng.normal(size=(3, 6, 2)), noise_of(np.full((6, 2), 1e-3), 50), count)
+    settled = stand.settled(np.zeros((6, 2)), np.zeros((6, 2, 2)))
+    np.testing.assert_array_equal(settled.c, stand.c)
+    assert not settled.creeps
+
+
 @pytest.mark.parametrize(("counts", "friction"), [(2000, True), (8000, True), (2000, False)])
 def test_drives_that_creep_between_counts_are_not_said_to_have_another_gain(counts, friction):
     """Torques of a creeping drive hold K_D times a rate that no count shows, steadily; one of 9 N m/rad is found."""

@@ -125,9 +125,9 @@ def calibrate(
     unknowns : "offsets" (N), "offsets+lengths" (3N) or "all", base points too (5N); of these, four motions stay unseen:
     scale, rotation and two translations of the whole machine.
     use : "angles", every sample, moving or not; or "torques", those of the rests of PD drives under a known gain, of
-    which each says where its encoder stood, q_desired - c / K_P; friction before a torque sensor shifts that, and the
-    offset, by f_c / K_P where all rests are approached from one side, and `note` says so.
-    K_P : number or (N,) N m/rad, for torques; default: fitted to the rests of the log.
+    which each says where its encoder stood, q_desired - c / K_P, less what rates add where the rests show it.  `note`
+    says where drives still creep, or where friction before a torque sensor shifts an offset by f_c / K_P.
+    K_P : number or (N,) N m/rad, for torques; default: fitted to the rests.
     noise : rad, standard deviation of a reading; default: from the residual and the steps of the readings.
     Raises `CalibrationError` where the samples do not determine the unknowns, with the combinations that they do, and
     ValueError for two drives, a log that does not fit the machine or has no rests for "torques", or angles of no pose.

@@ -46,7 +46,7 @@ def measured(robot: Manipulator, log) -> tuple[np.ndarray, list[Log]]:
     try:
         angles = real_array("log", log, robot.n_arms)
     except ValueError as error:
-        raise ValueError(f"{error}, a Log, a path, or a list of these") from None
+        raise ValueError(f"{error}, a Log, as run.log() makes one, a path, or a list of these") from None
     fits = angles.ndim == 2 and len(angles) > 0
     return shaped("log", angles, fits, f"angles (k, {robot.n_arms}) with k >= 1, or a Log"), []
 

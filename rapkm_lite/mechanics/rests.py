@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ class Rests(NamedTuple):
     """Means over each rest: desired and measured angles, torques, each (k, N).
 
     noise : (k, N, 2, 2) covariance of torque and angle of a record.  records : how many each mean has, (k,).
+    creeps : of drives that still move, so that their torques may be those of rates, how far torques and angles move
+    from the first half of a rest to the second, (k, 2).
     """
 
     desired: np.ndarray
@@ -28,15 +31,17 @@ class Rests(NamedTuple):
     c: np.ndarray
     noise: np.ndarray
     records: np.ndarray
+    creeps: Mapping[int, np.ndarray] = {}
 
     @property
     def c_error(self) -> np.ndarray:
         """Standard errors of the torques (k, N)."""
         return np.sqrt(self.noise[..., 0, 0] / self.records[:, None])
 
-    def fit(self, i: int, *columns) -> np.ndarray | None:
+    def fit(self, i: int, *columns, creeping: bool = False) -> np.ndarray | None:
         """Coefficients b, and their standard errors, of the torque -b[0] e + b[1] column + ... of drive i at error e.
 
+        creeping : a column tells of that, and what moves within the rests is no noise.
         Long rests weigh more.  What is left of the torques is their noise, or where drives still creep or cycle, more;
         few rests leave it uncertain how much, and five standard deviations are as sure as Student's t at a thousandth.
         None where the columns, each (k,), do not determine them with a rest to spare.
@@ -50,12 +55,33 @@ class Rests(NamedTuple):
         b = np.linalg.solve(information, weighted @ self.c[:, i])
         left = self.c[:, i] - design @ b
         both = np.array([1.0, b[0]])
-        noise = max(np.mean(both @ self.noise[:, i] @ both), 0.0)  # of torques that follow exactly, rounding: below 0
+        # Of torques that follow exactly, rounding: below 0.
+        noise = 0.0 if creeping else max(np.mean(both @ self.noise[:, i] @ both), 0.0)
+        if i in self.creeps:
+            noise = max(noise, np.mean(self.records * (self.creeps[i] @ both) ** 2))
         if spare:
             from scipy.special import stdtrit
 
             noise = max(noise, self.records @ left**2 / spare * max(1.0, stdtrit(spare, 0.9995) / 5.0) ** 2)
         return np.stack([b, np.sqrt(np.diagonal(np.linalg.inv(information)) * noise)])
+
+    def settled(self, qd_a: np.ndarray, moved: np.ndarray) -> Rests:
+        """The same with the torques that the drives would have there without their rates, where the rests show them.
+
+        In short rests drives still creep, and -K_D qd in their torques looks like another gain, or like friction.
+        qd_a : (k, N) mean rates, rad/s.  moved : (k, N, 2) as `creeps` says, of all drives.
+        """
+        c, creeps = self.c.copy(), {}
+        jitter = 2.0 * np.sqrt(self.noise[..., 1, 1] / self.records[:, None])
+        moves = np.abs(moved[..., 1]) > np.maximum(5.0 * jitter, 0.02 * np.abs(self.desired - self.q_a).max(axis=0))
+        for i, rates in enumerate(qd_a.T):
+            braked = self.fit(i, -rates, np.ones(len(rates)), creeping=True)
+            braked = self.fit(i, -rates, creeping=True) if braked is None else braked
+            if braked is not None and abs(braked[0, 1]) > 5 * braked[1, 1]:
+                c[:, i] += braked[0, 1] * rates
+            elif moves[:, i].any():
+                creeps[i] = moved[:, i]
+        return self._replace(c=c, creeps=creeps)
 
 
 class Gain(NamedTuple):
@@ -88,8 +114,14 @@ def rests(logs: list[Log]) -> Rests | None:
                 c, q_a = np.moveaxis(both.mean(axis=0), -1, 0)
                 off = both - both.mean(axis=0)
                 noise = np.einsum("kia,kib->iab", off, off) / (count - 1)
-                found.append((log.q_a_desired[still.start], q_a, c, noise, count))
-    return Rests(*map(np.array, zip(*found, strict=True))) if found else None
+                qd_a = np.gradient(near[still], log.t[still], axis=0, edge_order=2).mean(axis=0)
+                first, second = both[: count // 2], both[count // 2 :]
+                moved = second.mean(axis=0) - first.mean(axis=0)
+                found.append((log.q_a_desired[still.start], q_a, c, noise, count, qd_a, moved))
+    if not found:
+        return None
+    desired, q_a, c, noise, records, qd_a, moved = map(np.array, zip(*found, strict=True))
+    return Rests(desired, q_a, c, noise, records).settled(qd_a, moved)
 
 
 def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
@@ -163,6 +195,13 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
             "use = 'angles'"
         ) from None
     notes += one_sided(stand, K_P)
+    if stand.creeps:
+        drives = " and ".join(f"{i + 1}" for i in stand.creeps)
+        far = max(np.abs(moved[:, 1]).max() for moved in stand.creeps.values())
+        notes.append(
+            f"drives still creep in the rests ({drives}), by up to {1e3 * far:.2g} mrad from the first half to the "
+            "second: what their torques show of gain and friction is unsure; rest longer"
+        )
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     spread = spread if spread > 1e-12 else 0.0  # the rounding of means
     if filtered := _filtered(robot, stand, K_P):
