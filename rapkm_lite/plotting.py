@@ -97,7 +97,7 @@ from .lessons.lesson05.figures import (
 from .lessons.lesson06.figures import plot_bands, plot_gain_curve, plot_landscape, plot_placement, plot_readings
 from .lessons.lesson07.figures import plot_demand, plot_five_bar_curves, plot_spacing
 from .lessons.lesson08.figures import plot_bias, plot_chatter, plot_counted, plot_places, plot_torque_steps
-from .lessons.lesson09.figures import plot_accelerations, plot_clipping, plot_one_sign, plot_room
+from .lessons.lesson09.figures import plot_accelerations, plot_clipping, plot_one_sign, plot_room, shortest_reach
 from .lessons.lesson10.figures import (
     plot_faulty_runs,
     plot_geometry_maps,
@@ -106,6 +106,7 @@ from .lessons.lesson10.figures import (
     plot_saturation,
 )
 from .lessons.lesson11.figures import (
+    loop_frequencies,
     plot_effective_gain,
     plot_law_bands,
     plot_loop_frequencies,
@@ -139,6 +140,7 @@ __all__ = [
     "film_workshop",
     "grid_points",
     "lines_per_drive",
+    "loop_frequencies",
     "mode_name",
     "on_grid",
     "pair_line",
@@ -223,6 +225,7 @@ __all__ = [
     "plot_torques_and_errors",
     "plot_working_modes",
     "plot_workspace",
+    "shortest_reach",
     "table",
     "touching_arcs",
     "use_style",

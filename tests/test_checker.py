@@ -294,6 +294,18 @@ def test_torques_that_make_another_force_are_told_so_once():
     assert sentence.count("do not make the force f") == 1 and "A^T c misses f" in sentence
 
 
+def test_a_prestress_that_changes_its_side_along_the_way_is_named():
+    """The cheaper of both signs, anew at each pose: between two of them every drive changes its sign."""
+
+    def cheaper(A, f):
+        c, n = np.linalg.pinv(A).T @ f, rk.null_basis(A)[:, 0]
+        shifted = c + np.max((5e-3 - c) / n) * n, c + np.min((-5e-3 - c) / n) * n
+        return min(shifted, key=np.linalg.norm)
+
+    said = judged(exercises()["09.quiet_gears"], cheaper)
+    assert said.word == "wrong" and "changes its side" in said.mistake
+
+
 def test_what_stops_for_one_kind_of_case_only_says_for_which():
     def kinds(rng):
         return [Case("three entries", *case) for case in cases(rng)] + [Case("four", np.ones(4), np.arange(4.0), 2.0)]
@@ -350,7 +362,7 @@ def test_an_error_inside_a_law_is_told_as_that_of_the_students_code(name):
         ("06.placement", lambda robot, offset: rk.triangle(robot, side=0.08), "the answer is not numeric"),
         ("12.own_machine", lambda: rk.load("four_arms"), "it cannot be tried: the machine has 4 arms; allowed: 3"),
         ("12.own_machine", lambda: rk.load("no such file"), "your code stops with ValueError: "),
-        ("10.spare_law", lambda drawing: (19.0, 0.55), "it cannot be tried: law = (19.0, 0.55)"),
+        ("10.spare_law", lambda drawing: (19.0, 0.55), "it cannot be tried: law = array([19. , 0.55])"),
     ],
 )
 def test_a_design_that_does_not_stop_is_not_told_that_it_stops(name, answer, said):
@@ -803,6 +815,12 @@ def test_arithmetic_in_place_reaches_nothing_that_a_function_is_given():
         assert got.dtype == float and got.tolist() == [1.0, 2.0]
         for array in (a, named, *(rest.values() if isinstance(rest, dict) else rest)):
             assert array.all()
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.array])
+def test_an_answer_of_several_numbers_is_an_array_in_the_cells_that_follow(kind):
+    """`return low, high` makes a tuple, which has no method round."""
+    assert Answer(lambda: kind([4, 2.25]))().round(1).tolist() == [4.0, 2.2]
 
 
 def test_a_close_answer_is_drawn_dotted_too_with_copies(capsys):

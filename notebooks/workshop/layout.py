@@ -49,7 +49,7 @@ def figure_list() -> str:
     )
     for path in rooms:
         module = "." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
-        names = [n for n in defined(path) if module.startswith(".figures") or n.startswith(("film_", "plot_"))]
+        names = defined(path)
         for name in names:
             if name in owner:
                 raise ValueError(f"{name} stands in {owner[name]} and in {module}; allowed: one figure of that name")

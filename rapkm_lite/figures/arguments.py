@@ -245,6 +245,7 @@ _RULES: dict[str, Callable[[str, Any, Known], object]] = {
     "pairs": _pairs,
     "arms": _arms,
     "rows": _rows,
+    "stiffness": _numbers,
     **dict.fromkeys("trajectory path".split(), _trajectory),
     **dict.fromkeys("run free clipped".split(), _having("a Run, such as simulate returns", "robot q q_a c dt")),
     **dict.fromkeys("ax axes".split(), _axes),

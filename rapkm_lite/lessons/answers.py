@@ -89,8 +89,8 @@ class Handed(Answer):
 
 
 def tidied(got: Any) -> Any:
-    """Numbers and lists of numbers as floating-point arrays, a single number as a number; anything else as it is."""
-    if isinstance(got, np.ndarray | list | int | float | np.number) and not isinstance(got, bool):
+    """Numbers, lists and tuples of numbers as floating-point arrays, one number as a number; anything else as it is."""
+    if isinstance(got, np.ndarray | list | tuple | int | float | np.number) and not isinstance(got, bool):
         try:
             numbers = np.asarray(got)
             if numbers.dtype.kind in "iuf":

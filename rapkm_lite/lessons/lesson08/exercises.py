@@ -19,8 +19,8 @@ EXERCISES = {
         tasks.self_calibrate,
         hints=(
             "Each reading gives one equation for the offsets. What is its left side, and what its right side?",
-            "rk.estimate_pose(robot, q_a - offset, guess) gives poses, rk.null_basis(A) their null vectors n; solve "
-            "n^T offset = n^T (q_a - q) for all readings together with np.linalg.lstsq, and begin again with the new "
+            "rk.estimate_pose(robot, q_a - offset, guess) gives poses, rk.null_basis(A) their null vectors η; solve "
+            "η^T offset = η^T (q_a - q) for all readings together with np.linalg.lstsq, and begin again with the new "
             "offset.",
             "rows = rk.null_basis(A).mT; gap = rows @ (q_a - q[:, :N])[..., None]; "
             "offset = np.linalg.lstsq(rows.reshape(-1, N), gap.ravel(), rcond=None)[0]",
@@ -45,6 +45,8 @@ EXERCISES = {
             "only the first place is used, and the smallest offsets that explain it: one place knows one combination": (
                 tasks.of_one_place
             ),
+            "the null vectors are those of the guess, and one step is taken from there; the best poses come from the "
+            "readings": tasks.of_the_guess,
             "the readings are corrected the wrong way: the poses are those of q_a - offset": (
                 tasks.corrected_the_wrong_way
             ),
@@ -64,7 +66,7 @@ EXERCISES = {
         unit="m",
         judge=tasks.known,
         close=0.1,
-        improve="bring what is marked as missed inside its limit; the places that tell most lie where a component of n "
+        improve="bring what is marked as missed inside its limit; the places that tell most lie where a component of η "
         "vanishes, as far out as the disc allows",
         points=10.0,
         mistakes={

@@ -76,6 +76,12 @@ def of_one_place(robot, q_a, guess) -> np.ndarray:
     return np.linalg.pinv(rows[0]) @ gap[0]
 
 
+def of_the_guess(robot, q_a, guess) -> np.ndarray:
+    q = inverse_kinematics(robot, guess)
+    rows, gap = null_basis(control_matrix(robot, q)).mT, q_a - q[:, : robot.n_arms]
+    return np.linalg.lstsq(rows.reshape(-1, robot.n_arms), np.einsum("kij,kj->ki", rows, gap).ravel(), rcond=None)[0]
+
+
 def reading_cases(rng) -> list[tuple]:
     cases = []
     machines = (("testbed", "the testbed"), ("asymmetric", "three different arms"), ("four_arms", "four drives"))

@@ -109,6 +109,8 @@ EXERCISES = {
                 tasks.another_force
             ),
             "there is no prestress in this choice, so drives change their sign with the force": tasks.without_prestress,
+            "the prestress changes its side along the way, and every drive its sign with it; choose one side for the "
+            "whole run": tasks.changes_its_side,
             "a constant prestress of this sign: what is enough for the worst moment is too much for limit and heat": (
                 tasks.with_a_constant_one
             ),

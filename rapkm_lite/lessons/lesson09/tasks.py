@@ -182,5 +182,11 @@ def with_a_constant_one(answer) -> bool:
     return not without_prestress(answer) and float(np.ptp(share)) < 1e-5 and float(share[0]) > 0.0
 
 
+def changes_its_side(answer) -> bool:
+    """The prestress is along n at some poses and against it at others."""
+    share = [null_basis(A)[:, 0] @ chosen(answer, A, f) for A, f in probes()]
+    return not another_force(answer) and min(share) < -1e-4 and max(share) > 1e-4
+
+
 def another_force(answer) -> bool:
     return any(np.abs(A.T @ chosen(answer, A, f) - f).max() > 1e-3 * np.abs(f).max() for A, f in probes())

@@ -93,6 +93,9 @@ EXERCISES = {
                     np.min((limit - np.abs(fight)) / np.abs(A @ np.linalg.inv(A.T @ A)).max(axis=1))
                 )
             ),
+            "the smallest singular value bounds the size of all torques together; each drive has its own limit": (
+                lambda A, fight, limit: float(np.min(limit - np.abs(fight)) * np.linalg.svd(A, compute_uv=False)[-1])
+            ),
             "this is one force for each drive; the smallest is left in every direction": (
                 lambda A, fight, limit: (limit - np.abs(fight)) / tasks.shares(A)
             ),

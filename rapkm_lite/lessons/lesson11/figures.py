@@ -8,7 +8,7 @@ import numpy as np
 from ...control.stability import effective_gain
 from ...figures._shared import LEAST, no_finer, with_looks
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
-from ...mechanics.dynamics import orthogonal_complement
+from ...mechanics.dynamics import minimal_dynamics, orthogonal_complement
 
 _LOOKS = (
     {"color": NEUTRAL, "ls": "-", "marker": "o"},
@@ -18,22 +18,37 @@ _LOOKS = (
 )
 
 
-def plot_loop_frequencies(t, frequencies, nominal, ax=None):
-    """Natural frequencies (k, 2) in Hz of each loop along a path over time t (k,) in s: a band between two modes.
+def loop_frequencies(path, stiffness) -> np.ndarray:
+    """Natural frequencies (k, 2) in Hz along a path (`Trajectory`) of k samples, the lower one first.
 
-    frequencies : dict of label -> (k, 2); at most four.  nominal : frequency in Hz that all were designed for.
+    stiffness : (2, 2) or (k, 2, 2) in N/m, what a loop makes of an error of the end-effector, whose inertia they move.
 
-    >>> import numpy as np
-    >>> ax = plot_loop_frequencies(np.linspace(0, 1, 5), {"PD": np.full((5, 2), [4.0, 6.0])}, 5.0)
+    >>> import numpy as np; import rapkm_lite as rk
+    >>> loop_frequencies(rk.hold(rk.load(), [0.0, 0.0], 0.01), 2e3 * np.eye(2))[0].round(2)
+    array([6.36, 6.36])
+    """
+    M, _, _ = minimal_dynamics(path.robot, path.q, 0 * path.q)
+    squares = np.real(np.linalg.eigvals(np.linalg.solve(M, np.broadcast_to(stiffness, M.shape))))
+    return np.sort(np.sqrt(squares), axis=-1) / (2 * np.pi)
+
+
+def plot_loop_frequencies(path, springs: dict, nominal, ax=None):
+    """`loop_frequencies` of each loop over time: a band between its two modes.
+
+    springs : dict of label -> stiffness, as `loop_frequencies` takes it; at most four.  nominal : frequency in Hz that
+    all were designed for.
+
+    >>> import numpy as np; import rapkm_lite as rk
+    >>> ax = plot_loop_frequencies(rk.circle(rk.load(), 0.05), {"APD": 2e3 * np.eye(2)}, 5.0)
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.6))
-    for (label, both), look in with_looks("frequencies", frequencies, _LOOKS):
-        low, high = np.sort(both, axis=-1).T
-        ax.fill_between(t, low, high, color=look["color"], alpha=0.1, lw=0)
-        ax.plot(t, low, color=look["color"], ls=look["ls"], label=label)
-        ax.plot(t, high, color=look["color"], ls=look["ls"])
+    for (label, given), look in with_looks("springs", springs, _LOOKS):
+        low, high = loop_frequencies(path, given).T
+        ax.fill_between(path.t, low, high, color=look["color"], alpha=0.1, lw=0)
+        ax.plot(path.t, low, color=look["color"], ls=look["ls"], label=label)
+        ax.plot(path.t, high, color=look["color"], ls=look["ls"])
     ax.axhline(nominal, color="#222222", lw=0.8, zorder=0)
-    ax.set(xlabel="time in s", ylabel="natural frequency in Hz", xlim=(t[0], t[-1]), ylim=(0, None))
+    ax.set(xlabel="time in s", ylabel="natural frequency in Hz", xlim=(path.t[0], path.t[-1]), ylim=(0, None))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     return ax
 

@@ -15,7 +15,7 @@ EXERCISES = {
             "Offsets pull each drive by -K_P times its own. Which part of these torques moves nothing, and which "
             "matrix says so?",
             "A_tilde = rk.projector(J)[:m]; torques with A_tilde.T @ c = 0 move nothing. R of (15) is (A~^T)^+ A~^T; "
-            "the degree of freedom is n - r.",
+            "the degree of freedom is n - r. (The default cut-off of pinv may take rounding for rank.)",
             "R = rk.explicit_pseudoinverse(A_tilde, rk.select_independent(A_tilde, delta=J.shape[1] - J.shape[0])) "
             "@ A_tilde.T; -K_P * (np.eye(m) - R) @ offset",
         ),
