@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from fractions import Fraction
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -817,10 +818,56 @@ def test_arithmetic_in_place_reaches_nothing_that_a_function_is_given():
             assert array.all()
 
 
-@pytest.mark.parametrize("kind", [list, tuple, np.array])
+@pytest.mark.parametrize("kind", [list, tuple, np.array, lambda values: [Fraction(v) for v in values]])
 def test_an_answer_of_several_numbers_is_an_array_in_the_cells_that_follow(kind):
-    """`return low, high` makes a tuple, which has no method round."""
+    """`return low, high` makes a tuple, which has no method round, and SymPy makes objects."""
     assert Answer(lambda: kind([4, 2.25]))().round(1).tolist() == [4.0, 2.2]
+
+
+def test_nothing_that_can_be_told_stays_so_when_it_is_checked_again(capsys):
+    again = check("03.offset_c", check("03.offset_c", [None, None, None]))
+    assert np.isnan(again).all() and capsys.readouterr().out.count("OK 03.offset_c") == 2
+    assert "zeros are a claim" in examine("03.offset_c", np.zeros(3))[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda value: np.round(value, 5), "rounded to 5 decimals"),
+        (lambda value: np.float32(value), "single precision"),
+        (lambda value: np.round(value, 5) + 3e-4 * np.abs(value).max(), "instead of searching"),
+    ],
+)
+def test_numbers_that_are_rounded_are_told_so_and_no_other_advice(change, words):
+    exercise = exercises()["04.filtered_torques"]
+    said = judged(exercise, lambda A, c: change(exercise.reference(A, c)))
+    assert said.word == "close" and words in said.sentence
+
+
+def test_zeros_are_no_rounded_numbers():
+    exercise = exercises()["04.filtered_torques"]
+    assert judged(exercise, lambda A, c: np.round(1e-3 * c, 2)).word == "wrong"
+
+
+def test_the_darkest_place_of_a_map_is_near_an_input_singularity():
+    """A grid such as that of the lesson's own map, whose nodes are 4 mm apart: what the advice speaks of."""
+
+    def darkest(mode):
+        robot = rk.load().replace(mode=mode)
+        points = np.stack(np.meshgrid(*2 * [np.linspace(-0.3, 0.3, 140)]), axis=-1)
+        points = points[rk.reachable(robot, points)]
+        q = rk.inverse_kinematics(robot, points)
+        inside = np.abs(np.sin(q[:, 3:])).min(axis=1) > 0.1
+        return points[inside][np.argmin(rk.singular_values(rk.control_matrix(robot, q[inside]))[:, 1])]
+
+    said = judged(exercises()["02.input_singularity"], darkest)
+    assert said.word == "close" and "let a root finder" in said.sentence
+
+
+def test_signs_of_offsets_that_are_lost_are_named_on_the_grid_of_the_package():
+    place = exercises()["06.placement"].reference
+    said = judged(exercises()["06.placement"], lambda robot, offset: place(robot, np.abs(offset)))
+    assert "the signs of the offsets are lost" in said.mistake
 
 
 def test_a_close_answer_is_drawn_dotted_too_with_copies(capsys):

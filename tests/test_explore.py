@@ -386,14 +386,14 @@ def test_what_cannot_be_computed_is_a_sentence_in_the_picture():
 def test_a_machine_too_small_for_the_triangle_shows_what_it_reaches():
     explorer = made("own_machine")
     explorer.set(proximal=150, distal=150)
-    assert "outside the workspace" in explorer.problem
+    assert "what all arms reach" in explorer.problem
     (reached,) = [mark for mark in explorer.picture.marks if mark.kind == "polygon"]
     # On the outline one arm, the one with the longest way, is stretched to 300 mm; corners are cut between samples.
     way = np.linalg.norm(np.asarray(reached.data)[:, None] - rk.load().base * 0.23 / rk.load().base[2, 1], axis=-1)
     np.testing.assert_allclose(np.nanmax(way, axis=1), 0.3, atol=2e-4)
     # So little that no sample of the outline lies in it.
     tiny = explore.own_machine(rk.load("five_bar")).set(radius=320, distal=155, load=0.3)
-    assert "outside the workspace" in tiny.problem
+    assert "what all arms reach" in tiny.problem
     explorer.set(proximal=200, distal=200)
     assert not explorer.problem and not [mark for mark in explorer.picture.marks if mark.kind == "polygon"]
 

@@ -35,7 +35,7 @@ MAP = marks.Palette(
 
 @shared.ready_made
 def machine(robot: Manipulator) -> Explorer:
-    """The end-effector by hand in every working mode, a map of sigma_min, and the five-bar of each pair.
+    """The end-effector by hand in every working mode, a map of sigma_min, and the five-bars of up to three pairs.
 
     >>> machine().numbers["degree of actuation"]
     '2 of 2 (redundantly actuated)'
@@ -73,8 +73,9 @@ def machine(robot: Manipulator) -> Explorer:
 
     def draw(picture, x, y, mode, drives):
         picture.image("machine", sigma_map(mode, drives), extent, palette, clip=outline)
+        picture.polygon("machine", outline, fill=False, edgecolor=NEUTRAL, linewidth=0.8)
         picture.title("machine", f"Map of σ_min, {drives}", fontweight="bold")
-        point, q, _ = shared.held_machine(picture, "machine", robot, x, y, modes[mode])
+        point, q, stop = shared.held_machine(picture, "machine", robot, x, y, modes[mode])
         for curve in curves(mode, which[drives]) if which[drives] else ():
             picture.line("machine", *curve.T, color="#FFFFFF", linewidth=5, zorder=1.9)
             picture.line("machine", *curve.T, **pair_line(robot, which[drives]) | {"linewidth": 2.2}, zorder=2)
@@ -96,7 +97,7 @@ def machine(robot: Manipulator) -> Explorer:
             look = {"fontweight": "bold", "color": ALARM} if weak else {"fontweight": "normal", "color": AFTER}
             picture.title(name, words, fontsize=10, **look)
             numbers[f"σ_min of {pair_name(pair)}"] = f"{value:.{digits}f} rad/m"
-        return numbers
+        return numbers | stop
 
     plane = plane_limits(robot, 0.05)
     bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
@@ -214,7 +215,7 @@ def prestress(robot: Manipulator) -> Explorer:
         energy = [copper_loss(robot, v, t.dt).sum() for v in (least, c)]
         return {
             "changes of sign without": marks.per_drive(sign_changes(least), 0),
-            "with": marks.per_drive(sign_changes(c), 0),
+            "changes with": marks.per_drive(sign_changes(c), 0),
             "heat without": marks.told(energy[0], 2, strong**2) + " J",
             "heat with": marks.told(energy[1], 2, strong**2) + " J",
             "largest prestress": marks.told(1e3 * np.abs(stress).max(), 0, strong) + " mN m",

@@ -155,9 +155,10 @@ def own_machine(robot: Manipulator) -> Explorer:
             marks.draw_machine(picture, "machine", own, inverse_kinematics(own, middle))
         try:
             path = triangle(own, side, dt=0.02, centre=middle)  # a sample for each pixel or two
-        except ValueError:
+        except ValueError as error:
             marks.draw_workspace(picture, "machine", own)
-            raise
+            words = "allowed: other links, or base joints nearer to the middle or further from it"
+            raise ValueError(f"the triangle is not within what all arms reach (shaded); {words}") from error
         A = act.control_matrix(own, path.q)
         moving = act.inverse_dynamics(own, path.q, path.qd, path.qdd)
         pressing = -GAIN * matvec(act.prestress_projector(A), offset)

@@ -48,7 +48,7 @@ def allocation(robot: Manipulator) -> Explorer:
         picture.line("force", f_x, f_y, marker="o", markersize=7, color=ALARM, zorder=4)
         picture.handle("force", f_x, f_y, f_x=(1, 0), f_y=(0, 1))
         plain, torques = smallest(A, f), RULES[rule](A, f, 1e-3 * limit)
-        marks.bars(picture, "torque", [(1e3 * plain, {"alpha": 0.3}), (1e3 * torques, {})], form=".0f")
+        marks.bars(picture, "torque", [(1e3 * plain, {"alpha": 0.45}), (1e3 * torques, {})], form=".0f")
         for side in (-limit, limit):
             picture.line("torque", picture.xlim("torque"), [side, side], color=ALARM, linestyle=":", linewidth=1.5)
         picture.fit("torque", 1150 * plain, 1150 * torques, 1.15 * limit)
@@ -66,11 +66,13 @@ def allocation(robot: Manipulator) -> Explorer:
         A = control_matrix(robot, inverse_kinematics(robot, point))
         reach = 0.085 / np.abs(minimax_torques(A, np.array([0.0, 1.0]))).max()
         first = min(0.75, 0.05 * np.floor(18 * reach * times)) / times
+    wide = {"color": NEUTRAL, "linewidth": 7}
+    kinds = [("least size", wide | {"alpha": 0.45}), ("by rule", wide), ("limit", {"color": ALARM, "linestyle": ":"})]
     reaches = [("within limits", {"color": AFTER}), ("by least size", {"color": AFTER, "linestyle": "--"})]
     panels = {
         "machine": plane_limits(robot, 0.05) | {"title": "Machine"},
         "force": shared.force_panel(1.8 / times) | {"legend": reaches},
-        "torque": {"title": "Pale: least size", "ylabel": "torque in mN m", **marks.drive_axis(robot.n_arms)},
+        "torque": {"ylabel": "torque in mN m", "legend": kinds, **marks.drive_axis(robot.n_arms)},
     }
     controls = place | {
         "f_x": slider("force f_x in N", -1.5 / times, 1.5 / times, 0.05 / times, 0.0),
@@ -112,7 +114,7 @@ def calibration(robot: Manipulator) -> Explorer:
         (way, share), seen = around(radius), np.unique(np.round(angles).astype(int) % 360)
         marks.draw_machine(picture, "plane", robot, inverse_kinematics(robot, way[turn]))
         picture.line("plane", *way.T, color=NEUTRAL, linewidth=1, zorder=2)
-        dots = {"linestyle": "none", "marker": "o", "markersize": 6, "zorder": 6}
+        dots = {"linestyle": "none", "marker": "o", "markersize": 6 if places < 9 else 2, "zorder": 6}
         picture.line("plane", *way[seen].T, color=ALARM, **dots)
         picture.handle("plane", *way[turn], along=way[:121:3], turn=degrees[:121:3])
         marks.traces(picture, "seen", degrees, share)
@@ -123,17 +125,20 @@ def calibration(robot: Manipulator) -> Explorer:
             picture.text("error", 0.5, 0.5, words, inside=True, ha="center", va="center", fontsize=9, color=ALARM)
             return {"combinations that are known": f"{result.rank} of {N}", "calibration": "refused"}
         error, spread = 1e3 * np.array([result.offset - offset, np.sqrt(np.diagonal(result.covariance))])
-        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=".3f" if N < 4 else ".2f")
-        picture.fit("error", 1.25 * error, 1.25 * spread, least=0.05)
+        digits = 3 if spread.max() > 0.02 else 5
+        form = f".{digits - (N > 3)}f"
+        marks.bars(picture, "error", [(error, {}), (spread, {"alpha": 0.4})], form=form)
+        picture.fit("error", 1.25 * error, 1.25 * spread, least=0.002)
         return {
             "condition": f"{result.condition:.2f}",
-            "error of the offsets": marks.per_drive(error, 3) + " mrad",
-            "standard deviation expected": marks.per_drive(spread, 3) + " mrad",
+            "error of the offsets": marks.per_drive(error, digits) + " mrad",
+            "standard deviation expected": marks.per_drive(spread, digits) + " mrad",
         }
 
     wide = {"color": NEUTRAL, "linewidth": 7}
     both = [("found − true", wide), ("expected", wide | {"alpha": 0.4})]
-    seen = {"xlabel": "place on the circle in °", "ylabel": "|component of η|", "xlim": (0, 360), "ylim": (0, 1)}
+    share = "|component of η|" if N == 3 else "share of each drive"
+    seen = {"xlabel": "place on the circle in °", "ylabel": share, "xlim": (0, 360), "ylim": (0, 1)}
     panels = {
         "plane": plane_limits(robot, 0.05),
         "seen": seen | {"legend": marks.drive_lines(robot)},

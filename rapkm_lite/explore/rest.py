@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import lru_cache, partial
 
 import numpy as np
@@ -52,7 +51,7 @@ def steady_state(robot: Manipulator) -> Explorer:
             picture.line("error", run.t[[0, -1]], theory[[i, i]], color=arm_colour(i), linewidth=0.9, linestyle=":")
         marks.bars(picture, "rest", [(theory, {"alpha": 0.45}), (error[-1], {})], form=".1f")
         picture.fit("rest", 1.25 * theory, 1.25 * error[-1], least=1.0)
-        marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".1f", times=heavier)
+        marks.bars(picture, "torque", [(torque, {"alpha": 0.45}), (held, {})], form=".0f", times=heavier)
         picture.fit("torque", 1.25 * torque, 1.25 * held, least=shared.least_torque(robot, 10.0))
         return {
             "error at rest, theory": marks.per_drive(theory, 2) + " mrad",
@@ -80,7 +79,7 @@ def steady_state(robot: Manipulator) -> Explorer:
 
 @shared.ready_made
 def three_opinions(robot: Manipulator) -> Explorer:
-    """Where each drive wants the end-effector: drag a line, the triangle of disagreement closes, the torques vanish.
+    """Where each drive wants the end-effector: drag a line; where all of them meet, the torques vanish.
 
     >>> three_opinions().set(offset_2=0).numbers["distances from the lines"]
     '0.65 / 0.88 / 0.72 mm'
@@ -166,17 +165,14 @@ def landscape(robot: Manipulator) -> Explorer:
         "side": shared.path_slider(robot, "side of the triangle in mm", 20, 240, 10, 120, 1.0),
         "shift": shared.path_slider(robot, "triangle moved to the right in mm", -60, 60, 5, 40, 0.4),
     }
-    trace = 1e-3
-    with suppress(ValueError):  # hardly any room, or two arms
-        trace = np.trace(form(controls["side"].value, controls["shift"].value)) or trace
-    cost = shared.usual_gains(robot)[0] ** 2 * trace  # J/mrad^2 where controls start
-    levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(cost / 0.3)))  # J; 0.5 to 16 on the testbed
     wheel = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 181)]).T
 
     def draw(picture, K_P, side, shift, **offsets):
         if robot.n_arms < 3:
             raise ValueError(f"this machine has {robot.n_arms} arms and no antagonism; allowed: at least 3 arms")
         S = K_P**2 * form(side, shift)
+        # J; where controls start on the testbed, 0.5 to 16.
+        levels = 2.0 ** (np.arange(-1, 5) + np.round(np.log2(max(np.trace(S), 1e-300) / 0.3)))
         dq = np.array(list(offsets.values()))
         # E = (u - u0)^T S11 (u - u0) + rest, with u the first two offsets.
         S11, S12 = S[:2, :2], S[:2, 2:]
@@ -189,13 +185,13 @@ def landscape(robot: Manipulator) -> Explorer:
                 shade = str(0.62 - 0.55 * k / (len(levels) - 1))
                 picture.line("map", *ring, color=shade, linewidth=1.6)
                 # The number stands where the lines are far apart, and on no other; `half` is of its width.
-                words = f"{float(f'{level:.2g}'):g}"
+                words = f"{float(f'{level:.3g}'):g}"
                 away, half = np.hypot(*(ring - centre[:, None])) + 1e-3 * ring[1], max(2.0, 0.45 * len(words))
                 away[np.abs(ring).max(axis=0) > 12.5 - half] = -1.0
                 for other in taken:
                     away[np.all(np.abs(ring.T - other) < [2 * half, 1.8], axis=1)] = -1.0
                 k = np.argmax(away)
-                if away[k] > 0:
+                if away[k] > 0 and np.ptp(ring[0]) > 3 * half:
                     taken.append(ring[:, k])
                     look = {"color": min(shade, "0.45"), "ha": "center", "va": "center"}
                     picture.text("map", *ring[:, k], words, fontsize=9, **look)

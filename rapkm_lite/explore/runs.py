@@ -27,7 +27,7 @@ LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command fo
 
 @shared.ready_made
 def decentralized_run(robot: Manipulator) -> Explorer:
-    """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies next to Table 1.
+    """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies (Table 1: testbed).
 
     >>> decentralized_run().set(filter="force form (16)").numbers["largest torque"]
     '37 mN m'
@@ -106,7 +106,7 @@ def animation(robot: Manipulator) -> Explorer:
         largest = np.linalg.norm(recorded("off", True)[1], axis=-1).max()
     if largest > 4 * unit or 0.0 < largest < 0.4 * unit:
         unit = 2 * shared.rounded(largest / 4)
-    scale, wide, light = 0.1 * times / unit, 0.009 * times, heavier / times
+    scale, wide, light = 0.1 * times / unit, 0.014 * times, heavier / times
     least = {"torque": shared.least_torque(robot, 0.5), "error": 0.5 * times}
 
     def draw(picture, time, filter, offsets):

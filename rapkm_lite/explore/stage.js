@@ -55,7 +55,7 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
   const fixed = (values) => Array.from(values ?? [], (v) => ({ at: v, words: minus(v) }));
   const widest = (list) => Math.max(0, ...list.map((t) => width(t.words)));
   const top = 0.7 * font, bottom = spec.xticks?.length === 0 ? top : 1.6 * font;
-  const tall = Math.max(high - top - bottom, 10), most = Math.min(Math.max(Math.floor(tall / (2.2 * font)), 2), 7);
+  const tall = Math.max(high - top - bottom, 10), most = Math.min(Math.max(Math.floor(tall / (2.2 * font)), 3), 7);
   const y = spec.yticks ? fixed(spec.yticks) : ticks(y0, y1, most, spec.yscale === "log");
   // At least four digits have room, so that the box seldom moves while a control does.
   const left = y.length ? Math.max(widest(y), width("−100")) + 0.6 * font : top;
@@ -66,8 +66,8 @@ export function layout(spec, scale, [x0, x1, y0, y1], [wide, high], font, width)
     Object.assign(box, { left: left + (box.width - width) / 2, top: top + tall - height, width, height });
   }
   const fits = (list) => list.length * (widest(list) + 0.6 * font) < box.width;
-  const tried = [8, 6, 5, 4, 3, 2, 1].map((count) => ticks(x0, x1, count));
-  const x = spec.xticks ? fixed(spec.xticks) : (tried.find(fits) ?? []);
+  const tried = [8, 6, 5, 4, 3, 2].map((count) => ticks(x0, x1, count)).filter((list) => list.length > 1);
+  const x = spec.xticks ? fixed(spec.xticks) : (tried.find(fits) ?? tried.at(-1)?.slice(-2) ?? []); // one is no scale
   const right = box.left + box.width, foot = box.top + box.height, thin = spec.small ? Math.min(box.width / 120, 1) : 1;
   const up = spec.yscale === "log" ? (y) => Math.log(y / y0) / Math.log(y1 / y0) : (y) => (y - y0) / (y1 - y0);
   const at = (x, y) => [box.left + (box.width * (x - x0)) / (x1 - x0), box.top + box.height * (1 - up(y))];
@@ -122,7 +122,7 @@ class Panel {
     for (const part of ["head", "ylabel", "plot", "scale", "xlabel"])
       this[part] = rich(make("div", { className: `rapkm-${part}` }, this.el), spec[part]);
     this.heading = make("b", {}, this.head);
-    this.canvas = make("canvas", { role: "img", ariaLabel: spec.ylabel || name }, this.plot);
+    this.canvas = make("canvas", { role: "img", ariaLabel: [name, spec.ylabel].join(" ").trim() }, this.plot);
     this.ctx = this.canvas.getContext("2d");
   }
 
@@ -135,8 +135,8 @@ class Panel {
     if (this.told === (this.told = JSON.stringify([legend, theme.dark]))) return;
     this.head.replaceChildren(heading, make("div"));
     this.head.lastChild.append(...legend.map(([words, { color, width, dash, alpha }]) => {
-      const entry = rich(make("span"), words), dashes = dash.map((d) => d * width * POINT).join(" ");
-      const look = `stroke="${theme.colour(color)}" stroke-width="${width * POINT}" stroke-dasharray="${dashes}"`;
+      const entry = rich(make("span"), words), ink = theme.colour(color, width > 5), w = width * POINT;
+      const look = `stroke="${ink}" stroke-width="${w}" stroke-dasharray="${dash.map((d) => d * w).join(" ")}"`;
       entry.insertAdjacentHTML("afterbegin", `<svg><line x2="26" y1="5" y2="5" ${look} opacity="${alpha}"/></svg>`);
       return entry;
     }));
@@ -156,7 +156,7 @@ class Panel {
   /** Words at a pixel, with true subscripts. */
   write({ words, x, y, size, color, bold = false, ha, va, halo = false }) {
     const { ctx, theme } = this, left = x - this.pieces(words, size, bold) * SHARE[ha], foot = y + size * DROP[va];
-    Object.assign(ctx, { strokeStyle: theme.colour("paper"), fillStyle: theme.colour(color), lineWidth: 3 });
+    Object.assign(ctx, { strokeStyle: theme.colour("paper"), fillStyle: theme.colour(color), lineWidth: 5 });
     for (const way of halo ? ["strokeText", "fillText"] : ["fillText"])
       this.pieces(words, size, bold, (text, at, up) => ctx[way](text, left + at, foot - up));
   }
@@ -248,7 +248,7 @@ function words(panel, { kind, points, words }, style) {
   const size = panel.size(style.size), wide = panel.pieces(words, size, style.bold);
   const left = Math.max(Math.min(x - wide * SHARE[style.ha], panel.room[0] - wide), 0); // on the canvas
   // Words that would cover others step aside, away from what they name.
-  const near = ([a, b, c, s], up) => left - 3 < c && left + wide + 3 > a && Math.abs(y + up - b) < 0.6 * (s + size);
+  const near = ([a, b, c, s], up) => left - 1 < c && left + wide + 1 > a && Math.abs(y + up - b) < 0.6 * (s + size);
   const way = (style.va === "top" ? 0.25 : -0.25) * size;
   let up = 0;
   while (Math.abs(up) < 3 * size && panel.taken.some((t) => near(t, up))) up += way;
@@ -367,10 +367,10 @@ export function mount(el, scene, link) {
     const [x, y] = panel.at(handle.at[0], bare ? panel.frame[2] : handle.at[1]);
     const label = (name) => scene.labels?.[name] ?? name, told = (name) => `${label(name)}: ${state.places[name]}`;
     if (knob.parentElement !== panel.plot) panel.plot.append(knob);
-    const ariaLabel = `${names.map(label).join(" and ")}, in the picture`, ariaValueText = names.map(told).join(", ");
-    const className = `rapkm-knob ${bare ? "bare" : ""}`, hidden = false, ariaValueNow = state.places[names[0]];
+    const ariaLabel = `${names.map(label).join(" and ")}, in the picture`, ariaValueNow = state.places[names[0]];
+    const className = `rapkm-knob ${bare ? "bare" : ""}`, ariaValueText = minus(names.map(told).join(", "));
     const [ariaValueMin, ariaValueMax] = scene.ranges?.[names[0]] ?? [null, null];
-    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden });
+    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
     knob.style.translate = `${bare ? Math.max(x, panel.box.left + 9) : x}px ${y - 14 * bare}px`; // off the numbers
@@ -410,7 +410,7 @@ export function mount(el, scene, link) {
     rich(problem, minus(message.problem ?? "")).hidden = !message.problem;
     numbers.replaceChildren(...(message.numbers ?? []).map(([name, text]) => {
       const span = rich(make("span"), `${name}: `);
-      rich(make("b", {}, span), minus(text));
+      rich(make("b", {}, span), minus(text).replace(/(\d|[mN]) (?=[a-zµ])/gi, "$1\u00a0")); // units stay whole
       return span;
     }));
     const places = JSON.stringify(state.places);
@@ -460,7 +460,7 @@ export function mount(el, scene, link) {
 
   // What is seen, in words; names for sliders, which have none for readers of the screen; subscripts for labels.
   function atRest(words) {
-    sentence.textContent = words;
+    sentence.textContent = minus(words);
     for (const control of around()?.querySelectorAll(".rapkm-control") ?? []) {
       const label = control.querySelector(".widget-label"), said = (el) => el?.textContent.replace("\u200b", "").trim();
       const name = (control.dataset.words ??= said(label) || said(control)); // a box has an empty label besides

@@ -93,6 +93,8 @@ def tidied(got: Any) -> Any:
     if isinstance(got, np.ndarray | list | tuple | int | float | np.number) and not isinstance(got, bool):
         try:
             numbers = np.asarray(got)
+            if numbers.dtype.kind == "O":  # such as those of SymPy
+                numbers = numbers.astype(float)
             if numbers.dtype.kind in "iuf":
                 return numbers.astype(float).reshape(() if numbers.shape == (1,) else numbers.shape)[()]
         except (TypeError, ValueError, OverflowError):

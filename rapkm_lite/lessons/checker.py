@@ -90,6 +90,8 @@ def going_on(exercise: Exercise, word: str, own: Any) -> Any:
     value = exercise.is_value(exercise.cases(np.random.default_rng(0)))
     if value:
         package = reference() if callable(reference) else reference
+        if word == "ok" and exercise.raw:
+            return numbers(given(own, ()))[()]
         if word == "ok" or exercise.secret:
             return _own_value(own, package)
         return package

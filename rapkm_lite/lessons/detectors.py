@@ -37,6 +37,20 @@ FACTORS = {
 }
 
 
+def coarse(seen: Seen) -> str:
+    """Numbers that are right but for rounding to some decimals, or to single precision."""
+    flat = [np.concatenate([np.ravel(array) for array in arrays]) for arrays in (seen.got, seen.want)]
+    least = rounding(seen.want)
+    if flat[0].shape != flat[1].shape or any(largest(g - w) > max(0.1 * largest(w), least) for g, w, _ in seen):
+        return ""
+    got, off = flat[0], largest(flat[0] - flat[1])
+    for decimals in range(2, 9):
+        if off <= 0.51 * 10**-decimals and np.array_equal(got, np.round(got, decimals)):
+            return f"the numbers are rounded to {decimals} decimals"
+    single = off <= 1e-5 * largest(flat[1]) and np.array_equal(got, got.astype(np.float32))
+    return "the numbers are in single precision (float32)" * bool(single)
+
+
 def nothing(seen: Seen) -> str:
     """Zero everywhere, if only but for rounding, or the same for different cases."""
     if any(np.any(w) for w in seen.want) and not any(np.any(g) for g in seen.got):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..machine.manipulator import Manipulator
 from .answers import NOTHING, REFERENCE, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
-from .detectors import named, where
+from .detectors import coarse, named, where
 from .exercise import Case, Exercise, Measured
 from .seen import Seen, largest, ratio_of
 
@@ -139,6 +139,8 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
             return Result("close", f"the method is right, {said}. To improve: {exercise.improve}")
         raise Ended("wrong", said, sentence)
     off, share = _off(exercise, seen), _share(worst, want, right)
+    if exercise.close and not exercise.secret and (rounded := coarse(seen)):
+        return Result("close", f"the method is right, {off}, but {rounded}. To improve: return them as computed")
     if share <= exercise.close and not _by_a_factor(seen):
         near = f", {off}, that is {100 * share:.2g} %" if off else ""
         return Result("close", f"the method is right{near}. To improve: {exercise.improve}")

@@ -333,7 +333,7 @@ ANSWERS = {
             (lambda n: n * 1.5e-4)(rk.null_vector(ROBOT, rk.inverse_kinematics(ROBOT, [0.04, -0.05]))),
             "minimum norm",
         ),
-        ("wrong", "zero", np.zeros(3), "infinitely many"),
+        ("wrong", "zero", np.zeros(3), "zeros are a claim"),
         ("wrong", "measured errors", rk.mystery_run("offset_c").error[-1], "minimum norm"),
         ("wrong", "something", np.array([4e-3, -2e-3, 5e-3]), "do not even explain"),
         ("wrong", "one of three", [1e-3, np.nan, np.nan], "none of the three"),

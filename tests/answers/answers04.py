@@ -63,7 +63,7 @@ TORQUES = [
     ("wrong", "the matrix", lambda A, c: rk.antagonism_filter(A), "shape"),
     ("wrong", "a column", lambda A, c: keep(A, c)[:, None], "shape"),
     ("wrong", "sizes of the null vector", lambda A, c: c - np.abs(null(A)) * (np.abs(null(A)) @ c), ""),
-    ("wrong", "third drive off", lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0), "switched off"),
+    ("wrong", "third drive off", lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0), "drive 3 is off"),
     ("wrong", "half of it", lambda A, c: 0.5 * keep(A, c), "half"),
     ("wrong", "limited", lambda A, c: np.clip(c, -0.03, 0.03), ""),
     ("wrong", "complex", lambda A, c: keep(A, c) + 0j, "complex"),

@@ -79,7 +79,7 @@ def png(picture: Picture, problem: str = "") -> bytes:
     file = io.BytesIO()
     with mpl.rc_context(_RC):
         drawn.savefig(file, dpi=144)
-    image = Image.open(file).convert("RGB").quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    image = Image.open(file).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     file = io.BytesIO()
     image.save(file, "PNG", optimize=True)
     return file.getvalue()
@@ -136,7 +136,7 @@ def _image(ax, mark: Mark) -> None:
 
 def _legend(ax, mark: Mark) -> None:
     entries = [(Line2D([], [], **{"color": INK, **style}), mathtext(words)) for words, style in mark.words]
-    look = {"handlelength": 1.7, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
+    look = {"handlelength": 2.4, "columnspacing": 0.9, "handletextpad": 0.6, "borderaxespad": 0.1, "fontsize": 9}
     look |= {"loc": "lower right", "bbox_to_anchor": (1, 1)}
     count = len(entries)
     wide = ax.legend(*zip(*entries, strict=True), ncols=count, **look).get_window_extent().width

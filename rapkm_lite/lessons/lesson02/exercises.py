@@ -182,7 +182,7 @@ EXERCISES = {
         cases=tasks.mixed_modes,
         invariant=tasks.spread,
         tolerance=1e-6,
-        close=0.09,
+        close=0.15,
         improve="a grid or a minimizer comes only near: let a root finder make both cross products zero from there",
         mistakes={
             "this is the other common point of the curves, a base joint: there the arm is folded, a corner of the "

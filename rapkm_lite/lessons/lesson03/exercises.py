@@ -90,6 +90,9 @@ EXERCISES = {
             "eta is not squared in the sum of compliances": _mu(lambda n, k: np.sum(n / k)),
             "eta is not squared in the sum of compliances, only its size": _mu(lambda n, k: np.sum(np.abs(n) / k)),
             "only the softest drive is counted; the others give way too": (_mu(lambda n, k: 1 / k.min())),
+            "only the drive with the largest compliance is counted; the others give way too": (
+                _mu(lambda n, k: np.max(n**2 / k))
+            ),
             "only the first gain is used: right for equal gains only": _mu(lambda n, k: 1 / k[0]),
             "this is the number mu alone; the factor eta is missing, c = mu eta": (
                 lambda eta, gains, offset: -(eta @ offset) / np.sum(eta**2 / gains)

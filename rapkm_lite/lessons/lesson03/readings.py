@@ -16,6 +16,8 @@ def _log_mistakes(name: str) -> dict:
         "one place tells one number, and by the rest of the offsets the machine has moved": lambda n, e, c: e[0],
         "these are the measured errors of a rest, or the smallest offsets that explain them, which is nearly the same, "
         "averaged over the places: not the offsets": lambda n, e, c: e.mean(axis=0),
+        "these are the measured errors of the second rest: one place tells one number": lambda n, e, c: e[1],
+        "these are the measured errors of the last rest: one place tells one number": lambda n, e, c: e[-1],
         "these are rest torques over the gain: only their part along eta comes from the offsets, and one place is not "
         "enough": lambda n, e, c: -c[0] / K_P,
         "this is the minimum norm of the first rest: one place tells one number": lambda n, e, c: n[0] * (n[0] @ e[0]),
@@ -34,6 +36,10 @@ def _log_mistakes(name: str) -> dict:
         ),
     }
     return {words: tasks.from_rests(name, change) for words, change in read.items()}
+
+
+def _solved(n, e) -> np.ndarray:
+    return np.linalg.solve(n, np.sum(n * e, axis=1))
 
 
 def _log_exercise(name: str, hints: tuple[str, ...], tolerance: float, close: float, **more) -> Exercise:
@@ -75,6 +81,11 @@ READINGS = {
         3e-4,
         0.08,
         called="offsets_b",
+        mistakes={
+            "eta is taken at the corners of the big triangle, where this log has not been": tasks.from_rests(
+                "offset_b", lambda n, e, c: _solved(tasks.rests("offset_a")[0], e)
+            ),
+        },
     ),
     "03.offset_c": Exercise(
         np.full(3, np.nan),

@@ -202,7 +202,9 @@ def refusal(answer) -> Result:
 
 def _claimed(offset, n, known) -> tuple[str, str]:
     """Words for offsets that somebody read from `offset_c` all the same."""
-    if np.max(np.abs(offset - n * known)) < 1e-4:
+    if not np.any(offset):
+        words = "zeros are a claim, too: they leave the contradiction of the log unexplained"
+    elif np.max(np.abs(offset - n * known)) < 1e-4:
         words = "this is the minimum norm: the smallest offsets that explain the log, and not those of the machine"
     elif abs(n @ offset - known) < 3e-4:
         words = "these offsets explain the log, and so do infinitely many others: add any A xi, no torque shows it"

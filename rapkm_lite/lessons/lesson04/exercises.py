@@ -158,9 +158,12 @@ EXERCISES = {
             "the null vector is not divided by its norm: c - n (n c) needs a unit vector n": (
                 lambda A, c: c - np.cross(*A.T) * (np.cross(*A.T) @ c)
             ),
-            "the last drive is switched off: the force is the same, but other torques give it with a smaller norm": (
-                lambda A, c: np.append(np.linalg.solve(A[:2].T, A.T @ c), 0.0)
-            ),
+            **{
+                f"drive {off + 1} is off: the force is the same, but other torques give it with a smaller norm": (
+                    lambda A, c, off=off: np.insert(np.linalg.solve(np.delete(A, off, axis=0).T, A.T @ c), off, 0.0)
+                )
+                for off in range(3)
+            },
             "the mean of the torques is removed, as if the null vector were (1, 1, 1): it turns with the pose": (
                 lambda A, c: c - c.mean()
             ),
@@ -210,6 +213,12 @@ EXERCISES = {
             "measured and desired angles are exchanged, or the complement of the filter is used: the error along the "
             "null vector is kept and the rest removed": (
                 _command_with(lambda R, R_K, K, q, d: q - (q - d) + R_K @ (q - d))
+            ),
+            "these are the filtered torques; the command is an angle, (18)": (
+                _command_with(lambda R, R_K, K, q, d: -K * (R_K @ (q - d)))
+            ),
+            "this is the projection of (14), which weighs with the gains; (17) projects at right angles": (
+                lambda A, K_P, q, d: q - A @ np.linalg.solve((A.T * K_P) @ A, (A.T * K_P) @ (q - d))
             ),
             "the torques are filtered and divided by the gains: (17) projects the error with K_P A, not the torque": (
                 _command_with(lambda R, R_K, K, q, d: q - R @ (K * (q - d)) / K)
