@@ -458,7 +458,7 @@ def test_a_law_that_listens_to_dead_encoders_only_does_listen():
         return law
 
     said = judged(exercises()["05.dead_encoder"], make)
-    assert said.word == "wrong" and said.sentence.startswith("encoder 1 dead")
+    assert said.word == "wrong" and said.mistake.startswith("the frozen reading still moves its drive")
 
 
 def test_a_bill_that_is_too_high_is_not_to_be_mended_by_a_gain():

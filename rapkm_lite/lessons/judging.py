@@ -248,7 +248,7 @@ def _behaviour(exercise: Exercise, answer: Any) -> Result:
         raise Ended("wrong", text, "; ".join(f"{m.what} misses its limit" for m in measured if m.miss > 0.0))
     except Ended as end:
         # Which kind of design it is explains why it misses a limit; one that misses none is right, whatever its kind.
-        if end.result.word == "wrong":
+        if end.result.word == "wrong" and not end.result.mistake.startswith("stops with"):
             for sentence, made in exercise.mistakes.items():
                 if _true(made, answer):
                     raise Ended("wrong", f"{sentence}; {end.result.sentence}", sentence) from None

@@ -227,6 +227,20 @@ def blind(robot):
     return lambda t, q_a, qd_a, d: rk.inverse_dynamics(robot, d.q, d.qd, d.qdd, W=weights(robot))
 
 
+def by_hand(filtered, sign=1.0):
+    """PD as a function, its torques through a filter, or not."""
+
+    def make(robot):
+        def law(t, q_a, qd_a, d):
+            c = -sign * (7.05 * (q_a - d.q_a) + 0.225 * (qd_a - d.qd_a))
+            A = rk.control_matrix(robot, d.q)
+            return A @ np.linalg.solve(A.T @ A, A.T @ c) if filtered else c
+
+        return law
+
+    return make
+
+
 LEAN = [
     ("right", "weights", weighted(7.05, 0.225)),
     ("right", "stiffer", weighted(20.0, 0.4)),
@@ -236,6 +250,9 @@ LEAN = [
     ("close", "a little too soft", weighted(4.8, 0.19)),
     ("wrong", "fed forward without sensors", blind, "not used"),
     ("wrong", "PD", lambda robot: rk.PD(7.05, 0.225), "no filter"),
+    ("wrong", "PD as a function", by_hand(False), "no filter"),
+    ("wrong", "a function that filters without weights", by_hand(True), "missing or alike"),
+    ("wrong", "a function with the opposite sign", by_hand(False, -1.0), "pushes away"),
     ("wrong", "soft PD", lambda robot: rk.PD(2.0, 0.12), "no filter"),
     ("wrong", "no weights", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225)), "missing or alike"),
     ("wrong", "equal weights", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225), W=2.0), "missing or alike"),

@@ -318,6 +318,19 @@ def latching(robot):
     return law
 
 
+def all_drives(sign):
+    """Feed-forward, and the feedback of every drive, dead or alive."""
+
+    def make(robot):
+        def law(t, q_a, qd_a, d):
+            c = rk.inverse_dynamics(robot, d.q, d.qd, d.qdd)
+            return c - sign * (7.05 * (q_a - d.q_a) + 0.225 * (qd_a - d.qd_a))
+
+        return law
+
+    return make
+
+
 SURVIVORS = [
     ("right", "feed-forward and the living", feed_forward(7.05, 0.225)),
     ("right", "softer", feed_forward(3.0, 0.15)),
@@ -325,6 +338,8 @@ SURVIVORS = [
     ("right", "readings compared", Remembering),
     ("right", "a dead drive stays dead", latching),
     ("wrong", "PD", lambda robot: rk.PD(7.05, 0.225), "frozen"),
+    ("wrong", "a function that does not notice", all_drives(1), "must be noticed"),
+    ("wrong", "the opposite sign", all_drives(-1), "pushes away"),
     ("wrong", "the filter", lambda robot: rk.AntagonismFilter(rk.PD(7.05, 0.225)), "force"),
     ("wrong", "redundant", lambda robot: rk.RedundantCTC(1000.0, 60.0), "all encoders"),
     ("wrong", "redundant APD", lambda robot: rk.RedundantAPD(2.0, 0.08), "all encoders"),

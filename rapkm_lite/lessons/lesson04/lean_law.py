@@ -6,9 +6,10 @@ import numpy as np
 
 from ...control.laws import PD, AntagonismFilter
 from ...machine.manipulator import load
+from ...mechanics.antagonism import null_vector
 from ...mechanics.trajectory import triangle
 from ...simulation.runs import SimulationError, simulate
-from ..answers import blind, given_law
+from ..answers import blind, given_law, stiffness
 from ..checker import Exercise, Measured
 
 OFFSETS = ((4e-3, -2e-3, 5e-3), (-3e-3, -3e-3, -3e-3))
@@ -45,6 +46,22 @@ def _runs(make) -> list[Measured]:
     return [Measured("largest error", error, "mm", ERROR), Measured("energy", energy, "J", ENERGY)]
 
 
+def _probed(test):
+    """True for a function whose change with the measured angles, (3, 3), and the null vector there pass the test."""
+
+    def made(make) -> bool:
+        path = triangle(_machine(), dt=2e-3)
+        K = stiffness(make(_machine()), path[300])
+        return bool(np.isfinite(K).all() and test(K, null_vector(_machine(), path.q[300])))
+
+    return made
+
+
+def _fights(K, n) -> bool:
+    """Does an error that contradicts itself make a torque?"""
+    return bool(np.abs(K @ n).max() > 1e-3 * np.abs(K).max())
+
+
 def _filtered(test):
     """True for a filter around something whose weights, one per drive, pass the test."""
 
@@ -60,6 +77,8 @@ def _ratios(W) -> np.ndarray:
     diagonal = np.diag(W) if W.ndim == 2 else np.broadcast_to(W, 3)
     return diagonal / diagonal[0]
 
+
+_unweighted = _filtered(lambda law, W: isinstance(law.law, PD) and (W is None or np.ptp(_ratios(W)) < 1e-9))
 
 LEAN_LAW = Exercise(
     lean_law,
@@ -77,11 +96,14 @@ LEAN_LAW = Exercise(
         "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
             lambda make: blind(make(_machine()), triangle(_machine(), dt=2e-3)[300])
         ),
+        "the feedback pushes away from the path (sign): a drive ahead of its desired angle must be held back": (
+            _probed(lambda K, n: np.linalg.eigvalsh(K + K.T)[-1] > 1e-3 and np.trace(K) > 0.0)
+        ),
         "there is no filter: the drives pay for their quarrel (the antagonism is not removed)": (
-            lambda make: isinstance(make(_machine()), PD)
+            lambda make: isinstance(make(_machine()), PD) or _probed(_fights)(make)
         ),
         "the weights are missing or alike: this filter makes c^2 small, not the heat R_el (c/k_t)^2": (
-            _filtered(lambda law, W: isinstance(law.law, PD) and (W is None or np.ptp(_ratios(W)) < 1e-9))
+            lambda make: _unweighted(make) or _probed(lambda K, n: not _fights(K, n) and not _fights(K.T, n))(make)
         ),
         "the weights are upside down: the hot drive must be spared, its weight is the largest (inverse)": (
             _filtered(lambda law, W: isinstance(law.law, PD) and W is not None and _ratios(W)[2] < 1.0)

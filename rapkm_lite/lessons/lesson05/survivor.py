@@ -11,7 +11,7 @@ from ...mechanics.actuation import inverse_dynamics
 from ...mechanics.trajectory import triangle
 from ...simulation.faults import EncoderDropout
 from ...simulation.runs import SimulationError, simulate
-from ..answers import blind, given_law
+from ..answers import blind, given_law, stiffness
 from ..checker import Exercise, Measured
 
 OFFSET = (4e-3, -2e-3, 5e-3)
@@ -60,6 +60,16 @@ def _of_a_pair(make) -> bool:
     return isinstance(law := make(_model()), CTC) and law.independent is not None
 
 
+def _probed(test, frozen=False):
+    """True for a function whose torques change with the measured angles of their own drives as the test says."""
+
+    def made(make) -> bool:
+        path = triangle(_model(), side=0.12, duration=2.5, dt=2e-3)
+        return bool(np.all(test(np.diagonal(stiffness(make(_model()), path[300], frozen)))))
+
+    return made
+
+
 DEAD_ENCODER = Exercise(
     survivor,
     hints=(
@@ -76,6 +86,12 @@ DEAD_ENCODER = Exercise(
     mistakes={
         "the readings are not used: torques fed forward without feedback let the machine drift (a gain is missing)": (
             lambda make: blind(make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)[300])
+        ),
+        "the feedback pushes away from the path (sign): a drive ahead of its desired angle must be held back": (
+            _probed(lambda own: own > 1e-6)
+        ),
+        "the frozen reading still moves its drive: a dead encoder must be noticed, and its rate is zero": (
+            _probed(lambda own: own < -1e-6, frozen=True)
         ),
         "PD follows the frozen reading: its drive pushes against an error that is not there (a dead encoder must be "
         "noticed)": _kind(PD),
