@@ -120,7 +120,7 @@ def computed_torque(robot: Manipulator) -> Explorer:
     controls = {
         "law": choice("law", laws),
         "side": path_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
-        "rate": slider("poles at −1/s times", 10, 80, 2, 40),
+        "rate": slider("size of both poles in 1/s", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
     layout = [["plane", "map"], ["torque", "error"]]
     return explorer(draw, controls, panels, layout=layout, size=(9.2, 6.2), setup=setup)

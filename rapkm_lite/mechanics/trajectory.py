@@ -234,8 +234,9 @@ def triangle(
     if abs(angle) > 1e6:
         raise ValueError(f"angle = {angle:g} rad; allowed: up to 1e6 rad, beyond which corners would be rounded")
     turned = angle + np.deg2rad([210.0, 330.0, 90.0])
-    corners = exact_array("centre", centre, 2) + side / np.sqrt(3) * unit_vector(turned)
-    return _polygon(robot, corners, duration, dt, rest, {"side": side, "centre": centre, "angle": angle})
+    centre = exact_array("centre", centre, 2)
+    corners, given = centre + side / np.sqrt(3) * unit_vector(turned), {"side": side, "centre": centre.tolist()}
+    return _polygon(robot, corners, duration, dt, rest, given | {"angle": angle})
 
 
 def circle(
@@ -262,7 +263,7 @@ def circle(
         v = np.stack([-u[1], u[0]])
         return (middle + radius * u).T, (radius * rate * v).T, (radius * (rate_dot * v - rate**2 * u)).T
 
-    return _follow(robot, t, motion, {"radius": radius, "centre": centre})
+    return _follow(robot, t, motion, {"radius": radius, "centre": middle.ravel().tolist()})
 
 
 def hold(robot: Manipulator, x, duration: float = 1.0, dt: float = 1e-3) -> Trajectory:
