@@ -410,7 +410,7 @@ export function mount(el, scene, link) {
     rich(problem, minus(message.problem ?? "")).hidden = !message.problem;
     numbers.replaceChildren(...(message.numbers ?? []).map(([name, text]) => {
       const span = rich(make("span"), `${name}: `);
-      rich(make("b", {}, span), minus(text).replace(/(\d|[mN]) (?=[a-zµ])/gi, "$1\u00a0")); // units stay whole
+      rich(make("b", {}, span), minus(text));
       return span;
     }));
     const places = JSON.stringify(state.places);
