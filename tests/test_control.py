@@ -732,6 +732,24 @@ def test_a_filter_has_its_own_pose_and_weights_and_so_has_the_law_inside(law, op
     assert_allclose(fast.c, slow.c, rtol=0, atol=1e-9 * np.abs(slow.c).max())
 
 
+@pytest.mark.parametrize("law", [rk.AntagonismFilter(rk.PD(7.05, 0.225)), rk.APD(7.0, 0.2)], ids=["filter", "APD"])
+def test_weights_as_a_matrix_are_those_on_its_diagonal(law):
+    """In runs, too, where the engine knows only one number per drive."""
+    path, W = rk.circle(FRICTIONLESS, 0.05, 0.05), [1.0, 2.0, 4.0]
+    laws = (dataclasses.replace(law, W=each) for each in (W, np.diag(W)))
+    one, other = (rk.simulate(FRICTIONLESS, each, path, [4e-3, -2e-3, 5e-3]).c for each in laws)
+    assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())
+
+
+def test_weights_inside_a_filter_have_to_fit_although_no_torque_depends_on_them():
+    """A^T (A^T)_W^+ = I: whatever its weights, the law inside asks for the same force, which is all that (16) keeps."""
+    path = rk.circle(FRICTIONLESS, 0.05, 0.05)
+    run = lambda W: rk.simulate(FRICTIONLESS, rk.AntagonismFilter(rk.APD(7.0, 0.2, W=W)), path).c  # noqa: E731
+    assert_allclose(run([1.0, 2.0, 4.0]), run(None), rtol=0, atol=1e-9)
+    with pytest.raises(ValueError, match=r"W has shape \(4,\); allowed: one number, \(3,\)"):
+        run([1.0, 2.0, 4.0, 8.0])
+
+
 def test_one_measurement_or_many_and_one_desired_state_or_many():
     law, path = rk.PD([7.0, 5.0, 3.0], 0.2), rk.circle(TESTBED, 0.05, 1.0, dt=0.1)
     d, rng = path[0], np.random.default_rng(1)

@@ -50,6 +50,9 @@ def test_summary_for_people_names_the_machine_and_both_tables():
     assert done.returncode == 0, done.stderr
     for word in ("testbed", "default experiment, without filter", "Table 1, measured, with filter", "4.56", "2.24"):
         assert word in done.stdout
+    version, machine, drives = done.stdout.splitlines()[:3]
+    setting = rk.experiment("testbed")
+    assert rk.__version__ in version and repr(setting.robot) in machine and f" {setting.law!r}," in drives
 
 
 def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
