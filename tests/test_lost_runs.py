@@ -18,7 +18,7 @@ from numpy.testing import assert_array_equal
 import rapkm_lite as rk
 from rapkm_lite import engine
 from rapkm_lite.engine import loop
-from rapkm_lite.simulation import compiled, pools, runs, sweeps
+from rapkm_lite.simulation import chunks, compiled, pools, runs, sweeps
 from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.setup import Outcome, prepare
@@ -463,6 +463,28 @@ def test_torques_that_are_not_finite_mask_their_row_from_the_first_sample_on(law
     assert_array_equal(caught.value.partial.energies[[0, 2]], study.energies[[0, 2]])
 
 
+@pytest.mark.skipif(not engine.COMPILED, reason="without Numba every law runs in Python")
+def test_a_compiled_law_runs_in_python_only_where_its_first_answer_has_to_be_told(monkeypatch):
+    """Of four rows one is singular at its first sample and one later on, and two are done."""
+    asked = []
+
+    def once_more(setup, law):
+        asked.append(setup.sensors.offset[0])
+        return runs.attempt(setup, law)
+
+    @rk.compiled
+    def fails(t, q_a, qd_a, d):
+        late = np.nan if t > 0.1 and q_a[0] - d.q_a[0] > 1.0 else 0.0
+        first = np.nan if q_a[1] - d.q_a[1] > 1.0 else 0.0
+        return 0.0 * q_a + late + first
+
+    monkeypatch.setattr(chunks, "attempt", once_more)
+    offsets = np.array([[0.0, 0.0, 0.0], [0.1, 2.0, 0.0], [2.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
+    columns, _ = chunks.run_chunk(prepare(ROBOT, PATH, rk.Sensors()), [fails] * 4, offsets)
+    assert columns.failed.tolist() == [False, True, True, False] and 0.1 < columns.failure_time[2] < 0.11
+    assert asked == [0.1]
+
+
 class Unreadable(Exception):
     """It can be pickled, but not read again."""
 
@@ -665,6 +687,26 @@ class Taciturn:
 
 def test_what_does_not_travel_is_kept_here():
     assert pools.kept_here(Taciturn()) and not pools.kept_here(PD)
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (BrokenProcessPool("a process died"), True),  # as where it could not read what it was sent
+        (pickle.PicklingError("not found as m.law"), True),
+        (AttributeError("can't get local object"), True),
+        (TypeError("cannot pickle 'generator' object"), True),
+        (KeyError("gain table"), False),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_errors_of_the_way_to_another_process_are_told_what_can_go_it(error, told):
+    """Which kind it is depends on the version of Python."""
+    job: Future = Future()
+    job.set_exception(error)
+    with pytest.raises(type(error)) as caught:
+        pools.answer(job)
+    assert caught.value is error and any("only in modules" in note for note in getattr(error, "__notes__", [])) == told
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that exits takes other ways there")
