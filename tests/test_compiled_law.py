@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from samples import InPython
 
 import rapkm_lite as rk
+from rapkm_lite.control.compiled_law import CompiledLaw
 from rapkm_lite.engine import COMPILED, user
 from rapkm_lite.engine.pointer import MATRICES, places
 from rapkm_lite.engine.refusal import refusal
@@ -290,7 +291,11 @@ def test_values():
         rk.compiled(ctc, memory=-1)
     with pytest.raises(ValueError, match=r"function = compiled\(pid, .*\); allowed: \(t, q_a, qd_a, d"):
         rk.compiled(pid, memory=3)
-    for wrong in ({"at": "nowhere"}, {"memory": 10**7}):  # at once, before there is a function
+    for wrong in (3, "pid", rk.PD):  # a class makes laws and is none
+        with pytest.raises(ValueError, match=r"function = .*; allowed: \(t, q_a, qd_a, d"):
+            rk.compiled(wrong)
+    assert rk.compiled(ctc, memory=10**6).memory == 10**6
+    for wrong in ({"at": "nowhere"}, {"memory": 10**6 + 1}):  # at once, before there is a function
         with pytest.raises(ValueError, match=f"{next(iter(wrong))} = .*; allowed"):
             rk.compiled(**wrong)
     rk.compiled(max).check()  # a built-in function, which has no signature
@@ -393,6 +398,10 @@ REFUSED = {
 class Table(dict):
     def __call__(self, t, q_a, qd_a, d):
         return -7.0 * (q_a - d.q_a)
+
+
+def test_an_object_goes_by_the_name_of_its_class():
+    assert repr(rk.compiled(Table())) == "compiled(Table, at=None, memory=0)"
 
 
 @pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")
@@ -646,6 +655,28 @@ def test_a_law_that_fails_beside_a_lost_machine_is_not_to_blame_either():
             rk.simulate(ROBOT, one, path)
         assert caught.value.time == 0.0 and len(caught.value.partial) == 1
         assert isinstance(caught.value.__cause__, ValueError)
+
+
+def test_a_law_of_a_script_travels_by_its_name():
+    """Plain pickle has no other way, and a process that is forked finds it."""
+    there = """import pickle, rapkm_lite as rk
+@rk.compiled(memory=3)
+def soft(t, q_a, qd_a, d, memory):
+    return -2.0 * (q_a - d.q_a)
+again = pickle.loads(pickle.dumps(soft))
+assert again == soft and again.function is soft.function"""
+    done = subprocess.run([sys.executable, "-c", there], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+class Own(CompiledLaw):
+    """A class of a user's."""
+
+
+def test_a_law_of_a_users_class_travels_as_one_of_that_class():
+    law = Own(ctc, "true", 2)
+    for again in (pickle.loads(pickle.dumps(law)), copy.deepcopy(law)):
+        assert type(again) is Own and again == law
 
 
 def test_a_law_of_a_notebook_travels_with_its_code():
