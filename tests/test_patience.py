@@ -2,6 +2,7 @@
 
 import io
 import sys
+import threading
 import time
 import types
 
@@ -31,7 +32,7 @@ def notebook(monkeypatch):
 
     def display(bundle, raw, display_id):
         shown.append((bundle, raw))
-        return types.SimpleNamespace(update=display_again)
+        return types.SimpleNamespace(update=display_again) if display_id else None
 
     def display_again(bundle, raw):
         shown.append((bundle, raw))
@@ -76,12 +77,44 @@ def test_nothing_is_shown_where_nobody_looks(monkeypatch):
     assert stream.getvalue() == ""
 
 
-def test_a_notebook_sees_a_widget_without_text(notebook):
+def test_a_word_that_is_being_said_as_the_work_ends_is_taken_away(terminal, monkeypatch):
+    begun, left = threading.Event(), []
+
+    def show(text):
+        begun.set()
+        time.sleep(0.1)
+        return lambda: left.append(text)
+
+    monkeypatch.setattr(_patience, "_show", show)
+    with _patience.patience("late", after=0.01):
+        assert begun.wait(60.0)
+    assert len(left) == 1
+
+
+def test_a_notebook_sees_a_widget_without_text(notebook, monkeypatch):
+    closed = []
+    monkeypatch.setattr("ipywidgets.Widget.close", lambda widget: closed.append(widget.model_id))
     slow("notebook")
     (bundle, raw), last = notebook
     assert raw and list(bundle) == ["application/vnd.jupyter.widget-view+json"]
-    # Nothing is left for a page that is opened later.
-    assert last == ({}, True)
+    # Version 2.0 is that of the view's form, not of ipywidgets.
+    (view,) = bundle.values()
+    assert view == {"version_major": 2, "version_minor": 0, "model_id": view["model_id"]}
+    # Nothing is left for a page that is opened later, and no widget in the kernel.
+    assert last == ({}, True) and closed == [view["model_id"]]
+
+
+def test_a_bar_in_a_notebook_is_as_long_as_what_is_done(notebook, monkeypatch):
+    bars, seen = [], []
+
+    def bar(**options):
+        bars.append(types.SimpleNamespace(value=0, model_id="bar", close=lambda: None, **options))
+        return bars[-1]
+
+    monkeypatch.setattr("ipywidgets.IntProgress", bar)
+    for item in rk.progress(list("abcd")):
+        seen.append((item, bars[0].value))
+    assert seen == [("a", 0), ("b", 1), ("c", 2), ("d", 3)] and bars[0].value == bars[0].max == 4
 
 
 def test_progress_counts_the_chunks(terminal, notebook, monkeypatch):
