@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 import rapkm_lite as rk
 from rapkm_lite.engine import COMPILED
 from rapkm_lite.mechanics.actuation import distal_cross_products, drive_pairs
-from rapkm_lite.simulation.explain import _difference, _seen
+from rapkm_lite.simulation.explain import _difference, _seen, _with
 from rapkm_lite.simulation.growth import growth, magnified, swung
 from rapkm_lite.simulation.setup import prepare
 
@@ -34,6 +34,13 @@ def test_the_cause_of_a_lost_run_is_found_by_the_kernel_that_lost_it():
     with pytest.raises(rk.SimulationError):
         rk.simulate(ROBOT, PD, TRIANGLE, offset=[2.0, -1.0, 1.5])
     assert len(loop.closed_loops.signatures) == known
+
+
+def test_a_run_that_is_repeated_without_its_faults_keeps_a_table_of_them():
+    """A table without faults: a run without a table would need another kernel."""
+    healthy = _with(prepare(ROBOT, CIRCLE, rk.Sensors(), faults=[rk.DeadDrive(1, 0.1), rk.OffsetJump(0, 0.2, 1.0)]), [])
+    assert healthy.faults is not None
+    assert healthy.faults.alive.all() and not healthy.faults.jump.any() and not healthy.faults.held.any()
 
 
 def mine(t, q_a, qd_a, desired):

@@ -18,7 +18,7 @@ from numpy.testing import assert_array_equal
 import rapkm_lite as rk
 from rapkm_lite import engine
 from rapkm_lite.engine import loop
-from rapkm_lite.simulation import chunks, compiled, pools, runs, sweeps
+from rapkm_lite.simulation import chunks, compiled, explain, pools, runs, sweeps
 from rapkm_lite.simulation import loop as loop_in_python
 from rapkm_lite.simulation.chunks import Columns
 from rapkm_lite.simulation.setup import Outcome, prepare
@@ -213,6 +213,20 @@ def test_an_interrupt_while_the_cause_is_looked_for_loses_no_run(monkeypatch):
         rk.simulate(ROBOT, rk.PD(1e4, 0.225), PATH, OFFSET)
     consistent(caught.value, len(caught.value.partial))
     assert 0 < len(caught.value.partial) < len(PATH)
+
+
+def test_an_interrupt_while_a_run_is_repeated_is_no_run_that_was_lost_again(monkeypatch):
+    """The engine hands a Ctrl-C over beside what it has done; here in the first repetition, without the offsets."""
+    single, repeated = explain.single, []
+
+    def interrupted(setup, code):
+        repeated.append(setup.sensors.offset)
+        return single(setup, code)[0], KeyboardInterrupt()
+
+    monkeypatch.setattr(explain, "single", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rk.simulate(ROBOT, rk.AntagonismFilter(PD), PATH, [1.5, -1.5, 1.5])
+    assert isinstance(caught.value.partial, rk.Run) and [offset.any() for offset in repeated] == [False]
 
 
 @pytest.mark.parametrize(
