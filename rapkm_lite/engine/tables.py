@@ -120,7 +120,4 @@ def faults(table, width: int):
         return plain(np.empty(0))
     arms = np.minimum(np.arange(width), len(table.limit) - 1)
     limit = np.broadcast_to(table.limit, table.jump.shape)
-    columns = np.stack([v[:, arms] for v in (table.jump, table.held, table.alive, limit)], axis=1)
-    # Arms that fill up a row read no error: the search for a pose would take it for one of the machine's.
-    columns[:, 0, len(table.limit) :] = 0.0
-    return plain(columns.ravel())
+    return plain(np.stack([v[:, arms] for v in (table.jump, table.held, table.alive, limit)], axis=1).ravel())
