@@ -124,8 +124,7 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
 
 def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     seen = _seen(exercise, answer, cases)
-    want = seen.want
-    worst = [_deviation(g, w) for g, w, _ in seen]
+    worst, want = [_deviation(g, w) for g, w, _ in seen], seen.want
     allowed = [max(exercise.tolerance, 1e-9 * largest(w)) for w in want]
     right = [d <= a for d, a in zip(worst, allowed, strict=True)]
     lawful, sentence = _law(exercise, seen)
@@ -138,16 +137,21 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
         if exercise.close:
             return Result("close", f"the method is right, {said}. To improve: {exercise.improve}")
         raise Ended("wrong", said, sentence)
-    off, share = _off(exercise, seen), _share(worst, want, right)
-    if exercise.close and not exercise.secret and (rounded := coarse(seen)):
-        return Result("close", f"the method is right, {off}, but {rounded}. To improve: return them as computed")
-    if share <= exercise.close and not _by_a_factor(seen):
-        near = f", {off}, that is {100 * share:.2g} %" if off else ""
-        return Result("close", f"the method is right{near}. To improve: {exercise.improve}")
+    off = _off(exercise, seen)
+    if words := _close(exercise, seen, off, _share(worst, want, right)):
+        return Result("close", f"the method is right{words}")
     _explained(exercise, seen, right)
-    number = f": {lawful:.3g}" * (not exercise.secret and lawful < np.inf)
-    law = f"; {sentence}{number}" if lawful > exercise.tolerance else ""
-    raise Ended("wrong", f"it is {off or 'off'}{law}", "no name found")
+    law = f"; {sentence}" + f": {lawful:.3g}" * (not exercise.secret and lawful < np.inf)
+    raise Ended("wrong", f"it is {off or 'off'}" + law * (lawful > exercise.tolerance), "no name found")
+
+
+def _close(exercise: Exercise, seen: Seen, off: str, share: float) -> str:
+    """What a right method lacks, and how to improve; "" where the answer is not close. `share` : how far it is off."""
+    if exercise.close and not exercise.secret and (rounded := coarse(seen)):
+        return f", {off}, but {rounded}. To improve: return them as computed"
+    if share <= exercise.close and not _by_a_factor(seen):
+        return (f", {off}, that is {100 * share:.2g} %" if off else "") + f". To improve: {exercise.improve}"
+    return ""
 
 
 def _off(exercise: Exercise, seen: Seen) -> str:

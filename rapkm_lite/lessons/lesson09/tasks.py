@@ -185,7 +185,7 @@ def with_a_constant_one(answer) -> bool:
 def changes_its_side(answer) -> bool:
     """The prestress is along n at some poses and against it at others."""
     share = [null_basis(A)[:, 0] @ chosen(answer, A, f) for A, f in probes()]
-    return not another_force(answer) and min(share) < -1e-4 and max(share) > 1e-4
+    return not another_force(answer) and bool(min(share) < -1e-4 and max(share) > 1e-4)
 
 
 def another_force(answer) -> bool:
