@@ -25,7 +25,7 @@ def loop_frequencies(path, stiffness) -> np.ndarray:
 
     >>> import numpy as np; import rapkm_lite as rk
     >>> loop_frequencies(rk.hold(rk.load(), [0.0, 0.0], 0.01), 2e3 * np.eye(2))[0].round(2)
-    array([6.36, 6.36])
+    array([12., 12.])
     """
     M, _, _ = minimal_dynamics(path.robot, path.q, 0 * path.q)
     squares = np.real(np.linalg.eigvals(np.linalg.solve(M, np.broadcast_to(stiffness, M.shape))))
