@@ -961,6 +961,33 @@ def test_drives_that_creep_are_named_where_counts_hide_their_rates_and_silent_wh
     assert "creep" not in at_rest.note
 
 
+def test_three_short_rests_show_gain_and_rates():
+    """Two unknowns of each drive; with one more, for torques that lie aside, there would be too few."""
+    logs = short_rests(0.3, rk.PD([6.0, 7.0, 9.0], [0.3, 0.4, 0.2]), 0.05)[1:4]
+    assert_allclose(rk.calibrate(TESTBED, logs, use="torques").K_P, [6.0, 7.0, 9.0], rtol=0.02)
+
+
+def test_how_far_a_drive_creeps_is_told_between_the_halves_of_a_rest():
+    """A line over time: its means over both halves lie half of the rest apart; the first quarter is left out."""
+    t = np.arange(80) / 100
+    angles = np.stack([0.01 + 0.1 * t, np.full(80, 0.02)], axis=-1)
+    log = rk.Log("a line", t, angles, 0 * angles, -7.0 * angles)
+    creeps = rests([log]).creeps
+    assert list(creeps) == [0]
+    assert_allclose(creeps[0], [[-7.0 * 0.1 * 0.3, 0.1 * 0.3]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("times", "share", "creeps"), [(11.0, 0.03, 1), (9.0, 0.03, 0), (11.0, 0.015, 0)])
+def test_a_drive_creeps_from_ten_errors_of_a_mean_and_a_fiftieth_of_its_error_on(times, share, creeps):
+    """Both halves of n records have twice the variance of the whole, and so their difference four times."""
+    e = np.full((1, 1), 1e-2)
+    moved = share * e[0, 0]
+    sigma = moved / times  # of the mean of the rest
+    noise = np.array([[[[0.0, 0.0], [0.0, 50 * sigma**2]]]])
+    stand = Rests(0 * e, e, -7.0 * e, noise, np.array([50]))
+    assert len(stand.settled(0 * e, np.array([[[0.0, moved]]])).creeps) == creeps
+
+
 def test_rates_that_are_zero_leave_the_torques_of_rests_as_they_are():
     rng, count = np.random.default_rng(0), np.full(6, 50)
     stand = Rests(*rng.normal(size=(3, 6, 2)), noise_of(np.full((6, 2), 1e-3), 50), count)
