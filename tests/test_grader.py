@@ -69,6 +69,7 @@ SUBMISSIONS = {
     "jon": checked(["from rapkm_lite.lessons.lesson04.exercises import filtered_torques\n", *RIGHT[1:]]),
     "moe": checked([f"def filtered_torques(A, c):\n    return check({NAMES[0]!r}, ...)(A, c)\n", *RIGHT[1:]]),
     "kim": [SETUP, "while True: pass", *checked(RIGHT)[1:]],
+    "ned": [SETUP, TORQUES + "return (", *RIGHT[1:]],
     "lou": [SETUP, *RIGHT, *(f'hint("04.{name}")' for name in ("filtered_torques", "filtered_command"))],
 }
 # Student -> verdicts of the three exercises.
@@ -85,6 +86,7 @@ VERDICTS = {
     "jon": ["todo", "ok", "ok"],
     "moe": ["todo", "ok", "ok"],
     "kim": ["ok", "ok", "ok"],
+    "ned": ["wrong", "ok", "ok"],
     "lou": ["ok", "ok", "ok"],
 }
 

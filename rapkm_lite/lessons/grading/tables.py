@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import sys
+import textwrap
 from collections import Counter
 from pathlib import Path
 
@@ -57,7 +58,8 @@ def by_exercise(grades: list[Grade]) -> str:
         own = [grade for grade in grades if grade.exercise == name]
         words = Counter(grade.verdict for grade in own)
         mistakes = Counter(grade.mistake for grade in own if grade.verdict == "wrong" and grade.mistake)
-        common = "; ".join(f"{count} x {mistake[:70]}" for mistake, count in mistakes.most_common(3))
+        often = ((textwrap.shorten(mistake, 70, placeholder=" …"), count) for mistake, count in mistakes.most_common(3))
+        common = "; ".join(f"{count} x {mistake}" for mistake, count in often)
         counts = f"{words['ok']:>7}{words['close']:>7}{words['wrong']:>7}{words['todo']:>9}"
         lines.append(f"{name:<28}{counts}   {common}".rstrip())
     return "\n".join(lines)
