@@ -165,11 +165,13 @@ def cautions(
     """What to mind: a residual above the noise, or else above the steps of the readings (rad), places (k, 2) close."""
     said = []
     if noise:
-        size, what, cause = noise, "the noise", "something else"
+        size, what, cause, many = noise, "the noise", "something else", False
     else:
         size, what = step, "the steps of the readings,"
+        # Of many readings that agree but for their rounding the residual is known to a few hundredths.
+        many = len(x) > 100
         cause = "they have more noise than that (to be given as noise), or something"
-    if size and spread > 3 * size:
+    if size and spread > (1.5 if many else 3.0) * size:
         said.append(
             f"the residual {1e3 * spread:.3g} mrad exceeds {what} {1e3 * size:.2g} mrad: {cause} is wrong, such as a "
             "length or a base point"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ class Rests(NamedTuple):
 
     noise : (k, N, 2, 2) covariance of torque and angle of a record.  records : how many each mean has, (k,).
     creeps : of drives that still move, so that their torques may be those of rates, how far torques and angles move
-    from the first half of a rest to the second, (k, 2).
+    from the first half of a rest to the second, (k, 2).  braked : of drives whose torques are free of those of rates.
     """
 
     desired: np.ndarray
@@ -32,6 +32,7 @@ class Rests(NamedTuple):
     noise: np.ndarray
     records: np.ndarray
     creeps: Mapping[int, np.ndarray] = {}
+    braked: Collection[int] = ()
 
     @property
     def c_error(self) -> np.ndarray:
@@ -56,7 +57,7 @@ class Rests(NamedTuple):
         left = self.c[:, i] - design @ b
         both = np.array([1.0, b[0]])
         # Of torques that follow exactly, rounding: below 0.
-        noise = 0.0 if creeping else max(np.mean(both @ self.noise[:, i] @ both), 0.0)
+        noise = 0.0 if creeping or i in self.braked else max(np.mean(both @ self.noise[:, i] @ both), 0.0)
         if i in self.creeps:
             noise = max(noise, np.mean(self.records * (self.creeps[i] @ both) ** 2))
         if spare:
@@ -65,35 +66,48 @@ class Rests(NamedTuple):
             noise = max(noise, self.records @ left**2 / spare * max(1.0, stdtrit(spare, 0.9995) / 5.0) ** 2)
         return np.stack([b, np.sqrt(np.diagonal(np.linalg.inv(information)) * noise)])
 
-    def settled(self, qd_a: np.ndarray, moved: np.ndarray) -> Rests:
+    def settled(self, qd_a: np.ndarray, moved: np.ndarray, jitter: np.ndarray) -> Rests:
         """The same with the torques that the drives would have there without their rates, where the rests show them.
 
         In short rests drives still creep, and -K_D qd in their torques looks like another gain, or like friction.
-        qd_a : (k, N) mean rates, rad/s.  moved : (k, N, 2) as `creeps` says, of all drives.
+        qd_a : (k, N) mean rates, rad/s.  moved : (k, N, 2) as `creeps` says, of all drives.  jitter : (k, N) rad, what
+        the angles would move by their noise alone.
         """
-        c, creeps = self.c.copy(), {}
-        jitter = 2.0 * np.sqrt(self.noise[..., 1, 1] / self.records[:, None])
+        c, creeps, known = self.c.copy(), {}, []
         moves = np.abs(moved[..., 1]) > np.maximum(5.0 * jitter, 0.02 * np.abs(self.desired - self.q_a).max(axis=0))
         for i, rates in enumerate(qd_a.T):
             braked = self.fit(i, -rates, np.ones(len(rates)), creeping=True)
-            braked = self.fit(i, -rates, creeping=True) if braked is None else braked
+            # A column too many would blur the one that matters.
+            if braked is None or abs(braked[0, 2]) <= 5 * braked[1, 2]:
+                braked = self.fit(i, -rates, creeping=True)
             if braked is not None and abs(braked[0, 1]) > 5 * braked[1, 1]:
                 c[:, i] += braked[0, 1] * rates
+                known.append(i)
             elif moves[:, i].any():
                 creeps[i] = moved[:, i]
-        return self._replace(c=c, creeps=creeps)
+        return self._replace(c=c, creeps=creeps, braked=known)
 
 
 class Gain(NamedTuple):
-    """Gains (N,) N m/rad of PD drives as the rests show them, and their standard errors."""
+    """Gains (N,) N m/rad of PD drives as the rests show them, and their standard errors.
+
+    aside : N m, where torques that all lie aside by so much, with another gain, would explain them as well; or NaN.
+    """
 
     K_P: np.ndarray
     error: np.ndarray
+    aside: np.ndarray | tuple = ()
+
+    def instead(self, i: int) -> str:
+        """What else than the gain of drive i the rests may show."""
+        doubtful = len(self.aside) and self.aside[i] == self.aside[i]
+        words = ", or torques that lie {:+.2g} mN m off -K_P times the error, as with friction before a sensor"
+        return words.format(1e3 * self.aside[i]) if doubtful else ""
 
     def objections(self, nominal: np.ndarray) -> list[str]:
         """A sentence for each drive whose gain is not the nominal one, (N,)."""
         return [
-            f"the rests show K_P = {k:.3g} N m/rad for drive {i + 1}, not {given:.3g}"
+            f"the rests show K_P = {k:.3g} N m/rad for drive {i + 1}, not {given:.3g}{self.instead(i)}"
             for i, (k, error, given) in enumerate(zip(self.K_P, self.error, nominal, strict=True))
             if abs(k - given) > max(5 * error, 0.02 * given)
         ]
@@ -117,11 +131,13 @@ def rests(logs: list[Log]) -> Rests | None:
                 qd_a = np.gradient(near[still], log.t[still], axis=0, edge_order=2).mean(axis=0)
                 first, second = both[: count // 2], both[count // 2 :]
                 moved = second.mean(axis=0) - first.mean(axis=0)
-                found.append((log.q_a_desired[still.start], q_a, c, noise, count, qd_a, moved))
+                # From record to record creeping is no noise; a mean over half of them, and a difference of two.
+                jitter = np.sqrt(2.0 * np.sum(np.diff(near[still], axis=0) ** 2, axis=0) / (count - 1) / count)
+                found.append((log.q_a_desired[still.start], q_a, c, noise, count, qd_a, moved, jitter))
     if not found:
         return None
-    desired, q_a, c, noise, records, qd_a, moved = map(np.array, zip(*found, strict=True))
-    return Rests(desired, q_a, c, noise, records).settled(qd_a, moved)
+    desired, q_a, c, noise, records, qd_a, moved, jitter = map(np.array, zip(*found, strict=True))
+    return Rests(desired, q_a, c, noise, records).settled(qd_a, moved, jitter)
 
 
 def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
@@ -152,12 +168,15 @@ def fitted_gain(stand: Rests) -> Gain | None:
     found = []
     for i in range(stand.c.shape[1]):
         line, aside = stand.fit(i), stand.fit(i, np.ones(len(stand.c)))
+        doubt = np.nan
         # Torques that all lie aside are no part of the gain.
         if aside is not None and abs(aside[0, 1]) > 5 * aside[1, 1]:
             line = aside
         if line is None:
             return None
-        found.append(line[:, 0])
+        if aside is not None and line is not aside and abs(aside[0, 1]) > 2 * aside[1, 1]:
+            doubt = aside[0, 1] if abs(line[0, 0] - aside[0, 0]) > 0.02 * abs(line[0, 0]) else np.nan
+        found.append((*line[:, 0], doubt))
     return Gain(*np.array(found).T)
 
 
@@ -172,6 +191,8 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         if gain is None:
             raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
         K_P = gain.K_P
+        others = [gain.instead(i) for i in range(len(K_P))]
+        notes += [f"drive {i + 1} has K_P = {K_P[i]:.3g} N m/rad{other}" for i, other in enumerate(others) if other]
         left = stand.c + K_P * (stand.q_a - stand.desired)
         if np.sum(left**2) >= 0.25 * np.sum(stand.c**2) or _filtered(robot, stand, K_P):
             raise ValueError(
