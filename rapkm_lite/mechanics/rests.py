@@ -87,6 +87,16 @@ class Rests(NamedTuple):
                 creeps[i] = moved[:, i]
         return self._replace(c=c, creeps=creeps, braked=known)
 
+    def creeping(self) -> list[str]:
+        """A sentence where drives still move."""
+        drives = " and ".join(f"{i + 1}" for i in self.creeps)
+        far = max((np.abs(moved[:, 1]).max() for moved in self.creeps.values()), default=0.0)
+        sentence = (
+            f"drives still creep in the rests ({drives}), by up to {1e3 * far:.2g} mrad from the first half to the "
+            "second: what their torques show of gain and friction is unsure; rest longer"
+        )
+        return [sentence] if self.creeps else []
+
 
 class Gain(NamedTuple):
     """Gains (N,) N m/rad of PD drives as the rests show them, and their standard errors.
@@ -103,6 +113,11 @@ class Gain(NamedTuple):
         doubtful = len(self.aside) and self.aside[i] == self.aside[i]
         words = ", or torques that lie {:+.2g} mN m off -K_P times the error, as with friction before a sensor"
         return words.format(1e3 * self.aside[i]) if doubtful else ""
+
+    def doubts(self) -> list[str]:
+        """A sentence for each drive whose gain may be another one."""
+        others = [self.instead(i) for i in range(len(self.K_P))]
+        return [f"drive {i + 1} has K_P = {self.K_P[i]:.3g} N m/rad{words}" for i, words in enumerate(others) if words]
 
     def objections(self, nominal: np.ndarray) -> list[str]:
         """A sentence for each drive whose gain is not the nominal one, (N,)."""
@@ -191,8 +206,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         if gain is None:
             raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
         K_P = gain.K_P
-        others = [gain.instead(i) for i in range(len(K_P))]
-        notes += [f"drive {i + 1} has K_P = {K_P[i]:.3g} N m/rad{other}" for i, other in enumerate(others) if other]
+        notes += gain.doubts()
         left = stand.c + K_P * (stand.q_a - stand.desired)
         if np.sum(left**2) >= 0.25 * np.sum(stand.c**2) or _filtered(robot, stand, K_P):
             raise ValueError(
@@ -216,13 +230,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
             "use = 'angles'"
         ) from None
     notes += one_sided(stand, K_P)
-    if stand.creeps:
-        drives = " and ".join(f"{i + 1}" for i in stand.creeps)
-        far = max(np.abs(moved[:, 1]).max() for moved in stand.creeps.values())
-        notes.append(
-            f"drives still creep in the rests ({drives}), by up to {1e3 * far:.2g} mrad from the first half to the "
-            "second: what their torques show of gain and friction is unsure; rest longer"
-        )
+    notes += stand.creeping()
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     spread = spread if spread > 1e-12 else 0.0  # the rounding of means
     if filtered := _filtered(robot, stand, K_P):

@@ -137,11 +137,13 @@ class Bench:
         # Hints and pictures name an exercise, too; its answer may stand in a cell of its own.
         tried = [self.judged(name, value) for cell, value in self.bound[name] if cell not in cells][:5]
         order = ["ok", "close", "wrong", "todo"]
-        if not tried:
-            binds = re.compile(rf"^(def )?{called(name, self.exercises[name])} ?[(=]", re.MULTILINE)
-            stopped = [words for cell, words in sorted(self.failed.items()) if binds.search(texts[cell])]
-            tried = [Result("wrong", f"its cell: {words}", "its cell stops") for words in stopped]
-        return min(tried, key=lambda result: order.index(result.word), default=Result("todo", "not yet"))
+        return min(tried, key=lambda result: order.index(result.word), default=self.never_bound(name, texts))
+
+    def never_bound(self, name: str, texts: list[str]) -> Result:
+        """The verdict where nothing bears the answer's name: has the cell that was to make it stopped?"""
+        makes = re.compile(rf"^(def )?{called(name, self.exercises[name])} ?[(=]", re.MULTILINE)
+        stopped = [words for cell, words in sorted(self.failed.items()) if makes.search(texts[cell])]
+        return Result("wrong", f"its cell: {stopped[0]}", "its cell stops") if stopped else Result("todo", "not yet")
 
 
 def awaited(code: CodeType, space: dict[str, Any]) -> None:
