@@ -85,7 +85,7 @@ class Rests(NamedTuple):
                 known.append(i)
             elif moves[:, i].any():
                 creeps[i] = moved[:, i]
-        return self._replace(c=c, creeps=creeps, braked=known)
+        return self._replace(c=c, creeps=creeps, braked=tuple(known))
 
     def creeping(self) -> list[str]:
         """A sentence where drives still move."""
