@@ -225,6 +225,12 @@ BESIDE = """if True:
 
     else:
         assert not {"scipy.linalg", "numba.np.arraymath"} & set(sys.modules)
+        from rapkm_lite.engine.loop import closed_loops
+        (loaded,) = closed_loops.overloads.values()
+        # Names that Python asks for; of globals, those of the wrapper, and none of what is inlined.
+        told = str(loaded.library._shared_module)
+        assert f'@{loaded.fndesc.llvm_cpython_wrapper_name}(' in told and "call" not in told
+        assert [env.env_name for env in loaded.referenced_envs] == [closed_loops.targetctx.get_env_name(loaded.fndesc)]
     study = rk.sweep(robot, rk.PD(7.0, 0.2), path, [[4e-3, -2e-3, 5e-3]] * 2)
     if len(sys.argv) > 1:
         assert njit(lambda one, other: one - other)("as it was", 1) == "as it was"
@@ -249,7 +255,8 @@ def test_kernels_take_the_roots_of_arms_and_of_runs_several_at_once(tmp_path):
 
 def test_kernels_and_what_others_compile_leave_each_other_alone(tmp_path):
     """Another package may teach Numba a new difference between two kernels, and count from the end of an array; a
-    kernel from the cache needs nothing of what Numba would import to compile one, and gives the same bits."""
+    kernel from the cache needs nothing of what Numba would import to compile one, comes without the code that it was
+    made from, and gives the same bits."""
     pytest.importorskip("numba")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "RAPKM_LITE_NUMBA": "1"}
     first, again = (

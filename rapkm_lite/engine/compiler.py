@@ -148,6 +148,12 @@ class Whole(JITCodeLibrary):
         passes.add_refprune_pass()
         passes.run(self._final_module, builder)
 
+    def serialize_using_object_code(self):
+        """For the cache, machine code and the names in it: nothing is linked with a kernel, and its bitcode would take
+        longer to read than all the rest."""
+        names = (f'define void @"{function.name}"() {{ ret void }}' for function in self.get_defined_functions())
+        return self.name, "object", (self._get_compiled_object(), llvm.parse_assembly("\n".join(names)).as_bitcode())
+
 
 class Part(Whole):
     """What only kernels call: it is linked into them, and needs no machine code of its own."""
@@ -157,6 +163,13 @@ class Part(Whole):
 
     def set_env(self, name, env):
         """Without machine code there is nothing to enter."""
+
+    def _optimize_final_module(self):
+        # Nor does it raise, for which a place of its globals would be kept, and filled whenever the kernel is loaded.
+        for place in self._final_module.global_variables:
+            if place.name.startswith("_ZN08NumbaEnv"):
+                place.linkage = "internal"
+        super()._optimize_final_module()
 
     def _finalize_final_module(self):
         self._finalized = True

@@ -82,7 +82,7 @@ def _forgiving(dispatcher):
         return tried
 
     def swept(*arguments):
-        """Save a kernel, and delete those of earlier sources: 24 MB per version that nobody would ever read again."""
+        """Save a kernel, and delete those of earlier sources, megabytes that nobody would ever read again."""
         for old in Path(cache.cache_path).glob(f"*_{'[0-9a-f]' * 12}-*.nb[ci]"):
             if _sources() not in old.name:
                 old.unlink(missing_ok=True)
