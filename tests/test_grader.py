@@ -22,7 +22,15 @@ from rapkm_lite.checks import exercises
 from rapkm_lite.lessons.grading import grader
 from rapkm_lite.lessons.grading.cells import sources
 from rapkm_lite.lessons.grading.grader import Grade, grade, grade_one
-from rapkm_lite.lessons.grading.submission import Submission, called, found, hides_check, needed, statements
+from rapkm_lite.lessons.grading.submission import (
+    Submission,
+    called,
+    found,
+    hides_check,
+    needed,
+    statements,
+    unnamed,
+)
 from rapkm_lite.lessons.grading.tables import by_exercise, by_student, check_place, write_csv
 from rapkm_lite.lessons.grading.worker import Bench, nowhere
 
@@ -524,6 +532,15 @@ def test_a_number_in_a_name_that_is_no_lesson_is_corrected_by_the_exercises(tmp_
         (tmp_path / "ada" / name).unlink()
 
 
+def test_a_notebook_whose_lesson_cannot_be_told_is_not_graded_but_named(tmp_path):
+    """A date is not a lesson, unless the exercises say so; a name as the lessons have them is one."""
+    names = ["12.03_report.ipynb", "2026-12-03.ipynb", "Bericht 04 2026.ipynb", "00_start_2026-12-03.ipynb"]
+    for name in (*names, "04_title_2026-12-03.ipynb"):
+        write(tmp_path / "ada" / name, [SETUP])
+    assert [one.path.name for one in found(tmp_path, {"03", "04", "12"})] == ["04_title_2026-12-03.ipynb"]
+    assert unnamed(tmp_path, {"03", "04", "12"}) == sorted(f"ada/{name}" for name in names[:3])
+
+
 @pytest.mark.parametrize("name", ["04 Übung – Lösung", "Übung 04", "lesson04", "04", "04-filter (1)", "x_04 (gültig)"])
 def test_a_lesson_is_told_by_its_number_whatever_stands_around_it(tmp_path, name):
     write(tmp_path / "Jörg Müßig" / f"{name}.ipynb", [SETUP])
@@ -703,6 +720,17 @@ def test_a_data_file_beside_the_notebook_is_read_from_a_copy(tmp_path, words):
     assert graded_alone(tmp_path, f"import random\n{words}\n") == "ok"
     left = {path.relative_to(tmp_path).as_posix(): path for path in tmp_path.rglob("*") if path.is_file()}
     assert {*left} == {*files, "04_x.ipynb"} and all(left[name].read_text() == text for name, text in files.items())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right there")
+def test_what_would_be_too_much_to_copy_is_linked(tmp_path):
+    """As 2 GB beside the notebook of each of thirty students: only what fits is copied, and all of it is found."""
+    for name, size in (("a.bin", 10**8 - 1), ("b.bin", 2), ("c.bin", 1)):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(size)
+    grader._lend(Submission("ada", tmp_path / "04_x.ipynb", "04"), work := tmp_path / ".work")
+    assert [(work / name).is_symlink() for name in ("a.bin", "b.bin", "c.bin")] == [False, True, False]
+    assert (work / "b.bin").read_bytes() == bytes(2)
 
 
 def test_a_folder_that_cannot_be_copied_costs_nobody_a_grade(tmp_path, monkeypatch):

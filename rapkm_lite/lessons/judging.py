@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeGuard
 
@@ -141,17 +142,20 @@ def _numbers(exercise: Exercise, answer: Any, cases: list[tuple]) -> Result:
     if words := _close(exercise, seen, off, _share(worst, want, right)):
         return Result("close", f"the method is right{words}")
     _explained(exercise, seen, right)
-    law = f"; {sentence}" + f": {lawful:.3g}" * (not exercise.secret and lawful < np.inf)
-    raise Ended("wrong", f"it is {off or 'off'}" + law * (lawful > exercise.tolerance), "no name found")
+    law = f"; {sentence}" + (": too much" if exercise.secret else f": {lawful:.3g}") * (lawful < np.inf)
+    off = off or "off; how far is not told, since a few tries would then tell the answer"
+    raise Ended("wrong", f"it is {off}" + law * (lawful > exercise.tolerance), "no name found")
 
 
 def _close(exercise: Exercise, seen: Seen, off: str, share: float) -> str:
     """What a right method lacks, and how to improve; "" where the answer is not close. `share` : how far it is off."""
     if exercise.close and not exercise.secret and (rounded := coarse(seen)):
         return f", {off}, but {rounded}. To improve: return them as computed"
-    if share <= exercise.close and not _by_a_factor(seen):
-        return (f", {off}, that is {100 * share:.2g} %" if off else "") + f". To improve: {exercise.improve}"
-    return ""
+    if share > exercise.close or _by_a_factor(seen):
+        return ""
+    if exercise.near:
+        raise Ended("wrong", f"{exercise.near}; {off}, that is {100 * share:.2g} %", exercise.near)
+    return (f", {off}, that is {100 * share:.2g} %" if off else "") + f". To improve: {exercise.improve}"
 
 
 def _off(exercise: Exercise, seen: Seen) -> str:
@@ -192,9 +196,8 @@ def _law(exercise: Exercise, seen: Seen) -> tuple[float, str]:
                     number, text = np.inf, "nothing can be computed with it"
                 if number != number:
                     number, text = np.inf, "nothing can be computed with it"
-                number = float(number)
                 if not number < lawful:
-                    lawful, sentence = number, text
+                    lawful, sentence = float(number), text
     return lawful, sentence
 
 
@@ -205,9 +208,8 @@ def _sign(mistake: Callable, seen: Seen) -> int:
             made = [np.asarray(mistake(*map(copied, case)), dtype=float) for case in seen.cases]
     except Exception:
         return 0
-    if seen.agree(made, seen.want):
-        return 0
-    return next((sign for sign in (1, -1) if seen.same([sign * m for m in made])), 0)
+    signs = () if seen.agree(made, seen.want) else (1, -1)
+    return next((sign for sign in signs if seen.same([sign * m for m in made])), 0)
 
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:
@@ -273,8 +275,6 @@ def _design(exercise: Exercise, answer: Any) -> Any:
 
 def _true(made: Callable, answer: Any) -> bool:
     """Whether a design shows a known mistake; what cannot be asked does not show it."""
-    try:
-        with np.errstate(all="ignore"):
-            return bool(guarded(made, answer))
-    except Ended:
-        return False
+    with suppress(Ended), np.errstate(all="ignore"):
+        return bool(guarded(made, answer))
+    return False

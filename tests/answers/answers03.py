@@ -358,6 +358,7 @@ ANSWERS = {
             )(means("gain", "e"), means("gain", "c")),
         ),
         ("close", "a quarter beside", GAINS + [0.3, -0.25, 0.2]),
+        ("wrong", "mean of ratios", -(means("gain", "c") / means("gain", "e")).mean(axis=0), "mean of the ratios"),
         ("wrong", "nominal", np.full(3, 7.05), "nominal"),
         ("wrong", "opposite sign", -GAINS, "sign"),
         ("wrong", "reciprocal", 1 / GAINS, "reciprocal"),

@@ -41,6 +41,14 @@ def one_step(robot, q_a, guess):
     return np.linalg.pinv(rows.reshape(-1, robot.n_arms)) @ gap.ravel()
 
 
+def overwritten(robot, q_a, guess, steps=6):
+    """Each step from the corrected readings takes the place of the one before."""
+    offset = np.zeros(robot.n_arms)
+    for _ in range(steps):
+        offset = one_step(robot, q_a - offset, guess)
+    return offset
+
+
 def scaled(factor):
     return lambda robot, q_a, guess: factor * tasks.self_calibrate(robot, q_a, guess)
 
@@ -100,6 +108,7 @@ ANSWERS = {
         ("close", "three drives only", three_drives),
         ("close", "one step", one_step),
         ("close", "two steps", lambda r, q, g: three_drives(r, q, g, 2)),
+        ("wrong", "the last correction", overwritten, "offset += step"),
         ("wrong", "sign", scaled(-1), "sign"),
         ("wrong", "half", scaled(0.5), "factor"),
         ("wrong", "mrad", scaled(1e3), "1000"),

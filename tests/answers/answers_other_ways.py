@@ -254,7 +254,7 @@ ANSWERS = {
     ],
     "06.expected_cost": [
         ("right", "all choices of signs", all_signs),
-        ("close", "even draws of the right width", even_draws(np.sqrt(3))),
+        ("wrong", "even draws of the right width", even_draws(np.sqrt(3)), "random draws"),
         ("wrong", "even draws from -sigma to sigma", even_draws(1.0), "drawn evenly from -sigma to sigma"),
         ("wrong", "degrees", lambda S, sigma: all_signs(S, np.degrees(sigma)), "degrees instead of radians, squared"),
     ],

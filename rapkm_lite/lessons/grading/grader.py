@@ -20,8 +20,8 @@ from threading import Event
 from ..checker import exercises
 from .submission import Submission, found
 
-# Starts of one submission at most, each without what the one before hung in.
-_STARTS = 8
+# Starts of one submission at most, each without what the one before hung in; bytes that are copied for each at most.
+_STARTS, _MOST = 8, 10**8
 _ORDER = ("ok", "close", "wrong", "todo")
 
 
@@ -168,9 +168,10 @@ def _lend(submission: Submission, work: Path) -> None:
     """Copies, in a new folder, of the files that lie beside a notebook and in the folders there.
 
     Not of Python files, which the worker finds where they are, after those that are installed; nor of notebooks, of
-    what is hidden, of links to folders and of what cannot be read or written.
+    what is hidden, of links to folders and of what cannot be read or written.  Links instead to what would be too much.
     """
     work.mkdir()
+    room = _MOST
     for place, folders, files in os.walk(submission.path.parent):
         # Beside a loose notebook a folder is another student's.
         folders[:] = [] if submission.loose else [one for one in folders if one[0] != "."]
@@ -180,7 +181,9 @@ def _lend(submission: Submission, work: Path) -> None:
         for file in (Path(place, one) for one in files):
             if file.name[0] != "." and file.suffix.lower() not in (".py", ".pyc", ".ipynb") and os.path.isfile(file):
                 with suppress(OSError):
-                    shutil.copyfile(file, target / file.name)
+                    size = file.stat().st_size
+                    (shutil.copyfile if size <= room else os.symlink)(file.resolve(), target / file.name)
+                    room -= size * (size <= room)
 
 
 def _environment() -> dict[str, str]:

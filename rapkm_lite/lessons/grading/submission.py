@@ -48,7 +48,7 @@ class Submission:
 def found(folder: Path, known: set[str]) -> list[Submission]:
     """All submissions under a folder: STUDENT/.../04_title.ipynb, or loose notebooks, whose names are the student's.
 
-    known : numbers of the lessons that have exercises; for notebooks without such a number in their name see `unnamed`.
+    known : numbers of the lessons that have exercises; for notebooks whose lesson cannot be told see `unnamed`.
     Of several such numbers in a name, as in 04_title_v10_final.ipynb, that counts whose exercises the notebook names,
     and where it names exercises of another lesson only, that lesson.
     Raises ValueError when the folder does not exist or holds none.
@@ -63,9 +63,9 @@ def found(folder: Path, known: set[str]) -> list[Submission]:
 
 def _handed_in(folder: Path, known: set[str]) -> Iterator[Submission]:
     for path, parts in _notebooks(folder):
-        if numbers := [n for n in dict.fromkeys(_NUMBER.findall(path.name)) if n in known]:
+        if (lesson := _told(path, known)) in known:
             loose = len(parts) == 1
-            yield Submission(path.stem if loose else parts[0], path, _told(path, numbers, known), loose)
+            yield Submission(path.stem if loose else parts[0], path, lesson, loose)
 
 
 def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
@@ -73,30 +73,31 @@ def surpassed(folder: Path, known: set[str], counted: set[str]) -> list[str]:
     return [str(one.path) for one in _handed_in(folder, known) if str(one.path) not in counted]
 
 
-def _told(path: Path, numbers: list[str], known: set[str]) -> str:
+def _told(path: Path, known: set[str]) -> str:
     """The number in a name whose exercises the notebook names most often; another lesson's where it names only those.
 
-    A name may hold the number of a team or a date, as in team_07_lesson_04.ipynb.
+    A name may hold the number of a team or a date, as in team_07_lesson_04.ipynb.  "" where there is none, and where
+    there are several, as in 2026-12-03.ipynb, and no exercise is named.
     """
+    numbers = [n for n in dict.fromkeys(_NUMBER.findall(path.name)) if n in {*known, "00"}]
     try:
         named = Counter(re.findall(r"\b(\d\d)\.[a-z]\w+", path.read_text(encoding="utf-8")))
     except (OSError, ValueError):
-        return numbers[0]
+        named = Counter()
+    several = len(re.findall(r"\d\d+", path.name)) > 1 and not re.match(r"\d\d_", path.name)
+    if not numbers or (several and not any(named[n] for n in known)):
+        return ""
     return max(numbers if any(named[n] for n in numbers) else [*numbers, *sorted(known)], key=lambda n: named[n])
 
 
 def unnamed(folder: Path, known: set[str]) -> list[str]:
-    """The notebooks under a folder that nobody grades, since their names tell no lesson with exercises.
-
-    Lesson 00, which has none, is left out.
-    """
-    names = [(str(Path(*parts)), {*_NUMBER.findall(path.name)}) for path, parts in _notebooks(folder)]
-    return [name for name, numbers in names if not numbers & {*known, "00"}]
+    """The notebooks under a folder that nobody grades, since no lesson can be told; 00 can be, and has no exercises."""
+    return [str(Path(*parts)) for path, parts in _notebooks(folder) if not _told(path, known)]
 
 
 def silent(folder: Path, known: set[str]) -> list[str]:
     """The students' folders without a notebook that is graded, and other things that lie among them."""
-    heard = {parts[0] for path, parts in _notebooks(folder) if known & {*_NUMBER.findall(path.name)}}
+    heard = {parts[0] for path, parts in _notebooks(folder) if _told(path, known) in known}
     names = (entry.name for entry in os.scandir(folder) if entry.name[0] != "." and not entry.name.endswith(".csv"))
     return sorted({*names} - heard - {*unnamed(folder, known)})
 

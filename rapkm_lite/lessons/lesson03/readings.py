@@ -117,6 +117,9 @@ READINGS = {
         mistakes={
             "these are the nominal gains; one of the drives has another one": lambda: np.full(3, K_P),
             "the reciprocal: error over torque": lambda: 1 / hidden("gain")[1],
+            "this is the mean of the ratios of the rests: the ratio of a drive with hardly any error is mostly noise": (
+                tasks.from_rests("gain", lambda n, e, c: -(c / e).mean(axis=0))
+            ),
         },
     ),
     "03.gain": _log_exercise(

@@ -123,7 +123,7 @@ EXERCISES = {
             "sigma_dq**2 * np.trace(S)",
         ),
         close=0.05,
-        improve="a mean over random draws is as good as their number; the mean of dq_i dq_j is known exactly",
+        near="this is as near as a mean over random draws; without them the mean of dq_i dq_j is known exactly",
         mistakes=mistakes.MEANS,
     ),
     "06.cheapest_offsets": Exercise(

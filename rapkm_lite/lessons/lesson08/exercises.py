@@ -30,7 +30,8 @@ EXERCISES = {
         invariant=tasks.still_contradicts,
         tolerance=1e-9,
         close=0.03,
-        improve="take the poses anew from the readings less the offsets found, and repeat until nothing changes",
+        improve="take the poses anew from the readings less the offsets found, and repeat until nothing changes; what "
+        "corrected readings still show adds to the offsets",
         mistakes={
             "what is left at each place is averaged, but it holds only the part along its own null vector; "
             "solve the equations of all places together": lambda robot, q_a, guess: tasks.left_over(

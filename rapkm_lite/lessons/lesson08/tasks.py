@@ -96,7 +96,9 @@ def reading_cases(rng) -> list[tuple]:
 def still_contradicts(got, robot, q_a, guess) -> tuple[float, str]:
     words = "less these offsets the readings still contradict each other, by rad"
     try:
-        return float(np.abs(left_over(robot, q_a - got, guess)).max()), words
+        before, after = (float(np.abs(left_over(robot, q_a - offset, guess)).max()) for offset in (0.0, got))
+        last = "this is the last correction only, to be added to the offsets before it (offset += step): "
+        return after, last * bool(np.abs(got).max() < 0.1 * before) + words
     except ValueError:  # no pose is near
         return np.inf, "less these offsets the readings fit no pose"
 
