@@ -484,6 +484,9 @@ def test_a_design_that_returns_nothing_is_not_tried_yet(name):
 def test_several_arrays_are_no_answer():
     said = judged(VECTOR, lambda K, v, m: (K, np.outer(K, v))).sentence
     assert said.endswith("of type tuple: 2 arrays, of shapes (3,), (3, 3), where one is wanted")
+    # The whole of what lstsq gives.
+    said = judged(VECTOR, lambda K, v, m: np.linalg.lstsq(np.outer(K, v), v, rcond=None)).sentence
+    assert said.endswith("of type tuple: 4 arrays, of shapes (3,), (0,), (), (3,), where one is wanted")
 
 
 def test_a_design_is_judged_by_its_numbers_beside_their_limits():

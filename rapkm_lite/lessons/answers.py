@@ -225,9 +225,11 @@ def numbers(got: Any) -> np.ndarray:
         array = guarded(_array, got)
     except Ended:
         kind, parts = type(got).__name__, ""
-        if isinstance(got, tuple | list) and all(isinstance(part, np.ndarray) for part in got):
-            parts = f": {len(got)} arrays, of shapes {', '.join(str(part.shape) for part in got)}, where one is wanted"
-        sentence = f"the answer is not numeric but of type {kind}{parts or ', or too large'}"
+        if isinstance(got, tuple | list) and any(isinstance(part, np.ndarray) for part in got):
+            shapes = ", ".join(str(getattr(part, "shape", ())) for part in got)
+            parts = f": {len(got)} arrays, of shapes {shapes}, where one is wanted"
+        large = ", or too large" * isinstance(got, int | list | tuple | np.ndarray)
+        sentence = f"the answer is not numeric but of type {kind}{parts or large}"
         raise Ended("wrong", sentence, "not numeric") from None
     if array.size > 10**7:
         raise Ended("wrong", f"the answer holds {array.size} numbers; a few are wanted", "another shape")
