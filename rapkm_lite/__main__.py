@@ -59,7 +59,7 @@ def _tell_grades(folder: Path, grades) -> None:
     if others := surpassed(folder, known, {grade.file for grade in grades}):
         print(f"\nnot counted, since another notebook of this student has more points or is newer: {', '.join(others)}")
     if left := unnamed(folder, known):
-        words = "not graded, since neither name nor exercises tell their lesson; name them like 04_title.ipynb"
+        words = "not graded, since it cannot be told which lesson they are; name them like 04_title.ipynb"
         print(f"\n{words}: {', '.join(left)}")
     if empty := silent(folder, known):
         print(f"\nno notebook that could be graded: {', '.join(empty)}")

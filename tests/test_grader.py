@@ -513,6 +513,22 @@ def test_a_return_outside_its_function_is_said_to_be_there(tmp_path):
     assert said.verdict == "wrong" and "'return' outside function" in said.sentence
 
 
+def test_an_answer_below_the_check_that_stops_counts(tmp_path):
+    """Cells were run in another order than they stand; where nothing stands below, the cell stops."""
+    for name, cells in (("ada", [CHECKS[0], TORQUES]), ("ben", [CHECKS[0]])):
+        write(tmp_path / name / "04_antagonism_filter_energy.ipynb", [SETUP, *cells])
+    said = {one.student: (one.verdict, one.mistake) for one in grade(tmp_path) if one.exercise == NAMES[0]}
+    assert said == {"ada": ("ok", ""), "ben": ("wrong", "its cell stops")}
+
+
+def test_a_mark_of_byte_order_costs_nothing(tmp_path):
+    """Some editors put one in front of a notebook."""
+    path = tmp_path / "ada" / "04_antagonism_filter_energy.ipynb"
+    write(path, checked(RIGHT))
+    path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert [one.verdict for one in grade(tmp_path) if one.exercise in NAMES] == ["ok", "ok", "ok"]
+
+
 def test_what_is_awaited_is_waited_for(tmp_path):
     """A notebook may await outside a function."""
     before = "import asyncio\nasync def give():\n    await asyncio.sleep(0)\n    return 1.0\none = await give()\n"

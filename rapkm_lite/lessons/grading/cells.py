@@ -18,7 +18,7 @@ def sources(path: Path) -> list[str]:
     Raises ValueError when the file is no notebook.
     """
     try:
-        notebook = json.loads(path.read_text(encoding="utf-8"))
+        notebook = json.loads(path.read_text(encoding="utf-8-sig"))
         # Format 3 of notebooks has sheets of cells, whose code is their "input".
         sheets = [notebook] if "cells" in notebook else notebook["worksheets"]
         texts = [_code(cell) for sheet in sheets for cell in sheet["cells"]]

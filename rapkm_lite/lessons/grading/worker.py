@@ -124,20 +124,22 @@ class Bench:
         return result
 
     def without_check(self, name: str, texts: list[str]) -> Result:
-        """The verdict on what bears the answer's name: the last where the exercise is named, else the best anywhere."""
+        """The verdict on what bears the answer's name: the last where the exercise is named, else the best anywhere.
+
+        Cells may have been run in another order than they stand: an answer may be defined below the check that stops.
+        """
         cells = {i for i, text in enumerate(texts) if f'"{name}"' in text or f"'{name}'" in text}
         near = [value for cell, value in self.bound[name] if cell in cells]
         for value in reversed(near):
             result = self.judged(name, value)
             if result.word != "todo":
                 return result
-        stopped = [self.failed[cell] for cell in sorted(cells) if cell in self.failed]
-        if stopped:
-            return Result("wrong", f"its cell: {stopped[0]}", "its cell stops")
+        words = [f"its cell: {self.failed[cell]}" for cell in sorted(cells) if cell in self.failed]
+        stopped = [Result("wrong", text, "its cell stops") for text in words[:1]]
         # Hints and pictures name an exercise, too; its answer may stand in a cell of its own.
         tried = [self.judged(name, value) for cell, value in self.bound[name] if cell not in cells][:5]
-        order = ["ok", "close", "wrong", "todo"]
-        return min(tried, key=lambda result: order.index(result.word), default=self.never_bound(name, texts))
+        best = partial(min, key=lambda result: ["ok", "close", "wrong", "todo"].index(result.word))
+        return best([*stopped, *tried], default=self.never_bound(name, texts))
 
     def never_bound(self, name: str, texts: list[str]) -> Result:
         """The verdict where nothing bears the answer's name: has the cell that was to make it stopped?"""
