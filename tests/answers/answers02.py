@@ -280,6 +280,12 @@ CHOICES = [
     ("wrong", "wish forgotten", lambda A, f, W, c0: pinv_w(A, W) @ f, "wish"),
     ("wrong", "pinv", lambda A, f, W, c0: np.linalg.pinv(A.T) @ f, "pinv"),
     ("wrong", "lstsq", lambda A, f, W, c0: np.linalg.lstsq(A.T, f, rcond=None)[0], "pinv"),
+    (
+        "wrong",
+        "the wish alone beside the force",
+        lambda A, f, W, c0: np.linalg.solve(np.block([[W, A], [A.T, np.zeros((2, 2))]]), np.r_[c0, f])[: len(c0)],
+        "not multiplied by the weights",
+    ),
     ("wrong", "wish added whole", lambda A, f, W, c0: pinv_w(A, W) @ f + c0, "projector"),
     ("wrong", "sign of the wish", lambda A, f, W, c0: textbook(A, f, W, -c0), "sign"),
     ("wrong", "sign of the force", lambda A, f, W, c0: textbook(A, -f, W, c0), "sign"),

@@ -164,6 +164,9 @@ EXERCISES = {
             "the projector is transposed": (
                 lambda A, f, W, c0: weighted_pseudoinverse(A, W) @ f + prestress_projector(A, W).T @ c0
             ),
+            "the wish is not multiplied by the weights: the slope of the price is W (c - c0) (a factor W is missing)": (
+                lambda A, f, W, c0: tasks.best_torques(A, f, W, np.linalg.solve(W, c0))
+            ),
             "the price of c instead of c - c0 is smallest: the wish is weighted, not projected": (
                 lambda A, f, W, c0: tasks.best_torques(A, f, W, 0 * c0) + np.linalg.solve(W, c0)
             ),
