@@ -62,7 +62,7 @@ class Calibration(Value):
     freedom : how many readings were left over to estimate the noise from; infinite where it was given.
     rank : how many combinations of the unknowns the samples determine.  condition : of the closure equations.
     unseen : motions of the unknowns that no sample can show; what is estimated holds them at their nominal values.
-    residual : rad, root mean square of the closure that is left.  K_P : (N,) N m/rad fitted to the rests, or None.
+    residual : rad, root mean square of the closure that is left.  K_P : (N,) N m/rad of PD drives at rest, or None.
     corrected : the machine with the estimated lengths and base points.  note : sentences on what to mind.
 
     >>> import rapkm_lite as rk
@@ -126,7 +126,7 @@ def calibrate(
     scale, rotation and two translations of the whole machine.
     use : "angles", every sample, moving or not; or "torques", those of the rests of PD drives under a known gain, of
     which each says where its encoder stood, q_desired - c / K_P, less what rates add where the rests show it.  `note`
-    says where drives still creep, or where friction before a torque sensor shifts an offset by f_c / K_P.
+    says where drives still creep or integrate, or where friction before a torque sensor shifts an offset by f_c / K_P.
     K_P : number or (N,) N m/rad, for torques; default: fitted to the rests.
     noise : rad, standard deviation of a reading; default: from the residual and the steps of the readings.
     Raises `CalibrationError` where the samples do not determine the unknowns, with the combinations that they do, and
@@ -181,8 +181,6 @@ def _solved(robot, angles, unknowns, noise, step, K_P, notes) -> Calibration:
     half = basis @ (Vt.T / sigma)
     condition = float(sigma[0] / sigma[-1])
     notes = [*notes, *cautions(x, robot, condition, spread, step, noise)]
-    if used == 0.0:
-        notes.append("no reading is left over to show the noise, so that the covariance is none: pass noise")
     if unknowns == "all":
         notes.append(f"{', '.join(GAUGE)} of the whole machine are held: no reading shows them")
     return Calibration(
@@ -269,12 +267,14 @@ def _refusal(robot, basis, rows, step, spread, moved) -> CalibrationError:
     sign = np.where(Q.max(axis=0) < -Q.min(axis=0), -1.0, 1.0)
     known, value, names = sign[:, None] * Q.T, sign * np.linalg.solve(R.T, value) + 0.0, unknown_names(robot.n_arms)
     spread = np.linalg.norm(np.linalg.solve(R.T, np.diag(spread)), axis=-1)
-    within = (f" ± {s:.2g}" if s > 0.0 else "" for s in spread)
     terms = (" ".join(f"{c:+.3f} {n}" for c, n in zip(row, names, strict=False) if abs(c) > 5e-4) for row in known[:3])
     changes = ", geometry as changes from nominal" if len(moved) > robot.n_arms else ""
+    within = (f" ± {s:.2g}" if s > 0.0 else "" for s in spread)
+    told = "; ".join(f"{sum_} = {number:.4g}{s}" for sum_, number, s in zip(terms, value, within, strict=False))
+    told += "" if spread.any() else "; no reading is left over to show the noise: pass noise"
+    told = told if rank else "nothing, as the readings are rough by 0.1 rad or more"  # the bound of `_minimum`
     words = (
         f"the log determines {rank} of {needed} unknowns; allowed: logs that determine all, so more places and "
-        f"further apart, or fewer unknowns. Known to first order, in rad and m{changes}: "
-    ) + "; ".join(f"{sum_} = {number:.4g}{s}" for sum_, number, s in zip(terms, value, within, strict=False))
-    unsure = "" if spread.any() else "; no reading is left over to show the noise: pass noise"
-    return CalibrationError(words + unsure, rank, needed, known, value)
+        f"further apart, or fewer unknowns. Known to first order, in rad and m{changes}: {told}"
+    )
+    return CalibrationError(words, rank, needed, known, value)

@@ -171,10 +171,16 @@ def cautions(
         # Of many readings that agree but for their rounding the residual is known to a few hundredths.
         many = len(x) > 100
         cause = "they have more noise than that (to be given as noise), or something"
+    if not size and spread == 0.0:
+        said.append("no reading is left over to show the noise, so that the covariance is none: pass noise")
+    if not size and spread > 1e-6:
+        said.append(
+            f"the noise is taken from the residual {1e3 * spread:.3g} mrad, where a wrong geometry may hide: pass noise"
+        )
     if size and spread > (1.5 if many else 3.0) * size:
         said.append(
             f"the residual {1e3 * spread:.3g} mrad exceeds {what} {1e3 * size:.2g} mrad: {cause} is wrong, such as a "
-            "length or a base point"
+            "length, a base point or the order of columns"
         )
     extent = float(np.linalg.norm(x - x.mean(axis=0), axis=-1).max())
     if extent < 0.25 * robot.lengths.max():

@@ -24,6 +24,7 @@ class Rests(NamedTuple):
     noise : (k, N, 2, 2) covariance of torque and angle of a record.  records : how many each mean has, (k,).
     creeps : of drives that still move, so that their torques may be those of rates, how far torques and angles move
     from the first half of a rest to the second, (k, 2).  braked : of drives whose torques are free of those of rates.
+    integral : K_I in N m/(rad s) of drives whose torques grow in the rests with errors and time.
     """
 
     desired: np.ndarray
@@ -33,6 +34,7 @@ class Rests(NamedTuple):
     records: np.ndarray
     creeps: Mapping[int, np.ndarray] = {}
     braked: Collection[int] = ()
+    integral: Mapping[int, float] = {}
 
     @property
     def c_error(self) -> np.ndarray:
@@ -87,8 +89,21 @@ class Rests(NamedTuple):
                 creeps[i] = moved[:, i]
         return self._replace(c=c, creeps=creeps, braked=tuple(known))
 
+    def integrals(self, moved: np.ndarray, seconds: np.ndarray) -> dict[int, float]:
+        """`integral`, from how far torques, angles and rates have `moved`, (k, N, 3), between halves of T / 2 seconds.
+
+        By -K_P de - K_D dqd - K_I e T / 2 : what was gathered before is in both.
+        """
+        halves = self._replace(desired=0.0 * self.q_a, q_a=moved[..., 1], c=moved[..., 0], records=self.records / 4)
+        gathered = (self.q_a - self.desired) * seconds[:, None] / 2
+        lines = [halves.fit(i, -gathered[:, i], -moved[:, i, 2]) for i in range(self.c.shape[1])]
+        return {i: b[0, 1] for i, b in enumerate(lines) if b is not None and b[0, 1] > 5 * b[1, 1]}
+
     def creeping(self) -> list[str]:
-        """A sentence where drives still move."""
+        """A sentence where drives still move, or their torques."""
+        if self.integral:
+            K_I = ", ".join(f"{K_I:.3g} N m/(rad s) for drive {i + 1}" for i, K_I in self.integral.items())
+            return [f"the torques grow in the rests as under a law with an integral, K_I = {K_I}; use the angles"]
         drives = " and ".join(f"{i + 1}" for i in self.creeps)
         far = max((np.abs(moved[:, 1]).max() for moved in self.creeps.values()), default=0.0)
         sentence = (
@@ -108,8 +123,14 @@ class Gain(NamedTuple):
     error: np.ndarray
     aside: np.ndarray | tuple = ()
 
+    def least(self) -> np.ndarray:
+        """Smallest gains (N,) that would differ from none."""
+        return np.maximum(5 * self.error, 1e-6 * np.abs(self.K_P).max())
+
     def instead(self, i: int) -> str:
         """What else than the gain of drive i the rests may show."""
+        if abs(self.K_P[i]) <= self.least()[i]:
+            return ", as with torques that are noise, stuck, filtered, or those of another drive"
         doubtful = len(self.aside) and self.aside[i] == self.aside[i]
         words = ", or torques that lie {:+.2g} mN m off -K_P times the error, as with friction before a sensor"
         return words.format(1e3 * self.aside[i]) if doubtful else ""
@@ -143,16 +164,18 @@ def rests(logs: list[Log]) -> Rests | None:
                 c, q_a = np.moveaxis(both.mean(axis=0), -1, 0)
                 off = both - both.mean(axis=0)
                 noise = np.einsum("kia,kib->iab", off, off) / (count - 1)
-                qd_a = np.gradient(near[still], log.t[still], axis=0, edge_order=2).mean(axis=0)
-                first, second = both[: count // 2], both[count // 2 :]
+                qd_a = np.gradient(near[still], log.t[still], axis=0, edge_order=2)
+                first, second = np.split(np.concatenate([both, qd_a[..., None]], axis=-1), [count // 2])
                 moved = second.mean(axis=0) - first.mean(axis=0)
                 # From record to record creeping is no noise; a mean over half of them, and a difference of two.
                 jitter = np.sqrt(2.0 * np.sum(np.diff(near[still], axis=0) ** 2, axis=0) / (count - 1) / count)
-                found.append((log.q_a_desired[still.start], q_a, c, noise, count, qd_a, moved, jitter))
+                means = log.q_a_desired[start], q_a, c, noise, count, qd_a.mean(axis=0)
+                found.append((*means, moved, jitter, np.ptp(log.t[still])))
     if not found:
         return None
-    desired, q_a, c, noise, records, qd_a, moved, jitter = map(np.array, zip(*found, strict=True))
-    return Rests(desired, q_a, c, noise, records).settled(qd_a, moved, jitter)
+    *means, qd_a, moved, jitter, seconds = map(np.array, zip(*found, strict=True))
+    stand = Rests(*means)
+    return stand.settled(qd_a, moved[..., :2], jitter)._replace(integral=stand.integrals(moved, seconds))
 
 
 def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
@@ -169,16 +192,16 @@ def one_sided(stand: Rests, K_P: np.ndarray) -> list[str]:
         aside, error = line[:, 1]
         if abs(aside) > 5 * error and abs(aside) > 1e-4 * K_P[i]:
             said.append(
-                f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m off -K_P times the error, as with "
-                f"friction before a sensor: that shifts its offset by {-1e3 * aside / K_P[i]:+.2g} mrad; approach each "
-                "place from both sides"
+                f"the torques of drive {i + 1} lie {1e3 * aside:+.2g} mN m off -K_P times the error, as with friction "
+                f"before a sensor or a wrong zero of it: that shifts its offset by {-1e3 * aside / K_P[i]:+.2g} mrad; "
+                "approach each place from both sides, or set the zero"
             )
     return said
 
 
 def fitted_gain(stand: Rests) -> Gain | None:
-    """K_P of c = -K_P (q_a - q_desired) over the rests, drive by drive; None where a drive shows no error."""
-    if np.any(np.abs(stand.q_a - stand.desired).max(axis=0) < 1e-6):
+    """K_P of c = -K_P (q_a - q_desired) over the rests; None where a drive shows no error, or an integral of errors."""
+    if stand.integral or np.any(np.abs(stand.q_a - stand.desired).max(axis=0) < 1e-6):
         return None
     found = []
     for i in range(stand.c.shape[1]):
@@ -204,19 +227,23 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         )
     if K_P is None:
         if gain is None:
-            raise ValueError("K_P = None, and no rest shows it; allowed: the gain of the drives, one number or (N,)")
+            why = "".join(f" ({sentence})" for sentence in stand.creeping())
+            raise ValueError(
+                f"K_P = None, and no rest shows it{why}; allowed: the gain of the drives, a number or (N,)"
+            )
         K_P = gain.K_P
         notes += gain.doubts()
         left = stand.c + K_P * (stand.q_a - stand.desired)
         if np.sum(left**2) >= 0.25 * np.sum(stand.c**2) or _filtered(robot, stand, K_P):
             raise ValueError(
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
-                "filter; allowed: the gain of the drives, or use = 'angles'"
+                "filter, or where they are stuck, shifted or those of another drive; allowed: the gain of the drives, "
+                "or use = 'angles'"
             )
-        if len(wrong := np.flatnonzero(K_P <= 0.0)):
+        for i in np.flatnonzero(K_P <= gain.least()):
             raise ValueError(
-                f"K_P = None, and the rests show K_P[{wrong[0]}] = {K_P[wrong[0]]:.6g}; allowed: > 0, so torques of "
-                "drives that act, with the sign that drives their angles"
+                f"K_P = None, and the rests show K_P[{i}] = {K_P[i]:.3g} ± {gain.error[i]:.2g}; allowed: > 0 by five "
+                "standard errors (torques of drives that act, with the sign that drives their angles), or K_P as known"
             )
     angles = stand.desired - stand.c / K_P
     try:
@@ -229,7 +256,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
             f"desired angles, where no pose fits{why}; allowed: torques in N m and their gain in N m/rad, or "
             "use = 'angles'"
         ) from None
-    notes += one_sided(stand, K_P)
+    notes += [] if stand.integral else one_sided(stand, K_P)
     notes += stand.creeping()
     spread = float(np.sqrt(np.mean((stand.c_error / K_P) ** 2)))
     spread = spread if spread > 1e-12 else 0.0  # the rounding of means
@@ -237,7 +264,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         asked, pressed = filtered
         notes.append(
             f"the torques are mute: errors of the angles ask for {1e3 * asked:.3g} mN m that only press, and there are "
-            f"{1e3 * pressed:.2g} mN m, as under an antagonism filter; use the angles"
+            f"{1e3 * pressed:.2g} mN m, as under an antagonism filter or of drives that are off; use the angles"
         )
     return angles, spread
 
