@@ -324,6 +324,19 @@ def test_what_is_known_of_one_place_is_exact_to_second_order():
     assert gaps[0] / gaps[1] > 3.5
 
 
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("unknowns", ["offsets+lengths", "all"])
+def test_places_a_hair_apart_are_refused_with_what_a_plane_through_them_says(name, unknowns):
+    """Of rows that are smooth in the place, 10 um tell the value and the two slopes, (N - 2) of each: curvature is
+    some 1e-10 of them, which is rounding."""
+    robot = MACHINES[name]
+    x = np.array([0.03, 0.02]) + np.random.default_rng(0).uniform(-1e-5, 1e-5, (40, 2))
+    q_a = rk.inverse_kinematics(robot, x)[:, : robot.n_arms] + OFFSET[: robot.n_arms]
+    with pytest.raises(rk.CalibrationError) as refused:
+        rk.calibrate(robot, q_a, unknowns)
+    assert refused.value.rank == 3 * (robot.n_arms - 2)
+
+
 def test_noise_at_one_place_is_no_information():
     rng = np.random.default_rng(2)
     q_a = rk.inverse_kinematics(TESTBED, [0.03, -0.04])[:3] + OFFSET[:3]
@@ -622,7 +635,7 @@ def test_a_dead_drive_shows_no_gain_with_which_its_torques_could_be_read():
         rk.calibrate(FRICTIONLESS, dead, use="torques")
 
     note = rk.calibrate(FRICTIONLESS, dead, use="torques", K_P=7.05).note
-    assert re.findall(r"for drive (\d), not 7.05, as with torques that are noise, stuck", note) == ["2"]
+    assert re.findall(r"for drive (\d), not 7.05, as with torques or angles that are noise, stuck", note) == ["2"]
 
 
 @pytest.mark.parametrize("stuck", [0.0, 1e-5])

@@ -249,8 +249,8 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
             raise _refusal(robot, basis, Vt[:rank], step, spread, p - nominal)
         p, size = p + basis @ move, np.abs(move).max(initial=0.0)
         # No step gets smaller than its rounding error, nor than that of base points far from the origin.
-        coarse = 4 * np.spacing(np.abs(robot.base).max()) / robot.lengths.max()
-        if size < max(enough, 1e-13 + coarse + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
+        coarse = 1e-13 + 4 * np.spacing(np.abs(robot.base).max()) / robot.lengths.max()
+        if rank == basis.shape[1] and size < max(enough, coarse + 8 * np.finfo(float).eps * sigma[0] / sigma[-1]):
             return p, changed(robot, p), x, left, sigma, Vt
     raise ConvergenceError(
         f"calibrate did not converge: its last step was {size:.3g} at offsets {p[:N].tolist()} rad; "

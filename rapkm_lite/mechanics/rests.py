@@ -130,7 +130,7 @@ class Gain(NamedTuple):
     def instead(self, i: int) -> str:
         """What else than the gain of drive i the rests may show."""
         if abs(self.K_P[i]) <= self.least()[i]:
-            return ", as with torques that are noise, stuck, filtered, or those of another drive"
+            return ", as with torques or angles that are noise, stuck, filtered, or those of another drive"
         doubtful = len(self.aside) and self.aside[i] == self.aside[i]
         words = ", or torques that lie {:+.2g} mN m off -K_P times the error, as with friction before a sensor"
         return words.format(1e3 * self.aside[i]) if doubtful else ""
@@ -173,8 +173,8 @@ def rests(logs: list[Log]) -> Rests | None:
                 found.append((*means, moved, jitter, np.ptp(log.t[still])))
     if not found:
         return None
-    *means, qd_a, moved, jitter, seconds = map(np.array, zip(*found, strict=True))
-    stand = Rests(*means)
+    desired, q_a, c, noise, records, qd_a, moved, jitter, seconds = map(np.array, zip(*found, strict=True))
+    stand = Rests(desired, q_a, c, noise, records)
     return stand.settled(qd_a, moved[..., :2], jitter)._replace(integral=stand.integrals(moved, seconds))
 
 
@@ -237,8 +237,8 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         if np.sum(left**2) >= 0.25 * np.sum(stand.c**2) or _filtered(robot, stand, K_P):
             raise ValueError(
                 "K_P = None, and the torques at rest do not follow the errors of the angles, as under an antagonism "
-                "filter, or where they are stuck, shifted or those of another drive; allowed: the gain of the drives, "
-                "or use = 'angles'"
+                "filter, or where either are stuck, shifted or of another drive; allowed: the gain of the drives, or "
+                "use = 'angles'"
             )
         for i in np.flatnonzero(K_P <= gain.least()):
             raise ValueError(
@@ -264,7 +264,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         asked, pressed = filtered
         notes.append(
             f"the torques are mute: errors of the angles ask for {1e3 * asked:.3g} mN m that only press, and there are "
-            f"{1e3 * pressed:.2g} mN m, as under an antagonism filter or of drives that are off; use the angles"
+            f"{1e3 * pressed:.2g} mN m, as under a filter, or of drives that are off, or beside wrong angles (else, use them)"
         )
     return angles, spread
 
