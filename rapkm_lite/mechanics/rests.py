@@ -264,7 +264,7 @@ def angles_of_torques(robot: Manipulator, stand: Rests | None, gain, K_P, notes:
         asked, pressed = filtered
         notes.append(
             f"the torques are mute: errors of the angles ask for {1e3 * asked:.3g} mN m that only press, and there are "
-            f"{1e3 * pressed:.2g} mN m, as under a filter, or of drives that are off, or beside wrong angles (else, use them)"
+            f"{1e3 * pressed:.2g} mN m, as under a filter, or of drives that are off, or beside wrong angles"
         )
     return angles, spread
 
