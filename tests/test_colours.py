@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
+import rapkm_lite as rk
 from rapkm_lite import plotting
-from rapkm_lite.figures.style import ARM_COLOURS, ARM_TEXT_COLOURS
+from rapkm_lite.figures.style import ALARM, ARM_COLOURS, ARM_TEXT_COLOURS, PAIR_COLOURS
 
 # Machado, Oliveira, Fernandes 2009, severity 1: linear RGB as it is seen without one kind of cone.
 EYES = {
@@ -48,8 +49,8 @@ def test_lab_of_known_colours():
     assert contrast("#000000") == pytest.approx(21)
 
 
-@pytest.mark.parametrize("colour", ARM_COLOURS)
-def test_lines_of_arms_stand_out_on_white(colour):
+@pytest.mark.parametrize("colour", ARM_COLOURS + PAIR_COLOURS)
+def test_lines_stand_out_on_white(colour):
     assert contrast(colour) >= 3.0
 
 
@@ -66,6 +67,16 @@ def test_arms_are_apart_for_every_eye(eye, palette):
     assert min(apart) >= 30, "arms 1 to 3; a distance of 2.3 is just noticeable"
     assert min(np.linalg.norm(lab(a, eye) - lab(b, eye)) for a, b in itertools.combinations(palette[:4], 2)) >= 20
     assert min(np.linalg.norm(lab(a, eye) - lab(b, eye)) for a, b in itertools.combinations(palette, 2)) >= 12
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_pairs_are_apart_for_every_eye_and_no_arms(eye):
+    assert min(np.linalg.norm(lab(a, eye) - lab(b, eye)) for a, b in itertools.combinations(PAIR_COLOURS, 2)) >= 12
+    arms = [np.linalg.norm(lab(a, "all cones") - lab(b, "all cones")) for a in PAIR_COLOURS for b in ARM_COLOURS]
+    assert min(arms) >= 20
+    for robot in (rk.load("five_bar"), rk.load("four_arms")):
+        lines = [plotting.pair_line(robot, pair) for pair in rk.drive_pairs(robot)]
+        assert not {line["color"] for line in lines} & {*ARM_COLOURS, ALARM}
 
 
 def test_curves_and_prose_know_the_colours():

@@ -35,7 +35,7 @@ MAP = marks.Palette(
 
 @shared.ready_made
 def machine(robot: Manipulator) -> Explorer:
-    """The end-effector by hand in every working mode, a map of sigma_min, and the five-bars of up to three pairs.
+    """The end-effector by hand in every working mode, a map of sigma_min, and the five-bars of up to six pairs.
 
     >>> machine().numbers["degree of actuation"]
     '2 of 2 (redundantly actuated)'
@@ -44,7 +44,7 @@ def machine(robot: Manipulator) -> Explorer:
     times = shared.size(robot)
     digits = shared.decimals(times)
     palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
-    pairs = act.drive_pairs(robot)[:3]
+    small = "abcdef"[: len(pairs := act.drive_pairs(robot))]
     modes = {mode_name(m): m for m in working_modes(robot)}
     which = {"all drives": None} | {f"pair {pair_name(p)}": p for p in pairs}
     gx, gy, inside, points = grid_points(robot, 121)
@@ -87,7 +87,7 @@ def machine(robot: Manipulator) -> Explorer:
         }
         chains = arm_points(robot, q)
         from_parallel = np.degrees(np.arcsin(np.minimum(np.abs(act.distal_cross_products(robot, q)), 1.0)))
-        for pair, name, value, angle in zip(pairs, "abc", pair_measures(robot, q), from_parallel, strict=False):
+        for pair, name, value, angle in zip(pairs, small, pair_measures(robot, q), from_parallel, strict=False):
             weak = value < WEAK / times
             # The distal links that lie almost along each other are what makes a pair weak.
             for i in pair if weak else ():
@@ -100,16 +100,16 @@ def machine(robot: Manipulator) -> Explorer:
         return numbers | stop
 
     plane = plane_limits(robot, 0.05)
-    bare = {"xticks": [], "yticks": [], "title": " ", "small": True}
-    small = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | bare
-    panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys("abc"[: len(pairs)], small)
+    bare = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {"xticks": [], "yticks": [], "title": " ", "small": True}
+    panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys(small, bare)
     controls = shared.place_sliders(robot, 20, 30) | {
         "mode": choice("working mode", modes),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
-    layout = [["machine", name] for name in "abc"[: len(pairs)]]
+    layout = [["machine", *small[k::3]] for k in range(len(small[:3]))]
+    widths, size = ([2.7, 1, 1], (9.6, 5.0)) if len(small) > 3 else ([2.7, 1], (8.2, 5.0))
     scale = partial(marks.Picture.scale, panel="machine", palette=palette, label="σ_min in rad/m")
-    return explorer(draw, controls, panels, layout=layout, widths=[2.7, 1], size=(8.2, 5.0), setup=scale, live=True)
+    return explorer(draw, controls, panels, layout=layout, widths=widths, size=size, setup=scale, live=True)
 
 
 @shared.ready_made
@@ -144,6 +144,7 @@ def actuation(robot: Manipulator) -> Explorer:
         picture.line("plane", *t.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
         marks.draw_machine(picture, "plane", robot, t.q[k])
         picture.handle("plane", *t.x[k], along=t.x[::2], place=share[::2])
+        picture.fit("sigma", sigma, symmetric=False, least=4 / shared.size(robot))
         for i, pair in enumerate(pairs):
             style = pair_line(robot, pair)
             picture.line("sigma", share, sigma[:, i], **style)
@@ -174,7 +175,7 @@ def actuation(robot: Manipulator) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
         "sigma": way | measures | {"ylim": (0, 8 / shared.size(robot))},
-        "null": way | {"title": name, "ylabel": shown, "ylim": (-1.05, 1.05), "legend": drives},
+        "null": way | {"title": name, "ylabel": shown, "ylim": (-1.05 * (robot.n_arms == 3), 1.05), "legend": drives},
         "force": shared.force_panel(2 / shared.size(robot)) | {"title": "Forces", "legend": whole},
     }
     controls = {

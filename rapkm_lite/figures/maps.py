@@ -12,7 +12,7 @@ from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
 from ..mechanics.kinematics import inverse_kinematics, reachable
 from ..mechanics.maps import workspace_grid
-from .style import arm_line, axes_or_new
+from .style import ARM_LINES, PAIR_COLOURS, arm_line, axes_or_new
 
 _OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
 
@@ -38,12 +38,16 @@ def mode_name(mode) -> str:
 def pair_line(robot: Manipulator, pair) -> dict:
     """Colour and dashes of a pair: for three arms those of the arm left out, the one without prestress on its curve.
 
+    On other machines no arm has its colour.
+
     >>> import rapkm_lite as rk; robot = rk.load()
     >>> pair_line(robot, (1, 2)) == arm_line(0)
     True
     """
-    left_out = [i for i in range(robot.n_arms) if i not in pair]
-    return arm_line(left_out[0] if len(left_out) == 1 else drive_pairs(robot).index(pair))
+    if robot.n_arms == 3:
+        return arm_line(3 - sum(pair))
+    k = drive_pairs(robot).index(pair)
+    return {"color": PAIR_COLOURS[k % len(PAIR_COLOURS)], "linestyle": ARM_LINES[k % len(ARM_LINES)]}
 
 
 def pair_measures(robot: Manipulator, q) -> np.ndarray:

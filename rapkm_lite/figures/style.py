@@ -12,6 +12,8 @@ STYLE = Path(__file__).with_name("rapkm.mplstyle")
 # Blue, red, olive; then teal, purple, brown.  Text in an arm's colour takes the darker tone, at least 4.5:1 on white.
 ARM_COLOURS = ("#004488", "#BB5566", "#948A00", "#3997BF", "#8A3FC0", "#4D2020")
 ARM_TEXT_COLOURS = ("#004488", "#BB5566", "#7D7400", "#237C9E", "#8A3FC0", "#4D2020")
+# Pairs of drives, unless each leaves out one of three arms: colours that no arm has.
+PAIR_COLOURS = ("#C77A00", "#00805A", "#C2188B", "#0B3F4C", "#A47CBF", "#731700")
 # One more than there are colours, all different: 42 lines can be told apart, more than the 36 pairs of nine drives.
 _DASHES = ((5, 1.2), (4, 1.2, 1, 1.2), (1.5, 1.2), (6, 1.2, 1, 1.2, 1, 1.2), (4, 3), (10, 3))
 ARM_LINES = ("-", *((0, dashes) for dashes in _DASHES))
