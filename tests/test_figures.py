@@ -710,6 +710,15 @@ def test_every_drive_of_the_largest_machine_has_its_name_below_its_bar():
     assert [label.get_text() for label in ax.get_xticklabels()] == ["drive 1", "drive 2", "drive 3"]
 
 
+@pytest.mark.parametrize(
+    "robot, x, pair", [(rk.load("four_arms"), [0.0, 0.0], "1 and 3"), (rk.load(), [0.0, 0.2309], "1 and 2")]
+)
+def test_a_pair_that_sees_no_pose_is_named(robot, x, pair):
+    """Opposite arms of a square are parallel in its middle; at a corner of the workspace two arms are stretched."""
+    with pytest.raises(ValueError, match=f"drives {pair} alone: .*; allowed"):
+        plotting.plot_synchronization(robot, x, np.full(robot.n_arms, 4e-3))
+
+
 @pytest.mark.parametrize("x", [[0.05, -0.03], [-0.04, 0.02], [0.03, 0.05], [0.06, 0.05]])
 def test_names_of_pairs_that_nearly_agree_do_not_touch(x):
     """Six pairs of four arms: each name once, none on another or on a point."""

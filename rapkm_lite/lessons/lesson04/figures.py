@@ -12,7 +12,7 @@ from ...figures.film import film
 from ...figures.machine import arm_points, plane_axes
 from ...figures.maps import pair_line
 from ...figures.runs import lines_per_drive
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
+from ...figures.style import AFTER, ALARM, ARM_LINES, BEFORE, NEUTRAL, arm_colour, arm_line, axes_or_new
 from ...machine.arguments import short
 from ...mechanics.actuation import drive_pairs
 from ...mechanics.antagonism import null_vector
@@ -23,7 +23,13 @@ from ...simulation.energy import antagonistic_torque
 
 def _pair_poses(robot, q_a, guess, pairs) -> dict:
     """Each pair's five-bar (fig. 3), as its configuration (4,) in rad, at base angles q_a (N,); found from `guess`."""
-    return {pair: estimate_pose(robot.with_arms(pair), np.asarray(q_a)[list(pair)], guess) for pair in pairs}
+    poses = {}
+    for pair in pairs:
+        try:
+            poses[pair] = estimate_pose(robot.with_arms(pair), np.asarray(q_a)[list(pair)], guess)
+        except ValueError as error:
+            raise type(error)(f"drives {pair[0] + 1} and {pair[1] + 1} alone: {error}") from None
+    return poses
 
 
 def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
@@ -40,8 +46,7 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     true = inverse_kinematics(robot, x)[: robot.n_arms]
     shown = _pair_poses(robot, true + magnify * offset, x, ((0, 1), (1, 2))[: robot.n_arms - 1])
     for pair, face in zip(shown, ("white", ALARM), strict=False):
-        five_bar = robot.with_arms(pair)
-        for i, points in zip(pair, arm_points(five_bar, shown[pair]), strict=True):
+        for i, points in zip(pair, arm_points(robot.with_arms(pair), shown[pair]), strict=True):
             axes[0].plot(*points.T, "-" if face == "white" else "--", color=arm_colour(i), lw=3.2, zorder=3)
             axes[0].plot(*points[0], "o", color=arm_colour(i), ms=11, zorder=4)
             axes[0].plot(*points[1], "o", mfc="white", mec=arm_colour(i), mew=2, ms=7, zorder=4)
@@ -123,13 +128,10 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
 
 
 # Colour and dashes of runs that are compared on one axis: they belong to no arm.
-_RUN_LINES: tuple[dict[str, Any], ...] = (
-    {"color": BEFORE, "linestyle": "-"},
-    {"color": ALARM, "linestyle": (0, (5, 1.2))},
-    {"color": "#3997BF", "linestyle": (0, (4, 1.2, 1, 1.2))},
-    {"color": AFTER, "linestyle": "-"},
-    {"color": "#8A3FC0", "linestyle": (0, (1.5, 1.2))},
-)
+_RUN_LINES: list[dict[str, Any]] = [
+    {"color": colour, "linestyle": ARM_LINES[k]}
+    for colour, k in ((BEFORE, 0), (ALARM, 1), ("#3997BF", 2), (AFTER, 0), ("#8A3FC0", 3))
+]
 
 
 def plot_antagonism(run, ax=None, title: str = ""):
@@ -237,11 +239,8 @@ def film_filter(run, frames: int = 18):
         "to the side and torque that moves upwards. While the filter is turned on the curves draw together, and all "
         "points travel sideways onto the vertical axis and keep their height."
     )
-
-    def draw(axes, share):
-        plot_filter_share(run, share, axes)
-
-    return film(draw, [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)], alt, panels=2, figsize=(8.0, 3.2), seconds=4)
+    draw, shares = lambda axes, share: plot_filter_share(run, share, axes), [0.0, 0.0, 0.0, *np.linspace(0, 1, frames)]
+    return film(draw, shares, alt, panels=2, figsize=(8.0, 3.2), seconds=4)
 
 
 def plot_energies(rows: dict, ax=None, title: str = ""):

@@ -146,7 +146,8 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
         room = 0.2 * np.ptp(seen, axis=0).max() + 0.05 * longest.robot.lengths.max()
         box = dict(zip(box, zip(seen.min(axis=0) - room, seen.max(axis=0) + room, strict=True), strict=True))
     axes[1].set(**box, aspect="auto", title="enlarged, axes unequal")
-    axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.98))
+    beside = len(axes[1].get_legend_handles_labels()[1]) > 9  # of four arms or more it would hide the paths
+    axes[1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.02) if beside else (0.12, 0.98))
     return axes
 
 
