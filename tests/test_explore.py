@@ -1410,3 +1410,14 @@ def test_sliders_of_places_reach_around_the_place_of_paths_and_a_point_beyond_re
     x, y = np.rint(1e3 * middle(robot) / shown.controls["x"].step).astype(int) * shown.controls["x"].step
     told = shown.set(x=x, y=y).numbers["desired point"]
     assert told.endswith(" mm: an arm reaches no further") and not told.startswith(f"({x}, {y})")
+
+
+def test_a_value_that_comes_back_too_late_from_a_browser_moves_nothing():
+    """Live sliders send back what they round to: 3 + 2e-15 after 11 was set."""
+    shown = explore.three_opinions().set(offset_1=3.0).set(offset_1=11.0)
+    control, wanted = shown.controls["offset_1"], dict(shown.numbers)
+    control.set_state({"value": 3.0000000000000018})
+    assert control.value == 11.0 and shown.numbers == wanted
+    control.set_state({"value": 11.000000000000002})
+    control.set_state({"value": 7.5})
+    assert shown.values["offset_1"] == 7.5 and shown.numbers != wanted

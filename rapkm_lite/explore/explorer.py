@@ -86,7 +86,7 @@ class Explorer:
         parts(draw, controls, play, live, about)
         of_kind("picture", picture, Picture, "a Picture")
         self.draw, self.controls, self.picture = draw, dict(controls), picture
-        self._alone = threading.RLock()
+        self._alone, self._left = threading.RLock(), {}
         # The draw function of a ready-made explorer is local to the function that bears its name.
         told = written(draw)
         self.name = told.__qualname__.split(".")[0]
@@ -150,8 +150,7 @@ class Explorer:
         """Show it as one screen of a projector: a question, the controls beside the picture, the answer on demand."""
         bar, canvas = self.widget.children
         bar.layout.grid_template_columns = "minmax(0, 1fr)"
-        show = widgets.ToggleButton(layout={"width": "auto"})
-        said = widgets.HTML(f"<p>{answer}</p>")
+        show, said = widgets.ToggleButton(layout={"width": "auto"}), widgets.HTML(f"<p>{answer}</p>")
         traitlets.dlink((show, "value"), (said.layout, "display"), lambda on: "block" if on else "none")
         traitlets.dlink((show, "value"), (show, "description"), lambda on: f"{'Hide' if on else 'Show'} the answer")
         beside = widgets.VBox([bar, show, said], layout={"flex": "0 0 300px"})
@@ -201,17 +200,19 @@ class Explorer:
 
     @alone
     def _changed(self, change) -> None:
-        said, value = "", tidied(change["new"])
-        # A browser rounds to steps of its own and sends back a value that differs in the last digit.
-        if self._held or value == tidied(change["old"]):
+        owner, said, value, before = change["owner"], "", tidied(change["new"]), tidied(change["old"])
+        # A browser rounds to steps of its own and sends back a value that differs in the last digit, at times too late.
+        if self._held or value == before:
+            self._left[owner, repr(before)] = self._held * time.monotonic()
             return
-        if self._player and self._player.late(change["owner"]):
+        if self._player and self._player.late(owner):
             return self.reset()
-        near = snap(change["owner"], value)
+        late = time.monotonic() < self._left.get((owner, repr(value)), -1.0) + 1.0
+        near = before if late else snap(owner, value)
         if near != value:
-            said = f"{value:g} was rounded to {near:g}"
+            said = "" if late else f"{value:g} was rounded to {near:g}"
             with self._quiet():
-                change["owner"].value = near
+                owner.value = near
         self._step()
         self._send(note=said)
 
