@@ -613,7 +613,7 @@ def test_a_singularity_is_that_of_the_desired_pose_at_which_the_run_was_lost(dur
         rk.simulate(ROBOT, rk.CTC(900.0, 60.0, (0, 1)), path, OFFSET)
     at = rk.at(ROBOT, path.q[round(caught.value.time / path.dt)])
     (x1, y1), (x2, y2) = (d / np.linalg.norm(d) for d in at.d[:2])
-    assert f"|d_j x d_k| = {abs(x1 * y2 - x2 * y1):.2g} at" in caught.value.reason
+    assert f"|d_j × d_k| = {abs(x1 * y2 - x2 * y1):.2g} at" in caught.value.reason
 
 
 @pytest.mark.parametrize(("aside", "named"), [(0.0, True), (0.01, False)])

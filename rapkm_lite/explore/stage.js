@@ -13,9 +13,10 @@ const ENTER = { key: "Enter", keyCode: 13, bubbles: true };
 /** True minus signs before numbers, not in words with a hyphen. */
 export const minus = (words) => String(words).replace(/(^|[\s([/])-(?=\.?\d)/g, "$1−");
 
-/** "σ_min" and "10^−3" as pieces {text, shift}: shift -1 is a subscript, 1 a superscript. */
+/** "σ_min" and "10^−3" as pieces {text, shift}: -1 is a subscript, 1 a superscript; units stay with their numbers. */
 export function pieces(words) {
-  return String(words).split(/([_^][\p{L}\p{N}−]+)/u).filter(Boolean).map((part) => {
+  const whole = String(words).replace(/(?<=\d|N|N m) (?=(k?g|Hz|[mµ]?(N|m|rad|J|W|s))(?![\p{L}\d])|[%‰])/gu, "\xa0");
+  return whole.split(/([_^][\p{L}\p{N}−]+)/u).filter(Boolean).map((part) => {
     const shift = part.length > 1 ? ({ _: -1, "^": 1 }[part[0]] ?? 0) : 0;
     return { text: shift ? part.slice(1) : part, shift };
   });
@@ -282,8 +283,7 @@ function image(panel, { points, words: [key, palette], images }) {
     canvas.getContext("2d").putImageData(picture, 0, 0);
     panel.map = { key: now, canvas };
   }
-  trace(ctx, pixels(panel, points), true);
-  if (points.length) ctx.clip("evenodd");
+  if (points.length) trace(ctx, pixels(panel, points), true), ctx.clip("evenodd");
   ctx.drawImage(panel.map.canvas, left / ratio, top / ratio, width / ratio, height / ratio);
 }
 

@@ -160,14 +160,14 @@ def _singular(setup: Setup, law, rows: slice, least: float) -> Iterator[str]:
     if (most := crossed.max(axis=1).min()) < 0.03 * least:
         yield (
             "near an input singularity, where the distal links are parallel and no drive pushes across them: "
-            f"|d_j x d_k| = {most:.2g} at most at the desired pose"
+            f"|d_j × d_k| = {most:.2g} at most at the desired pose"
         )
     if pair is not None and (min(pair), max(pair)) in pairs:
         measure = crossed[:, pairs.index((min(pair), max(pair)))].min()
         if measure < least:
             yield (
                 f"near a parameterization singularity of its independent drives "
-                f"{pair[0] + 1} and {pair[1] + 1}: |d_j x d_k| = {measure:.2g} at the desired pose"
+                f"{pair[0] + 1} and {pair[1] + 1}: |d_j × d_k| = {measure:.2g} at the desired pose"
             )
 
 

@@ -49,6 +49,8 @@ test("subscripts, powers and minus signs are found, hyphens are left", () => {
   assert.deepEqual(pieces("K_P 1 in N"), [{ text: "K", shift: 0 }, { text: "P", shift: -1 }, { text: " 1 in N", shift: 0 }]);
   assert.deepEqual(pieces("10^−3"), [{ text: "10", shift: 0 }, { text: "−3", shift: 1 }]);
   assert.deepEqual(pieces("σ_min").map((p) => p.text), ["σ", "min"]);
+  const [{ text }] = pieces("0 / 5 mN m of 2 N m s²/rad, 9 % at 2 J/mrad², 3 more, 1 sample");
+  assert.equal(text.replaceAll("\xa0", "~"), "0 / 5~mN~m of 2~N~m~s²/rad, 9~% at 2~J/mrad², 3 more, 1 sample");
   assert.equal(minus("end-effector at (-60, -69) mm"), "end-effector at (−60, −69) mm");
 });
 
