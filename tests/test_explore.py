@@ -1086,6 +1086,9 @@ def test_a_typed_value_that_is_rounded_says_so():
     page = Page(explorer)
     explorer.controls["slope"].value = 1.234
     assert explorer.values["slope"] == 1.2 and page.got[-1]["note"] == "1.234 was rounded to 1.2"
+    explorer.set(slope=0.0)
+    explorer.controls["slope"].set_state({"value": 4.4e-16})
+    assert explorer.values["slope"] == 0.0 and not page.got[-1].get("note"), "the browser's rounding of zero"
     explorer.controls["slope"].value = 1.5
     assert page.got[-1]["note"] == ""
 
@@ -1421,3 +1424,9 @@ def test_a_value_that_comes_back_too_late_from_a_browser_moves_nothing():
     control.set_state({"value": 11.000000000000002})
     control.set_state({"value": 7.5})
     assert shown.values["offset_1"] == 7.5 and shown.numbers != wanted
+
+
+def test_a_rest_outside_the_picture_says_nothing_of_a_desired_point_that_is_reached():
+    shown = explore.three_opinions(rk.load("asymmetric"))
+    assert any(mark.words.startswith("at rest outside") for mark in shown.picture.marks if mark.kind == "words")
+    assert "desired point" not in shown.numbers

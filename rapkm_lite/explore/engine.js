@@ -1,5 +1,4 @@
 // The machine, its PD drives and the antagonism filter in plain JavaScript, for pages without a kernel.
-//
 // The same algebra as rapkm_lite/engine, which tests/test_engine_js.py holds it to: with v the velocity of the
 // end-effector, an arm with link vectors a, d has the rates b.v and -l.v of its links, b = d / (a x d) and
 // l = a / (a x d), so that b is its row of A.  SI units; an offset is measured minus true angle.
@@ -172,7 +171,6 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
     }
     return near ? Math.max(1, Math.ceil(Math.max(stiff, Math.min(fast, 4000)))) : 1;
   }
-
   let x = path.x[0], y = path.x[1], vx = 0, vy = 0, x1 = x, y1 = y, x2 = x, y2 = y;
   thought.at(x, y);
   for (let k = 0, o = 0; k < samples; k++, o += N) {

@@ -210,7 +210,7 @@ class Explorer:
         late = time.monotonic() < self._left.get((owner, repr(value)), -1.0) + 1.0
         near = before if late else snap(owner, value)
         if near != value:
-            said = "" if late else f"{value:g} was rounded to {near:g}"
+            said = "" if late or abs(near - value) < 1e-9 * owner.step else f"{value:g} was rounded to {near:g}"
             with self._quiet():
                 owner.value = near
         self._step()

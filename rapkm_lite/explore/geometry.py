@@ -41,8 +41,7 @@ def machine(robot: Manipulator) -> Explorer:
     '2 of 2 (redundantly actuated)'
     """
     # A goes with one over the lengths.
-    times = shared.size(robot)
-    digits = shared.decimals(times)
+    digits = shared.decimals(times := shared.size(robot))
     palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
     small = "abcdef"[: len(pairs := act.drive_pairs(robot))]
     modes = {mode_name(m): m for m in working_modes(robot)}

@@ -123,8 +123,8 @@ def three_opinions(robot: Manipulator) -> Explorer:
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}
         picture.line("opinions", *rest, color=NEUTRAL, zorder=6, **tip)
         if np.abs(rest).max() > half:
-            words = f"at rest outside, {np.hypot(*rest):.1f} mm away"
-            picture.text("opinions", 0.02, 0.97, words, inside=True, va="top", fontsize=9, color=ALARM)
+            far_off = f"at rest outside, {np.hypot(*rest):.1f} mm away"
+            picture.text("opinions", 0.02, 0.97, far_off, inside=True, va="top", fontsize=9, color=ALARM)
         marks.bars(picture, "torque", [(torque, {})], width=0.6, form=".1f", times=heavier)
         picture.fit("torque", 1.25 * torque, least=shared.least_torque(robot, 10.0))
         return {

@@ -12,11 +12,11 @@ const ENTER = { key: "Enter", keyCode: 13, bubbles: true };
 
 /** True minus signs before numbers, not in words with a hyphen. */
 export const minus = (words) => String(words).replace(/(^|[\s([/])-(?=\.?\d)/g, "$1−");
+export const WHOLE = /((?:[\d.]+ )?m?N m\b\S*(?: s\b\S*)?|[\d.]+ (?:[%‰]|(?:k?g|Hz|[mµ]?(?:[NmJWs]|rad))\b\S*))/u;
 
-/** "σ_min" and "10^−3" as pieces {text, shift}: -1 is a subscript, 1 a superscript; units stay with their numbers. */
+/** "σ_min" and "10^−3" as pieces {text, shift}: shift -1 is a subscript, 1 a superscript. */
 export function pieces(words) {
-  const whole = String(words).replace(/(?<=\d|N|N m) (?=(k?g|Hz|[mµ]?(N|m|rad|J|W|s))(?![\p{L}\d])|[%‰])/gu, "\xa0");
-  return whole.split(/([_^][\p{L}\p{N}−]+)/u).filter(Boolean).map((part) => {
+  return String(words).split(/([_^][\p{L}\p{N}−]+)/u).filter(Boolean).map((part) => {
     const shift = part.length > 1 ? ({ _: -1, "^": 1 }[part[0]] ?? 0) : 0;
     return { text: shift ? part.slice(1) : part, shift };
   });
@@ -171,8 +171,7 @@ class Panel {
     if (label && !this.scale.textContent) rich(this.scale, label);
     this.entitle(last("title"), last("legend")?.words);
     if (!wide || !high || !frame) return;
-    const ratio = (this.ratio = window.devicePixelRatio || 1);
-    const [width, height] = this.room.map((v) => Math.round(v * ratio));
+    const ratio = (this.ratio = devicePixelRatio || 1), [width, height] = this.room.map((v) => Math.round(v * ratio));
     // Setting a size blanks a canvas, so only when it is another one.
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.size = (points) => Math.max((points / 10.5) * look.base, look.floor);
@@ -321,9 +320,10 @@ export function steps({ along, set }, key, shift) {
 const make = (tag, properties = {}, parent = new DocumentFragment()) =>
   parent.appendChild(Object.assign(document.createElement(tag), properties));
 
-/** Put words into an element, with true subscripts. */
+/** Put words into an element, with true subscripts; units stay with their numbers. */
 function rich(el, words = "") {
-  el.replaceChildren(...pieces(words).map(({ text, shift }) => (shift ? make("sub", { textContent: text }) : text)));
+  const whole = (text) => text.split(WHOLE).map((part, k) => (k % 2 ? make("nobr", { textContent: part }) : part));
+  el.replaceChildren(...pieces(words).flatMap((p) => (p.shift ? make("sub", { textContent: p.text }) : whole(p.text))));
   return el;
 }
 
@@ -370,7 +370,7 @@ export function mount(el, scene, link) {
     const ariaLabel = `${names.map(label).join(" and ")}, in the picture`, ariaValueNow = state.places[names[0]];
     const className = `rapkm-knob ${bare ? "bare" : ""}`, ariaValueText = minus(names.map(told).join(", "));
     const [ariaValueMin, ariaValueMax] = scene.ranges?.[names[0]] ?? [null, null];
-    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: false });
+    Object.assign(knob, { className, ariaLabel, ariaValueNow, ariaValueMin, ariaValueMax, ariaValueText, hidden: 0 });
     // JupyterLab takes arrow keys from whatever has the focus without this word.
     knob.dataset.lmSuppressShortcuts = "true";
     knob.style.translate = `${bare ? Math.max(x, panel.box.left + 9) : x}px ${y - 14 * bare}px`; // off the numbers
@@ -410,8 +410,7 @@ export function mount(el, scene, link) {
     rich(problem, minus(message.problem ?? "")).hidden = !message.problem;
     numbers.replaceChildren(...(message.numbers ?? []).map(([name, text]) => {
       const span = rich(make("span"), `${name}: `);
-      rich(make("b", {}, span), minus(text));
-      return span;
+      return rich(make("b", {}, span), minus(text)), span;
     }));
     const places = JSON.stringify(state.places);
     if (message.note || message.from || places !== root.dataset.places) say(minus(message.note ?? ""));
@@ -458,7 +457,7 @@ export function mount(el, scene, link) {
   }
   copy.onclick = () => say(state.code) && navigator.clipboard?.writeText(state.code).catch(() => {});
 
-  // What is seen, in words; names for sliders, which have none for readers of the screen; subscripts for labels.
+  // For readers of the screen what is seen, names of sliders, and their numbers, not exponents; subscripts for labels.
   function atRest(words) {
     sentence.textContent = minus(words);
     for (const control of around()?.querySelectorAll(".rapkm-control") ?? []) {
@@ -466,6 +465,9 @@ export function mount(el, scene, link) {
       const name = (control.dataset.words ??= said(label) || said(control)); // a box has an empty label besides
       for (const part of control.querySelectorAll(".noUi-handle, .ui-slider-handle, .widget-readout, select, input"))
         Object.assign(part, { ariaLabel: name }).dataset.lmSuppressShortcuts = "true";
+      const [handle, readout] = [".noUi-handle", ".widget-readout"].map((part) => control.querySelector(part));
+      const told = () => handle.ariaValueText === readout.textContent || (handle.ariaValueText = readout.textContent);
+      if (handle && readout) told(), (control.eye ??= new MutationObserver(told)).observe(handle, { attributes: true });
       control.onkeydown = (event) => event.isTrusted || event.stopPropagation(); // JupyterLab would take the focus
       if (label?.textContent.includes("_")) rich(label, name);
     }

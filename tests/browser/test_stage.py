@@ -195,6 +195,10 @@ def named(notebook, name):
     assert [c["label"].replace("_", "") for c in controls] == [w.replace("_", "") for w in words]
     for control, word in zip(controls, words, strict=True):
         assert set(control["names"]) == {word}, control
+    # Of a logarithmic slider the browser would tell the exponent.
+    parts = "c => ['.noUi-handle', '.widget-readout'].map(part => c.querySelector(part))"
+    told = f"() => [...stage.box().querySelectorAll('.rapkm-control')].map({parts})"
+    assert notebook.ask(f"() => ({told})().every(([a, b]) => a?.ariaValueText === b?.textContent)")
 
 
 def obeys_everywhere(notebook):
