@@ -922,3 +922,16 @@ def test_the_middle_of_two_drives_is_that_of_three_at_equal_distances():
 def close_figures():
     yield
     plt.close("all")
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.ma.masked])
+def test_bands_count_lost_runs_and_show_none_of_them(lost):
+    """Energies 1 to 10 J and two lost runs of twelve: ten twelfths are below 10 J, five below the mean of 5.5 J."""
+    energies = np.ma.arange(1.0, 13.0)
+    energies[10:] = [4.0, 8.0]
+    energies[[3, 7]] = lost
+    curve, mean, *_ = plotting.plot_bands({"a": energies}).lines
+    np.testing.assert_allclose(curve.get_xydata()[-1], [10.0, 1000 / 12])
+    np.testing.assert_allclose(mean.get_xydata(), [[5.5, 500 / 12]])
+    with pytest.raises(ValueError, match="samples\\['a'\\] has 12 lost runs; allowed"):
+        plotting.plot_bands({"a": np.full(12, np.nan)})

@@ -72,13 +72,17 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
 def plot_bands(samples: dict, ax=None):
     """Distribution functions of energies in J with their means; `samples` maps one or two labels to (k,).
 
+    Of runs that were lost, masked or NaN, no energy is below any other; ValueError where all were.
+
     >>> ax = plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
     """
     ax = axes_or_new(ax, figsize=(6.6, 3.5))
     for (label, values), colour in with_looks("samples", samples, (BEFORE, AFTER)):
-        values = np.sort(values)
-        ax.step(values, 100 * np.arange(1, len(values) + 1) / len(values), color=colour, lw=2.2, label=label)
-        ax.plot(values.mean(), 100 * np.mean(values <= values.mean()), "D", color=ALARM, ms=7)
+        done = np.sort(np.ma.masked_invalid(values).compressed())
+        if not done.size:
+            raise ValueError(f"samples[{label!r}] has {len(values)} lost runs; allowed: one energy at least")
+        ax.step(done, 100 * np.arange(1, len(done) + 1) / len(values), color=colour, lw=2.2, label=label)
+        ax.plot(done.mean(), 100 * np.sum(done <= done.mean()) / len(values), "D", color=ALARM, ms=7)
     ax.plot([], [], "D", color=ALARM, label="mean")
     ax.set(xlabel="total electric energy in J", ylabel="share of runs below, %", xlim=(0, None), ylim=(0, 101))
     ax.legend(loc="lower right")
