@@ -123,7 +123,7 @@ class Panel {
     for (const part of ["head", "ylabel", "plot", "scale", "xlabel"])
       this[part] = rich(make("div", { className: `rapkm-${part}` }, this.el), spec[part]);
     this.heading = make("b", {}, this.head);
-    this.canvas = make("canvas", { role: "img", ariaLabel: [name, spec.ylabel].join(" ").trim() }, this.plot);
+    this.canvas = make("canvas", { role: "img", ariaLabel: (!spec.aspect && spec.ylabel) || name }, this.plot);
     this.ctx = this.canvas.getContext("2d");
   }
 

@@ -120,7 +120,7 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
     """Curves where the two distal links of a pair are parallel: its parameterization singularities.
 
     pairs : some of `drive_pairs`; default all.
-    on_map : draw outlined white lines, readable on top of a map, instead of the arms' colours.
+    on_map : draw outlined white lines, readable on top of a map, instead of those of `pair_line`.
 
     >>> import rapkm_lite as rk
     >>> ax = plot_pair_curves(rk.load(), n=81)
