@@ -207,7 +207,7 @@ class Explorer:
             return
         if self._player and self._player.late(owner):
             return self.reset()
-        late = time.monotonic() < self._left.get((owner, repr(value)), -1.0) + 1.0
+        late = value != change["new"] and time.monotonic() < self._left.get((owner, repr(value)), -1.0) + 1.0
         near = before if late else snap(owner, value)
         if near != value:
             said = "" if late or abs(near - value) < 1e-9 * owner.step else f"{value:g} was rounded to {near:g}"

@@ -147,7 +147,7 @@ def calibration(robot: Manipulator) -> Explorer:
     controls = {
         "radius": shared.path_slider(robot, "radius in mm", 10, 125, 5, 120, 0.95),
         "turn": slider("turn of the first place in °", 0, 120, 5, 0),
-        "places": choice("places on the circle", [1, 2, 3, 6, 12, 48], 3),
+        "places": choice("places on the circle", [1, 2, 3, 6, 12, 24], 3),
         "counts": choice("counts a turn", [("2000", 2000), ("20 000", 20_000), ("200 000", 200_000)], 20_000),
     }
     space = partial(marks.draw_workspace, panel="plane", robot=robot)

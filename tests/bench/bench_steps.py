@@ -35,8 +35,8 @@ def settings(widget, count: int = 12) -> list:
 def steps(name: str, **base) -> dict[str, list[float]]:
     """Milliseconds of CPU time for each control of an explorer, from the setting `base` on."""
     explorer = getattr(explore, name)().set(**base)
-    with explorer._quiet():
-        orders = {control: settings(widget) for control, widget in explorer.controls.items() if control not in base}
+    others = getattr(explore, name)().controls
+    orders = {control: settings(widget) for control, widget in others.items() if control not in base}
     explorer.canvas.send = lambda content, buffers=None: json.dumps(content)
     explorer._message({"kind": "hello"})
     times: dict[str, list[float]] = {}
