@@ -43,6 +43,20 @@ def test_introduction_redundant_formulation_does_not_use_minimal_coordinates():
     assert np.linalg.matrix_rank(G, rtol=1e-9) == 2 and np.abs(G).max() < 0.1
 
 
+def test_introduction_parameterization_singularities_are_input_singularities_of_the_pair_only():
+    # Printed: they "are also input singularities", which 2.2 defines by a degree of actuation that changes.  Along a
+    # side of the base the curve of its pair is crossed; only the five-bar of that pair loses a degree there.
+    for i, k in PAIRS:
+        (start, end), pair = TESTBED.base[[i, k]], TESTBED.with_arms((i, k))
+        middle, ahead = (start + end) / 2, (end - start) / 8
+        x = middle + np.outer([-1.0, -1e-3, 0.0, 1e-3, 1.0], ahead)
+        q, two = rk.inverse_kinematics(TESTBED, x), rk.inverse_kinematics(pair, x)
+        assert abs(rk.distal_cross_products(TESTBED, q[2])[PAIRS.index((i, k))]) < 1e-14
+        assert rk.degree_of_actuation(pair, two).tolist() == [2, 2, 1, 2, 2]
+        assert rk.degree_of_actuation(TESTBED, q).tolist() == [2, 2, 2, 2, 2]
+        assert rk.singular_values(rk.control_matrix(TESTBED, q))[..., 1].min() > 1.0  # rad/m
+
+
 def test_text_after_7_degree_of_freedom():
     for robot in MACHINES.values():
         n, m, r = robot.n_joints, robot.n_arms, robot.n_constraints
@@ -100,6 +114,18 @@ def test_section_3_1_antagonism_is_of_the_pd_scheme_12_and_does_not_exist_under_
         for law in (pd, ctc)
     ]
     assert left[0] > 1e-2 and left[1] < 1e-15
+
+
+def test_text_before_13_the_measured_angles_are_no_pose_that_is_attained():
+    # Printed: the pose q~_a that is attained.  At rest the machine stands at q_a, and q~_a = q_a + offset fits no pose.
+    run = rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), rk.hold(FRICTIONLESS, [0.0, 0.0], 3.0), offset=OFFSET)
+    assert np.abs(run.qd_a[-1]).max() < 1e-9
+    q_a, read = run.q_a[-1], run.q_a[-1] + OFFSET
+    apart = [np.linalg.norm(angles - rk.estimate_pose(FRICTIONLESS, angles, [0.0, 0.0])[:3]) for angles in (q_a, read)]
+    assert apart[0] < 1e-12
+    assert_allclose(1e3 * apart[1], 4.05, atol=0.005)  # what errata print
+    # To first order it is the part of the offsets along the null vector, (4 - 2 + 5) / sqrt(3) mrad.
+    assert_allclose(apart[1], OFFSET.sum() / np.sqrt(3), rtol=np.linalg.norm(OFFSET))
 
 
 def test_eq_14_steady_state_error():
