@@ -171,6 +171,14 @@ def test_values_of_the_package_stay_as_they_are(value):
                 array.setflags(write=True)
 
 
+def test_what_a_value_computes_when_asked_cannot_be_written_either():
+    """A number written into it would be lost without a word: the next look computes it anew."""
+    run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), PATH)
+    for computed in (run.energy, run.error, run.path_error, run.log().error, rk.table1().deviation):
+        with pytest.raises(ValueError, match="read-only"):
+            computed[0] = 9.0
+
+
 def test_the_tree_of_a_machine_is_read_only():
     kept = arrays(rk.load().tree)
     assert len(kept) > 10 and not any(array.flags.writeable for array in kept.values())

@@ -11,7 +11,7 @@ import numpy as np
 
 from .arguments import of_kind, one_of, real_array, shaped, short
 from .datafiles import data_path
-from .values import Array, Value
+from .values import Array, Value, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +49,7 @@ class Log(Value):
     @property
     def error(self) -> np.ndarray:
         """Measured minus desired base angles (k, N), rad: what the controller works on."""
-        return self.q_a - self.q_a_desired
+        return frozen(self.q_a - self.q_a_desired)
 
     def __repr__(self):
         return f"Log({self.name!r}, {len(self.t)} records, {self.t[-1] - self.t[0]:g} s, {self.c.shape[1]} drives)"

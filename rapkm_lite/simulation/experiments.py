@@ -9,7 +9,7 @@ import numpy as np
 from ..control.laws import PD, AntagonismFilter
 from ..machine.datafiles import UNITS_OF, data_path, known, read_toml
 from ..machine.manipulator import Manipulator, load
-from ..machine.values import Value
+from ..machine.values import Value, frozen
 from ..mechanics.trajectory import Trajectory, triangle
 from .faults import Fault, read_fault
 from .runs import Run, simulate
@@ -93,7 +93,7 @@ class Table1(Value):
     @property
     def deviation(self) -> np.ndarray:
         """(simulated - measured) / measured, (2, 3)."""
-        return (self.simulated - self.measured) / self.measured
+        return frozen((self.simulated - self.measured) / self.measured)
 
 
 def measured_energies() -> np.ndarray:

@@ -122,17 +122,17 @@ class Run(Value):
     @property
     def energy(self) -> np.ndarray:
         """Electric energy per drive (N,) in J, regenerative: sum over holds of R (c/k_t)^2 dt + c (q[k+1] - q[k])."""
-        return copper_loss(self.robot, self.c[:-1], self.dt) + mechanical_work(self)
+        return frozen(copper_loss(self.robot, self.c[:-1], self.dt) + mechanical_work(self))
 
     @property
     def error(self) -> np.ndarray:
         """Joint errors q_a - q_a^d (k, N) of the true base angles, rad."""
-        return self.q_a - self.trajectory.q_a[: len(self)]
+        return frozen(self.q_a - self.trajectory.q_a[: len(self)])
 
     @property
     def path_error(self) -> np.ndarray:
         """Distance (k,) in m of the end-effector from its desired place at each sample, also where it lags."""
-        return np.linalg.norm(self.x - self.trajectory.x[: len(self)], axis=-1)
+        return frozen(np.linalg.norm(self.x - self.trajectory.x[: len(self)], axis=-1))
 
     @property
     def switches(self) -> int:
