@@ -6,6 +6,7 @@ words of the lesson that quote it, where there are such.  tests/test_published.p
 
 from __future__ import annotations
 
+import argparse
 import functools
 import json
 from collections.abc import Callable
@@ -501,6 +502,7 @@ def kept(new: list[dict], old: list[dict]) -> list[dict]:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     table = kept(rows(), json.loads(TABLE.read_text(encoding="utf-8")))
     lines = ",\n".join("  " + json.dumps(row, ensure_ascii=False) for row in table)
     TABLE.write_text(f"[\n{lines}\n]\n", encoding="utf-8")

@@ -330,7 +330,10 @@ def test_pages_for_teachers_are_written_or_refused_by_a_sentence(tmp_path, targe
 WITH_ARGUMENTS = ["docs/teaching/formula_sheet.py", "notebooks/slides.py", "notebooks/build.py", "docs/build.py"]
 
 
-@pytest.mark.parametrize("script", [*WITH_ARGUMENTS, "docs/lite.py", "tests.bench", "tests.minutes"])
+@pytest.mark.parametrize(
+    "script",
+    [*WITH_ARGUMENTS, "docs/lite.py", "docs/pictures/make.py", "tests.bench", "tests.minutes", "tests.published"],
+)
 def test_a_script_says_how_it_is_called(tmp_path, script):
     start = [ROOT / script] if script.endswith(".py") else ["-m", script]
     here = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(ROOT)}}

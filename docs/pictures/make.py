@@ -1,5 +1,6 @@
 """The moving picture of the README: python docs/pictures/make.py"""
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -53,4 +54,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     main()
