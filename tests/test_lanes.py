@@ -437,6 +437,15 @@ def test_friction_of_a_machine_that_is_thrown_about():
     assert_allclose(rk.sweep(robot, law, path, offset).x_final[0], states[-1, :2], rtol=0, atol=1e-8)
 
 
+def test_friction_of_a_machine_with_a_payload_that_starts_at_once():
+    """Creep that dies away within some tenths of a hold carries far enough to be integrated well: to 2 nm."""
+    robot = MACHINES["asymmetric"].replace(gravity=[0.0, 0.0], friction=0.7, friction_velocity=0.1)
+    path, law, offset = rk.hold(robot, [0.0, 0.0], 0.02), rk.PD(30.0, 0.8), np.array([0.01, -0.01, -0.01])
+    states = reference(robot, law, path, offset, method="LSODA", rtol=1e-12, atol=1e-15)[0]
+    assert_allclose(rk.simulate(robot, law, path, offset).x, states[:, :2], rtol=0, atol=2e-9)
+    assert_allclose(rk.sweep(robot, law, path, offset).x_final[0], states[-1, :2], rtol=0, atol=2e-9)
+
+
 def test_friction_of_neighbours_changes_no_bit():
     """Constant friction of drives that all move fast, and its tanh beside a neighbour that is slow, are one number."""
     robot, path = MACHINES["testbed"].replace(friction=[4e-3, 0.3, 0.0]), rk.circle(MACHINES["testbed"], 0.1, 1.0)

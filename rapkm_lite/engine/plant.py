@@ -14,8 +14,8 @@ from .leaves import small_angle, solve2, steep, stiffness, turned
 from .rows import *
 from .tables import *
 
-# Largest lambda h of a Runge-Kutta step across the bend of the friction law, and the most steps.
-STIFF, MOST_STEPS = 1.0, 4000.0
+# Steps across the bend of friction have lambda h <= 1/2 where lambda dt < DECAY, else <= 1; and the most steps.
+DECAY, MOST_STEPS = 6.0, 4000.0
 
 
 @outlined
@@ -131,7 +131,7 @@ def count_steps(lanes, arms, extra, w, dt):
             rate, acc, k = w[at(QD, i, j, W, L)], w[at(ACC, i, j, W, L)], (w[of(KX, j, W, L)], w[of(KY, j, W, L)])
             a, b, c = stiffness(f, sharpness, (m11, m12, m22), row, rate, acc, k, dt)
             stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-        n = near * max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS))))
+        n = near * max(1.0, math.ceil(max(stiff + min(stiff, DECAY), min(fast, MOST_STEPS))))
         w[of(STEPS, j, W, L)] = max(1.0, n)
         w[of(BEND, j, W, L)] = 0.0 if n == 0.0 and len(extra) == 0 else sharpness
         w[of(STEP, j, W, L)] = dt / max(1.0, n)

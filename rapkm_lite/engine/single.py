@@ -12,7 +12,7 @@ from . import edge
 from .arms import acting, moving, placed, slow
 from .jit import index, kernel, leaf, outlined
 from .leaves import small_angle, solve2, steep, stiffness, turned
-from .plant import MOST_STEPS, STIFF, judge, mend
+from .plant import DECAY, MOST_STEPS, judge, mend
 from .rows import *
 from .tables import *
 
@@ -130,7 +130,7 @@ def count_steps(arms, w, kx, ky, dt):
         row, rate, acc = (w[B1 * W + i], w[B2 * W + i]), w[QD * W + i], w[ACC * W + i]
         a, b, c = stiffness(w[FRICTION * W + i], sharpness, (m11, m12, m22), row, rate, acc, (kx, ky), dt)
         stiff, fast, near = stiff + a, max(fast, b * c), max(near, c)
-    return max(1.0, math.ceil(max(stiff / STIFF, min(fast, MOST_STEPS)))) if near > 0.0 else 0.0
+    return max(1.0, math.ceil(max(stiff + min(stiff, DECAY), min(fast, MOST_STEPS)))) if near > 0.0 else 0.0
 
 
 @outlined

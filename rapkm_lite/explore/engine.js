@@ -169,7 +169,7 @@ export function simulate(m, path, { K_P, K_D, offset = 0, filter = "off", encode
       if (!(f > 0 && Math.abs(rates[i]) < 20 / sharpness + (qdd + 2 * yields) * dt)) continue;
       near = true, fast = Math.max(fast, Math.min((qdd + yields) * dt * sharpness / 0.6, yields * dt * dt / 3e-9));
     }
-    return near ? Math.max(1, Math.ceil(Math.max(stiff, Math.min(fast, 4000)))) : 1;
+    return near ? Math.max(1, Math.ceil(Math.max(stiff + Math.min(stiff, 6), Math.min(fast, 4000)))) : 1;
   }
   let x = path.x[0], y = path.x[1], vx = 0, vy = 0, x1 = x, y1 = y, x2 = x, y2 = y;
   thought.at(x, y);
