@@ -3,6 +3,7 @@
 import copy
 import pickle
 
+import mpmath
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -66,6 +67,29 @@ def test_redundant_quantities_are_those_of_the_chapter(robot):
 def test_redundant_quantities_stay_exact_at_the_edge_of_the_workspace(robot, distance):
     # F grows like one over the root of the distance; nothing of the redundant form may come from it.
     check_against_lapack(robot, *edge_motion(robot, distance), 1e-13)
+
+
+@machines
+@pytest.mark.parametrize("distance", [1e-4, 1e-7, 1e-10])
+def test_the_rates_of_joints_keep_their_digits_at_the_edge_of_the_workspace(robot, distance):
+    """F = B^-1 arm by arm, B = (E (a + d), E d) the Jacobian of the tip, in 40 digits at the very angles; dF/dt too."""
+    q, qd = edge_motion(robot, distance, 12)
+    with mpmath.workdps(40):
+        for k, at in enumerate(rk.at(robot, q[k], qd[k]) for k in range(len(q))):
+            for i, lengths in enumerate(robot.lengths):
+                joints = [i, robot.n_arms + i]
+                (base, elbow), (w1, bend) = ([mpmath.mpf(float(v[k, j])) for j in joints] for v in (q, qd))
+                a, d = (link * mpmath.expj(angle) for link, angle in zip(lengths, (base, base + elbow), strict=True))
+                a_dot, d_dot = 1j * w1 * a, 1j * (w1 + bend) * d
+                B, B_dot = (
+                    mpmath.matrix([[-(v + u).imag, -u.imag], [(v + u).real, u.real]])
+                    for v, u in ((a, d), (a_dot, d_dot))
+                )
+                F = B**-1
+                F_dot = -F * B_dot * F
+                for found, exact in ((at.F, F), (at.F_dot, F_dot)):
+                    wanted = np.array(exact.tolist(), dtype=float)
+                    assert_allclose(found[joints], wanted, rtol=0, atol=2e-15 * np.abs(wanted).max())
 
 
 def test_the_edge_itself_is_a_regular_pose_of_the_redundant_form():

@@ -14,7 +14,7 @@ class Tree:
     """Constants of the tree that is left when every arm but arm 2 is cut from the end-effector.
 
     N, n, r : arms, joints, constraints.  lengths : (4N,) m, of the links in v.  longest : the longest link, m.
-    edge : (N,) |a x d| in m^2 below which an arm counts as stretched or folded.
+    most : (N,) m^2, l1 l2, which |a x d| = l1 l2 |sin(elbow angle)| does not exceed.
     absolute : (2N, 2N) angles of the links against the x axis from joint angles.  spread_arms : (N, 4N),
     spread_links : (2N, 4N), a number per arm, per link, to its entries of v.
     gaps : (4N, r) and gap : (r,) m, h = v gaps + gap.
@@ -33,7 +33,7 @@ class Tree:
         base, elbow = np.arange(N), np.arange(N, n)
         arm = np.eye(N)[:, np.arange(n) % N]
         self.lengths, self.longest = np.tile(robot.lengths.T.ravel(), 2), robot.lengths.max()
-        self.edge = 1e-12 * robot.lengths.prod(axis=1)
+        self.most = robot.lengths.prod(axis=1)
         self.elbow = np.concatenate([elbow, elbow])
         self._linear(arm, base, elbow, robot.base)
         self._dynamic(robot, base, elbow)

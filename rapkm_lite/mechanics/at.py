@@ -150,7 +150,7 @@ class At(Value):
     # Minimal coordinates.
     @quantity
     def _levers(self):
-        levers = cores.inner_levers(self.robot.tree, self._v)
+        levers = cores.inner_levers(self.robot.tree, self.q)
         _ = self._closed
         return levers
 

@@ -77,18 +77,24 @@ def check_tangent(tree: Tree, J: np.ndarray, qd: np.ndarray) -> None:
         )
 
 
-def inner_levers(tree: Tree, v: np.ndarray) -> np.ndarray:
-    """a_i x d_i = l1 l2 sin(elbow angle), once for each entry of v, (..., 4N); no arm may be stretched or folded."""
-    N, n = tree.N, tree.n
-    lever = v[..., :N] * v[..., n + N :] - v[..., n : n + N] * v[..., N:n]
-    small = np.abs(lever) < tree.edge
+EDGE = 1e-12
+"""|sin(elbow angle)| below which an arm counts as stretched or folded."""
+
+
+def inner_levers(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """a_i x d_i = l1 l2 sin(elbow angle), once for each entry of v, (..., 4N); no arm may be stretched or folded.
+
+    The difference of two products would lose the digits that the elbow angle has near the edge of the workspace.
+    """
+    bend = np.sin(q[..., tree.N :])
+    small = np.abs(bend) < EDGE
     if small.any():
         arm = np.argwhere(small)[0][-1]
         raise ValueError(
             f"q puts arm {arm + 1} on the boundary of the workspace (sin(elbow angle) < 1e-12), where the end-effector "
             "position is no coordinate; allowed: poses inside, or independent joints instead of the end-effector"
         )
-    return linear(lever, tree.spread_arms)
+    return linear(bend * tree.most, tree.spread_arms)
 
 
 def joint_complement(J: np.ndarray, independent, of_pose: bool = True) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from ..machine.arguments import positive_number, real_array, shaped, short
 from ..machine.manipulator import Manipulator
 from ..machine.values import frozen
+from .cores import EDGE
 from .kinematics import inverse_kinematics
 
 Motion: TypeAlias = Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -144,9 +145,10 @@ def joint_motion(robot: Manipulator, x, xd, xdd, before) -> tuple[np.ndarray, np
     angle, l1 = np.ascontiguousarray(q[:, :N].T), robot.lengths[:, :1]
     a = l1 * np.cos(angle), l1 * np.sin(angle)
     d = [np.add.outer(-robot.base[:, i], x[:, i]) - a[i] for i in range(2)]
-    lever = a[0] * d[1] - a[1] * d[0]
-    if np.any(np.abs(lever) < robot.tree.edge[:, None]):
+    bend = np.sin(q[:, N:].T)
+    if np.any(np.abs(bend) < EDGE):
         raise ValueError("an arm is stretched or folded")
+    lever = robot.tree.most[:, None] * bend
 
     def rates(u0, u1) -> np.ndarray:
         """Base and elbow joints, (2N, k), when the tips move at the rate (u0, u1)."""

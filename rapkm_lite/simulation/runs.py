@@ -193,8 +193,9 @@ def simulate(
     dt = 2 ms, by less than 0.2 micrometres at 10 ms.  Near the edge of the workspace it takes more: the run ends
     at the sample after which an arm stretches or folds.
     Stiff friction costs time: a hold in which a drive is nearly at rest takes as many Runge-Kutta steps as dt f_c / v0
-    over the inertia that a drive moves, added up over all drives: one for the testbed's friction, 2400 (0.4 ms) in its
-    middle for 1 N m and v0 = 0.1 mrad/s; beyond 4000 the run is refused.  Then a larger ``friction_velocity`` helps.
+    over the inertia that a drive moves, added up over all drives, or twice as many, but six more at most: one for the
+    testbed's friction, 2400 (0.4 ms) in its middle for 1 N m and v0 = 0.1 mrad/s; beyond 4000 the run is refused.  Then
+    a larger ``friction_velocity`` helps.
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python, or a
     `compiled` one, raises at the first sample comes through.  Whatever else stops a run, then or later, raises
     SimulationError with the run up to there: a machine that leaves the workspace, a lost pose, a singularity of the
