@@ -41,9 +41,11 @@ def machine(robot: Manipulator) -> Explorer:
     '2 of 2 (redundantly actuated)'
     """
     # A goes with one over the lengths.
-    digits = shared.decimals(times := shared.size(robot))
+    times = shared.size(robot)
+    digits = shared.decimals(times)
     palette = replace(MAP, levels=tuple(v / times for v in MAP.levels))
-    small = "abcdef"[: len(pairs := act.drive_pairs(robot))]
+    pairs = act.drive_pairs(robot)
+    small = "abcdef"[: len(pairs)]
     modes = {mode_name(m): m for m in working_modes(robot)}
     which = {"all drives": None} | {f"pair {pair_name(p)}": p for p in pairs}
     gx, gy, inside, points = grid_points(robot, 121)
@@ -119,9 +121,9 @@ def actuation(robot: Manipulator) -> Explorer:
     '4.62 rad/m'
     """
     pairs, digits = act.drive_pairs(robot), shared.decimals(shared.size(robot))
-    name, shown, about = "Null vector", "component", ""
+    name, shown, low, about = "Null vector", "component", -1.05, ""
     if robot.n_arms != 3:
-        name, shown = "Null space", "share of each drive"
+        name, shown, low = "Null space", "share of each drive", 0.0
         about = "A walk along the path: sigma_min of each pair, the null space of A^T, and the forces of the drives."
 
     @lru_cache(maxsize=8)
@@ -174,7 +176,7 @@ def actuation(robot: Manipulator) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Machine"},
         "sigma": way | measures | {"ylim": (0, 8 / shared.size(robot))},
-        "null": way | {"title": name, "ylabel": shown, "ylim": (-1.05 * (robot.n_arms == 3), 1.05), "legend": drives},
+        "null": way | {"title": name, "ylabel": shown, "ylim": (low, 1.05), "legend": drives},
         "force": shared.force_panel(2 / shared.size(robot)) | {"title": "Forces", "legend": whole},
     }
     controls = {
