@@ -234,7 +234,7 @@ def _minimum(robot, angles, basis, nominal, p, x, blur, enough=0.0, courage=0):
         U, sigma, Vt = np.linalg.svd(rows @ basis, full_matrices=False)
         explained, gap = U.T @ left, math.sqrt(left @ left)
         # Rows wander by about the noise of the angles they are taken at: smaller singular values say nothing.
-        noise = max(blur, math.sqrt(max(gap**2 - explained @ explained, 0.0)))
+        noise = max(blur, math.sqrt(max(gap**2 - explained @ explained, 0.0)) * (len(left) > len(sigma)))
         rank = int(np.sum(sigma > max(1e-8, 10 * (blur if courage == 2 and gap > 0.02 else noise)) * sigma[0]))
         step = explained[:rank] / sigma[:rank]
         move = -Vt[:rank].T @ step
