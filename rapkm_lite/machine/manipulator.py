@@ -77,9 +77,9 @@ class Manipulator(Value):
             raise ValueError(f"lengths = {short(lengths.tolist())} m; allowed: up to 1e6 m")
         masses = bounded("masses", _per_link("masses", self.masses, N), 0.0, strict=True)
         given: dict[str, Any] = {"base": base, "lengths": lengths, "masses": masses}
-        inertias = masses * lengths**2 / 12 if self.inertias is None else _per_link("inertias", self.inertias, N)
-        given["inertias"] = bounded("inertias", inertias, 0.0, strict=False)
-        given["centers"] = lengths / 2 if self.centers is None else _per_link("centers", self.centers, N)
+        for key, rod in _slender_rods(lengths, masses).items():
+            given[key] = rod if getattr(self, key) is None else _per_link(key, getattr(self, key), N)
+        bounded("inertias", given["inertias"], 0.0, strict=False)
         if np.any((given["centers"] < 0.0) | (given["centers"] > lengths)):
             raise ValueError(f"centers = {short(given['centers'].tolist())} m; allowed: on the link, 0 to its length")
         for key in ("rotor_inertia", "friction", "resistance", "torque_constant"):
@@ -172,7 +172,7 @@ class Manipulator(Value):
         Raises ValueError for fewer than two arms, a repeated or an unknown one.
 
         >>> from rapkm_lite import load
-        >>> load().with_arms((0, 2))
+        >>> print(load().with_arms((0, 2)))
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
         arms = list(joint_indices("arms", arms, self.n_arms, None, "arm"))
@@ -191,7 +191,13 @@ class Manipulator(Value):
         """The working mode as it is printed, such as "++-"."""
         return "".join("+" if s > 0 else "-" for s in self.mode)
 
-    def __repr__(self):
+    def _given(self) -> dict[str, Any]:
+        rods = _slender_rods(self.lengths, self.masses)
+        meant = [name for name, value in rods.items() if np.array_equal(value, getattr(self, name))]
+        each = ("lengths", "masses", *rods, "rotor_inertia", "resistance", "torque_constant", "friction", "mode")
+        return self._fields() | {k: _shortest(getattr(self, k)) for k in each} | dict.fromkeys(meant)
+
+    def __str__(self):
         lo, hi = self.lengths.min(), self.lengths.max()
         links = f"{lo:g} m" if lo == hi else f"{lo:g} to {hi:g} m"
         return f"Manipulator({self.name!r}: {self.n_arms} arms, links {links}, working mode {self.signs})"
@@ -210,6 +216,17 @@ def _per_link(name: str, value, N: int) -> np.ndarray:
     array = real_array(name, value)
     fits = array.shape in ((), (2,), (N, 2))
     return np.broadcast_to(shaped(name, array, fits, f"one number, (2,) or ({N}, 2)"), (N, 2))
+
+
+def _slender_rods(lengths: np.ndarray, masses: np.ndarray) -> dict[str, np.ndarray]:
+    return {"centers": lengths / 2, "inertias": masses * lengths**2 / 12}
+
+
+def _shortest(value: np.ndarray) -> Any:
+    """One number or one pair where it stands for all arms, as one types it."""
+    if np.all(value == value.flat[0]):
+        return value.flat[0].item()
+    return value[0] if np.all(value == value[0]) else value
 
 
 def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
@@ -251,7 +268,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
 
     Raises ValueError for an unknown key, a missing value, a wrong unit or a value out of range.
 
-    >>> load()
+    >>> print(load())
     Manipulator('testbed': 3 arms, links 0.2 m, working mode +++)
     """
     tables = read_toml(source)

@@ -189,6 +189,10 @@ class Value:
         """The fields by name, but for those that a class of a user's sets later."""
         return {name: getattr(self, name) for name in _names(type(self)) if hasattr(self, name)}
 
+    def _given(self) -> dict[str, Any]:
+        """The fields as one would type them."""
+        return self._fields()
+
     def _own(self) -> dict[str, Any]:
         """What a class of a user's has set besides its fields, without what is computed on demand and kept."""
         kind, names = type(self), _names(type(self))
@@ -227,9 +231,9 @@ class Value:
     @recursive_repr()
     def __repr__(self) -> str:
         """The call that makes the value: required fields by position, others by name where they are not the default."""
-        parts = []
+        parts, given = [], self._given()
         for field in dataclasses.fields(self) if _names(type(self)) else ():
-            value = getattr(self, field.name, None)
+            value = given.get(field.name)
             if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
                 parts.append(_typed(value))
             elif not equal(value, _frozen(field.default)):
