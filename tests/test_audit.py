@@ -219,6 +219,21 @@ def test_text_before_23_projection_of_the_acceleration_takes_the_rate_of_the_pro
     assert np.abs(Gt @ off + Ct @ qd - left(N @ off)).max() > 1e-3
 
 
+def test_eq_23_the_forces_depend_on_the_velocity():
+    r"""(23): $\tilde{G}(q)\ddot{q} + \tilde{C}(q,\dot{q})\dot{q} + \tilde{Q}(q) = \tilde{A}^{T}c$."""
+    qd = rk.orthogonal_complement(TESTBED, Q) @ [0.3, -0.2]
+    there, back, rest = (rk.redundant_dynamics(TESTBED, Q, s * qd)[2] for s in (1.0, -1.0, 0.0))
+    friction = TESTBED.friction * np.sign(qd[:3])
+    assert np.abs(TESTBED.friction - 4.2e-3).max() < 1e-15 and np.abs(qd[:3]).min() > 10 * TESTBED.friction_velocity
+    assert_allclose(there, A_TILDE.T @ friction, atol=1e-8)  # what (24) makes of it
+    assert_allclose(back, -there, rtol=1e-12)
+    assert np.abs(rest).max() == 0.0 and np.abs(there).max() > 1e-3
+    # Gravity alone is a function of the pose.
+    heavy = FRICTIONLESS.replace(gravity=(0.0, -9.81))
+    weight = [rk.redundant_dynamics(heavy, Q, s * qd)[2] for s in (1.0, -1.0)]
+    assert np.abs(weight[0]).max() > 0.1 and np.array_equal(*weight)
+
+
 def test_text_after_24_rate_of_the_projector_takes_j_where_b_is_printed():
     q, qd, _, (x, xd, _) = random_motion(TESTBED, 50, bend=0.2)
     N, J = rk.nullspace_projector(TESTBED, q), rk.constraint_jacobian(TESTBED, q)

@@ -127,7 +127,7 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
     return axes
 
 
-# Colour and dashes of runs that are compared on one axis: they belong to no arm.
+# Colour and dashes of runs that are compared on one axis: they belong to none of three arms.
 _RUN_LINES: list[dict[str, Any]] = [
     {"color": colour, "linestyle": ARM_LINES[k]}
     for colour, k in ((BEFORE, 0), (ALARM, 1), ("#3997BF", 2), (AFTER, 0), ("#8A3FC0", 3))
