@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from subprocess import list2cmdline
 
+from . import __version__
+
 
 def _summary(options) -> None:
-    from . import __version__
     from .simulation.compiled import without_compiler
     from .simulation.summary import as_text, summary
 
@@ -68,6 +69,7 @@ def _tell_grades(folder: Path, grades) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rapkm_lite", description=__doc__)
+    parser.add_argument("--version", action="version", version=f"rapkm_lite {__version__}")
     parser.add_argument("--json", action="store_true", help="print the summary for scripts")
     parser.set_defaults(run=_summary)
     commands = parser.add_subparsers(title="commands", metavar="command")

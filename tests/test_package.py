@@ -66,6 +66,10 @@ def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
     assert "encoder offsets (4, -2, 5) mrad" in text
 
 
+def test_the_version_is_told():
+    assert command("--version").stdout.split() == ["rapkm_lite", rk.__version__]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a closed pipe is another error there")
 def test_a_reader_that_has_enough_is_no_error_to_tell():
     """As `| head -1`, but sure to have closed the pipe before the first line."""
