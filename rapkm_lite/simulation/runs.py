@@ -251,7 +251,8 @@ def _run(setup: Setup, law, outcome: Outcome) -> Run:
     status, sample, *columns = outcome
     columns = [setup.trajectory.t, *columns]
     if status != DONE:
-        table = np.concatenate(columns[1:], axis=-1)[: sample + (status in (LEFT_WORKSPACE, TOO_STIFF))]
+        columns = [column[: sample + (status in (LEFT_WORKSPACE, TOO_STIFF))] for column in columns]
+        table = np.concatenate(columns[1:], axis=-1)
         rows = int(np.append(np.all(np.abs(table) < 1e100, axis=-1), False).argmin())
         columns = [column[:rows] for column in columns]
     # What a kernel has finished is finite and frozen.
