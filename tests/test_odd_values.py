@@ -68,6 +68,7 @@ def test_other_kinds_of_numbers_count_as_what_they_are():
             r"n_arms = 1e\+99; allowed: whole numbers >= 2, to 1000",
         ),
         (lambda: rk.SimulationError("now", "it stopped"), r"time = 'now' is not numeric; allowed: real numbers"),
+        (lambda: rk.PD([7.0, [7.0]], 0.2), r"K_P = \[7.0, \[7.0\]\] is not numeric; allowed: real numbers, in rows"),
         (lambda: rk.close_loops(TESTBED, Q + 0.1, 1e-30), r"tolerance = 1e-30 of the longest link; allowed: "),
         (lambda: plotting.plot_prestress_maps(rk.load("four_arms"), n=9), r"robot has 4 arms; allowed: 3, "),
         (lambda: plotting.plane_limits(TESTBED, -1.0), r"margin = -1; allowed: >= 0"),

@@ -63,8 +63,9 @@ def numeric(name: str, value, *last: int) -> np.ndarray:
         array = array.astype(float, copy=False)
     except OverflowError:
         raise ValueError(f"{name} = {short(value)} is too large; allowed: finite numbers, below 1e100") from None
-    except Exception:
-        raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers") from None
+    except Exception as error:
+        rows = ", in rows of one length" if "inhomogeneous" in str(error) else ""
+        raise ValueError(f"{name} = {short(value)} is not numeric; allowed: real numbers{rows}") from None
     if last and array.shape[-len(last) :] != last:
         raise ValueError(f"{name} has shape {array.shape}; allowed: ({', '.join(['...', *map(str, last)])})")
     return array

@@ -186,7 +186,7 @@ def simulate(
     model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles, from
         which set-points of `Trajectory.with_set_points` stay as far as they are from the path's.
     velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
-        first-order low-pass that begins with the true ones; None for the true rates.
+        first-order low-pass that begins with the true ones (its step: see `Sensors`); None for the true rates.
     faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s under PD it errs by less than 1 nm at
@@ -199,7 +199,8 @@ def simulate(
     Raises ValueError for bad arguments and for a first answer of the law that does not fit; what a law in Python, or a
     `compiled` one, raises at the first sample comes through.  Whatever else stops a run, then or later, raises
     SimulationError with the run up to there: a machine that leaves the workspace, a lost pose, a singularity of the
-    law's coordinates, an error in the law.  A Ctrl-C comes through, with the run up to there as its `partial`.
+    law's coordinates, an error in the law.  A Ctrl-C comes through, with the run up to there as its `partial`, once
+    it has begun: not while the path is prepared or a `compiled` law compiles.
 
     >>> import rapkm_lite as rk
     >>> spring = lambda t, q_a, qd_a, desired: -7.0 * (q_a - desired.q_a) - 0.2 * (qd_a - desired.qd_a)

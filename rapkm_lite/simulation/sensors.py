@@ -17,7 +17,8 @@ class Sensors(Value):
     offset : calibration offsets in rad, measured minus true angle: one number or (N,).
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
-        first-order low-pass that begins with the true ones; None for the true rates.
+        first-order low-pass that begins with the true ones, from sample to sample by the share dt / (dt + constant) of
+        the way to the new difference; None for the true rates.
     Raises ValueError for values out of range.
 
     >>> Sensors(encoder=2000)
