@@ -672,6 +672,10 @@ def test_finished_chunks_are_on_the_exception_and_the_rest_is_cancelled(law, err
     assert_array_equal(part.energies[:4], rk.sweep(ROBOT, law, PATH, offsets[:4]).energies)
     assert part.energies.mask[4:].all()
     assert "4 of 8 runs were finished" in caught.value.__notes__[-1]
+    energies = np.ma.copy(part.energies)  # finished as the docstring of `Sweep` says
+    energies[part.failed] = rk.sweep(ROBOT, law, PATH, part.offsets[part.failed]).energies
+    assert not np.ma.is_masked(energies)
+    assert_array_equal(energies, rk.sweep(ROBOT, law, PATH, offsets).energies)
 
 
 def test_an_interrupt_before_any_chunk_is_done_has_a_partial_too():

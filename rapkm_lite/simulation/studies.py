@@ -24,7 +24,10 @@ from .setup import prepare
 class Sweep(Value):
     """Result of `sweep`, one row per run; rows of failed runs are masked, and zero under the mask: use `compressed`.
 
-    A file keeps no mask, so `np.savez` and `np.savetxt` write the zeros: save ``study.energies[~study.failed]``.
+    A file keeps no mask, so `np.savez` and `np.savetxt` write the zeros: save ``study.energies[~study.failed]``;
+    `pickle` keeps all, a law of yours by the name of its module.  What is left of a study that was stopped is
+    ``study.offsets[study.failed]``, with the laws of these rows; write what a sweep of them gives into copies:
+    ``energies = np.ma.copy(study.energies)``, ``energies[study.failed] = rest.energies``.
     law : the law, or a tuple of k.  offsets : (k, N) rad; robot and trajectory were the same for all runs.
     energies : (k, N) electric energy per drive in J, as `Run.energy`.
     torque_norm : (k,) root mean square over time of the Euclidean norm of the drive torques, N m.
