@@ -469,7 +469,7 @@ export function mount(el, scene, link) {
       const told = () => handle.ariaValueText === readout.textContent || (handle.ariaValueText = readout.textContent);
       if (handle && readout) told(), (control.eye ??= new MutationObserver(told)).observe(handle, { attributes: true });
       control.onkeydown = (event) => event.isTrusted || event.stopPropagation(); // JupyterLab would take the focus
-      if (label?.textContent.includes("_")) rich(label, name);
+      readout?.isContentEditable && (readout.role = "textbox"), label?.textContent.includes("_") && rich(label, name);
     }
     for (const part of around()?.querySelectorAll("button") ?? []) {
       const sign = part.querySelector(".widget-play i")?.className.replace(/.*fa-/, "").replace("retweet", "repeat");

@@ -199,6 +199,8 @@ def named(notebook, name):
     parts = "c => ['.noUi-handle', '.widget-readout'].map(part => c.querySelector(part))"
     told = f"() => [...stage.box().querySelectorAll('.rapkm-control')].map({parts})"
     assert notebook.ask(f"() => ({told})().every(([a, b]) => a?.ariaValueText === b?.textContent)")
+    # A name belongs to a role: the number beside a slider, which can be typed, is a field.
+    assert notebook.ask(f"() => ({told})().every(([, b]) => !b || b.role === 'textbox')")
 
 
 def obeys_everywhere(notebook):
@@ -370,6 +372,16 @@ def test_nothing_plays_where_less_motion_is_asked_for(shown):
     notebook.page.emulate_media(reduced_motion="reduce")
     assert notebook.ask(seen) == 0
     notebook.page.emulate_media(reduced_motion="no-preference")
+
+
+def test_tracks_and_buttons_are_seen_where_the_system_takes_only_its_own_colours(shown):
+    notebook = shown("animation")
+    # Forced colours leave borders and no backgrounds (CSS Color Adjustment, 3.1).
+    bare = """() => [...stage.box().querySelectorAll('.noUi-base, button, select, input[type=text]')].filter(e =>
+        e.getClientRects().length && parseFloat(getComputedStyle(e).borderTopWidth) === 0).map(e => e.className)"""
+    notebook.page.emulate_media(forced_colors="active")
+    assert notebook.ask(bare) == []
+    notebook.page.emulate_media(forced_colors="none")
 
 
 def test_reloaded_page_goes_on_with_the_kernel(shown):
