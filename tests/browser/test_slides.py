@@ -25,4 +25,9 @@ def test_every_slide_fits_a_projector(browser, tmp_path, lesson):
         page.goto(file.as_uri())
         page.evaluate("document.images.length && Promise.all([...document.images].map(image => image.decode()))")
         assert page.evaluate(TALL) == [], f"{width} x {height}: slide, px too tall, px too wide"
+    # What a reader of the screen is told: the slide is what the page is about, and where it is among the others.
+    page.keyboard.press("Home")
+    page.get_by_role("button", name="Next slide").click()
+    assert page.get_by_role("main").locator("section:visible").count() == 1
+    assert page.get_by_role("status").inner_text() == f"2 / {page.evaluate('pages.length')}"
     page.close()
