@@ -8,11 +8,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from PIL import Image, ImageColor
 
 import rapkm_lite as rk
-from rapkm_lite import plotting
-from rapkm_lite.figures.style import ALARM, ARM_COLOURS, ARM_TEXT_COLOURS, PAIR_COLOURS
+from rapkm_lite import explore, plotting
+from rapkm_lite.figures.style import AFTER, ALARM, ARM_COLOURS, ARM_TEXT_COLOURS, PAIR_COLOURS
 
 # Machado, Oliveira, Fernandes 2009, severity 1: linear RGB as it is seen without one kind of cone.
 EYES = {
@@ -58,6 +59,32 @@ def test_lines_stand_out_on_white(colour):
 def test_text_of_arms_is_readable_and_of_their_colour(line, text):
     assert contrast(text) >= 4.5
     assert np.linalg.norm(lab(line, "all cones")[1:] - lab(text, "all cones")[1:]) < 20
+
+
+MADE = [n for n in explore.__all__ if getattr(explore, n).__annotations__.get("return") == "Explorer"]
+
+
+@pytest.mark.parametrize("name", sorted({*MADE} - {"explorer"}))
+def test_words_of_explorers_are_readable_on_what_they_stand_on(name):
+    picture = getattr(explore, name)().picture
+    marks = [*picture.fixed, *picture.marks]
+    discs = [(m.panel, *np.ravel(m.data), to_hex(m.style["color"])) for m in marks if m.style.get("marker") == "o"]
+    for mark in marks:
+        if mark.kind in ("label", "words"):
+            colour = to_hex(mark.style.get("color", AFTER))
+            if colour == "#ffffff":  # on a disc, at the same place
+                [colour] = {disc[-1] for disc in discs if disc[:-1] == (mark.panel, *np.ravel(mark.data))}
+            assert contrast(colour) >= 4.5, mark
+
+
+def test_words_of_the_figures_of_arms_are_readable():
+    robot = rk.load("four_arms")
+    q = rk.inverse_kinematics(robot, [0.01, 0.02])
+    drawn = [plotting.plot_joint_angles(robot, q), plotting.plot_machine(robot, q)]
+    drawn.append(plotting.plot_placement(robot, [[0.0, 0.0], [0.02, 0.0]], [1.0, 2.0]))
+    for ax in drawn:
+        assert [text for text in ax.texts if contrast(to_hex(text.get_color())) < 4.5] == []
+        plt.close(ax.figure)
 
 
 @pytest.mark.parametrize("eye", EYES)

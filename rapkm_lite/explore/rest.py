@@ -9,7 +9,7 @@ import numpy as np
 from ..control.laws import PD
 from ..figures import marks
 from ..figures.machine import plane_limits
-from ..figures.style import ALARM, NEUTRAL, arm_colour, arm_line
+from ..figures.style import ALARM, NEUTRAL, arm_colour, arm_line, arm_text_colour
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..mechanics.antagonism import steady_state_error, steady_state_torque
@@ -113,7 +113,7 @@ def three_opinions(robot: Manipulator) -> Explorer:
             far = 0.7 * np.linalg.norm(spots[:, None] - seen, axis=-1)
             room = np.hstack([far, np.abs(spots @ normal.T - level), 2 * half - 2 * np.abs(spots)]).min(axis=1)
             seen.append(spots[first_best(20 * room - far[:, i + 1])])
-            look = {"color": arm_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
+            look = {"color": arm_text_colour(i), "fontweight": "bold", "ha": "center", "va": "center"}
             picture.text("opinions", *seen[-1], f"{i + 1}", **look)
         if N == 3 and np.abs(cross(normal, np.roll(normal, 1, axis=0))).min() > 1e-9:
             corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]

@@ -234,10 +234,10 @@ function line(panel, { points }, style) {
     area(panel, SHAPES[marker].map((v, j) => path[k + (j % 2)] + r * v), { face, color, width });
 }
 
-/** Closed rings of pixels, filled and with an edge. */
-function area(panel, path, style) {
+/** Closed rings of pixels, filled and with an edge; of one colour, in the tone of lines. */
+function area(panel, path, style, { face, color } = style) {
   trace(panel.ctx, path, true);
-  Object.assign(panel.ctx, { fillStyle: panel.theme.colour(style.face, true) ?? "transparent" }).fill("evenodd");
+  Object.assign(panel.ctx, { fillStyle: panel.theme.colour(face, face !== color) ?? "transparent" }).fill("evenodd");
   stroke(panel, path, style, true);
 }
 

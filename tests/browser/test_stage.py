@@ -269,6 +269,17 @@ def test_last_place_of_a_fast_hand_wins_and_is_clamped(shown):
     assert abs(places["x"] - 20) <= 4 and abs(places["y"] - 30) <= 4
 
 
+# Contrast (WCAG 2) of the numbers of the drives, in the colour of the paper, to the discs that they are written on.
+DISCS = """() => {
+  const share = v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+  const shine = c => [0.2126, 0.7152, 0.0722].reduce((sum, w, k) => sum + w * share(c[k] / 255), 0.05);
+  const canvas = stage.root().querySelector('canvas'), scale = devicePixelRatio;
+  const paper = shine(getComputedStyle(stage.root()).backgroundColor.match(/\\d+/g));
+  return painted.get(canvas).words.filter(([words]) => /^[123]$/.test(words)).map(([, x, y]) => {
+    const disc = shine(canvas.getContext('2d').getImageData(scale * (x - 3), scale * (y + 3), 1, 1).data);
+    return Math.max(disc, paper) / Math.min(disc, paper); }); }"""
+
+
 def test_theme_leaves_no_canvas_blank_and_scale_two_is_sharp(shown):
     notebook = shown("machine", scale=2)
     assert all(
@@ -280,6 +291,7 @@ def test_theme_leaves_no_canvas_blank_and_scale_two_is_sharp(shown):
         notebook.wait(f"() => {ink} {'>' if 'Dark' in theme else '<'} 128", 20)
         # The pixels follow: the corner of a canvas is paper, the numbers beside the axes are ink.
         notebook.wait("() => Math.min(...stage.colours()) > 10", 10)
+        notebook.wait(f"() => ({DISCS})().length === 3 && Math.min(...({DISCS})()) >= 4.5", 10)
 
 
 def test_saved_shut_down_and_reopened_shows_the_picture(shown):

@@ -10,7 +10,7 @@ from ...machine.arguments import positive_number
 from ...mechanics.actuation import drive_pairs
 from ..machine import arm_points
 from ..maps import pair_line, pair_name
-from ..style import NEUTRAL, arm_colour, arm_line
+from ..style import NEUTRAL, arm_colour, arm_line, arm_text_colour
 from .plane import workspace_outline
 
 
@@ -26,7 +26,7 @@ def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -
     for i in range(robot.n_arms) if arms is None else arms:
         colour, points = arm_colour(i), chains[i]
         picture.line(panel, *points.T, color=colour, linewidth=4, solid_capstyle="round", zorder=3)
-        picture.line(panel, *points[0], color=colour, marker="o", markersize=10 + 5 * names, zorder=4)
+        picture.line(panel, *points[0], color=arm_text_colour(i), marker="o", markersize=10 + 5 * names, zorder=4)
         picture.line(panel, *points[1], color=colour, marker="o", zorder=4, **open_joint)
         if names:
             look = {"color": "white", "fontsize": 9, "fontweight": "bold", "ha": "center", "va": "center", "zorder": 5}

@@ -34,7 +34,7 @@ def plot_joint_angles(robot, q, ax=None):
         base, elbow = float(q[i]), float(q[N + i])
         at = robot.base[i] + robot.lengths[i, 0] * unit_vector(base)
         _angle(ax, robot.base[i], 0.0, base, size, f"$q^{{{i + 1}}}$", arm_text_colour(i), taken)
-        _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_colour(i), taken)
+        _angle(ax, at, base, base + elbow, size, f"$q^{{{N + i + 1}}}$", arm_text_colour(i), taken)
     return ax
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...figures._shared import scaled_frame, with_looks
 from ...figures.machine import plot_machine, plot_workspace
-from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, axes_or_new
+from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 
 
 def plot_landscape(values, cube, theory, axes=None):
@@ -59,7 +59,7 @@ def plot_placement(robot, centres, values, ax=None, label="antagonistic energy i
     for i, point in enumerate(robot.base):
         ax.plot(*point, "o", color=arm_colour(i), ms=10)
         place = {"xytext": (0, 12 if point[1] > 0 else -16), "textcoords": "offset points", "ha": "center"}
-        ax.annotate(f"drive {i + 1}", point, color=arm_colour(i), fontweight="bold", fontsize=9, **place)
+        ax.annotate(f"drive {i + 1}", point, color=arm_text_colour(i), fontweight="bold", fontsize=9, **place)
     marks = ax.scatter(*np.asarray(centres).T, c=values, marker="s", s=60, zorder=3)
     ax.figure.colorbar(marks, ax=ax, label=label)
     if path is not None:
