@@ -24,9 +24,9 @@ def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -
     chains = arm_points(robot, q)
     open_joint = {"markersize": 6.5, "markerfacecolor": "white", "markeredgewidth": 2}
     for i in range(robot.n_arms) if arms is None else arms:
-        colour, points = arm_colour(i), chains[i]
+        colour, disc, points = arm_colour(i), arm_text_colour(i) if names else arm_colour(i), chains[i]
         picture.line(panel, *points.T, color=colour, linewidth=4, solid_capstyle="round", zorder=3)
-        picture.line(panel, *points[0], color=arm_text_colour(i), marker="o", markersize=10 + 5 * names, zorder=4)
+        picture.line(panel, *points[0], color=disc, marker="o", markersize=10 + 5 * names, zorder=4)
         picture.line(panel, *points[1], color=colour, marker="o", zorder=4, **open_joint)
         if names:
             look = {"color": "white", "fontsize": 9, "fontweight": "bold", "ha": "center", "va": "center", "zorder": 5}
