@@ -190,12 +190,9 @@ def bend(lanes, drives, arms, law, table, o, w):
 @leaf
 def redundant_feedback(lanes, drives, arms, law, table, o, w):
     """w and g of (28) and (32) in all joints: w = F^+ (v - Fdot u), or F^T G (v - Fdot u) as a force in line 2."""
-    L, W = len(lanes), len(arms)
     ask(lanes, drives, arms, law, table, o, w)
     if law.form == REDUNDANT_CTC_LINE2 or law.form == REDUNDANT_APD_LINE2:
         unprojected(lanes, drives, arms, w)
-    for j in range(L):
-        w[of(PUSH_X, j, W, L)], w[of(PUSH_Y, j, W, L)] = 0.0, 0.0
     if law.form == REDUNDANT_APD or law.form == REDUNDANT_APD_LINE2:
         bend(lanes, drives, arms, law, table, o, w)
     tangent(lanes, drives, arms, w)

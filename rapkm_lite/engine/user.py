@@ -28,17 +28,6 @@ def product(out, A, B, rows, inner, columns):
             out[i, j] = s
 
 
-@leaf
-def transposed(out, A, B, rows, inner, columns):
-    """out = A^T B."""
-    for i in range(rows):
-        for j in range(columns):
-            s = 0.0
-            for k in range(inner):
-                s += A[k, i] * B[k, j]
-            out[i, j] = s
-
-
 @view
 def matrix(buffer, start, rows, columns):
     """A matrix that stands in the buffer, and where the next one starts; `reshape` would call a function in C."""
@@ -58,13 +47,12 @@ def fill(drives, arms, law, t, table, o, w, buffer):
     for i in range(6):
         buffer[p + i] = table[o + i]
     p += 6
-    for i in range(N):
-        buffer[p + i], buffer[p + N + i] = want(table, o, ANGLE, i, W), want(table, o, ELBOW, i, W)
-        buffer[p + 2 * N + i], buffer[p + 3 * N + i] = want(table, o, RATE, i, W), want(table, o, ELBOW_RATE, i, W)
-        buffer[p + 4 * N + i] = want(table, o, ACCELERATION, i, W)
-        buffer[p + 5 * N + i] = want(table, o, ELBOW_ACCELERATION, i, W)
+    for block in (ANGLE, ELBOW, RATE, ELBOW_RATE, ACCELERATION, ELBOW_ACCELERATION):
+        for i in range(N):
+            buffer[p + i] = want(table, o, block, i, W)
+        p += N
     if law.asks != NOTHING:
-        fill_matrices(drives, arms, law, table, o, w, buffer[p + 6 * N :])
+        fill_matrices(drives, arms, law, table, o, w, buffer[p:])
 
 
 @leaf
@@ -164,28 +152,28 @@ def fill_matrices(drives, arms, law, table, o, w, room):
     U, H, T = scratch[0], scratch[1], scratch[2]
     # Minimal coordinates: F^T G F, F^T (C F + G Fdot), F^T Q.
     product(H, G, F, n, n, 2)
-    transposed(G2, F, H, 2, n, 2)
+    product(G2, F.T, H, 2, n, 2)
     product(H, C_, F, n, n, 2)
     product(T, G, F_dot, n, n, 2)
     for i in range(n):
         H[i, 0], H[i, 1] = H[i, 0] + T[i, 0], H[i, 1] + T[i, 1]
-    transposed(C2, F, H, 2, n, 2)
-    transposed(Q2, F, Q_, 2, n, 1)
+    product(C2, F.T, H, 2, n, 2)
+    product(Q2, F.T, Q_, 2, n, 1)
     # Redundant coordinates with N = U U^T: U (U^T G U) U^T and so on.
     project(F, F_dot, U, T, P, P_dot, n)
     small, wide = scratch[3], scratch[4].reshape(2, n)
     product(H, G, U, n, n, 2)
-    transposed(small, U, H, 2, n, 2)
+    product(small, U.T, H, 2, n, 2)
     product(T, U, small, n, 2, 2)
     spread(Gn, T, U, n)
-    transposed(wide, H, P_dot, 2, n, n)
+    product(wide, H.T, P_dot, 2, n, n)
     product(T, C_, U, n, n, 2)
-    transposed(small, U, T, 2, n, 2)
+    product(small, U.T, T, 2, n, 2)
     for i in range(2):
         for j in range(n):
             wide[i, j] += small[i, 0] * U[j, 0] + small[i, 1] * U[j, 1]
     product(Cn, U, wide, n, 2, n)
-    transposed(small, U, Q_, 2, n, 1)
+    product(small, U.T, Q_, 2, n, 1)
     product(Qn, U, small, n, 2, 1)
     m11 = m12 = m22 = 0.0
     for i in range(N):
