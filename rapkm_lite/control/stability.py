@@ -12,7 +12,6 @@ from ..machine.arguments import (
     joint_vectors,
     real_array,
     shaped,
-    solve,
     tall_matrix,
     wide_matrix,
 )
@@ -72,7 +71,7 @@ def effective_gain(F, K) -> np.ndarray:
     K = K * np.eye(n) if K.ndim == 0 else K
     check_leading(F=F.shape[:-2], K=K.shape[:-2])
     Q, R = full_rank("F", F, "its columns are not independent; allowed: one column for each degree of freedom")
-    return solve("R", R, Q.mT @ K @ F)
+    return np.linalg.solve(R, Q.mT @ K @ F)
 
 
 def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np.ndarray:

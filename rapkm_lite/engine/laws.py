@@ -79,7 +79,7 @@ def look(lanes, drives, arms, extra, table, o, w):
                 ad, den = w[at(MAD, i, j, W, L)], w[at(MDEN, i, j, W, L)]
                 s, t = cos * den - sin * ad, cos * ad + sin * den
                 # Only those that are far: no run feels its neighbours.
-                if not (abs(s * w[at(MODEL + ELBOW_SCALE, i, j, W, L)]) <= 0.1 and t >= 0.0):
+                if w[at(NEAR, i, j, W, L)] < 0.0:
                     w[at(ELBOW_E, i, j, W, L)] = math.atan2(s, t)
 
 

@@ -15,9 +15,9 @@ from ..figures.style import AFTER, NEUTRAL
 from ..machine.manipulator import Manipulator
 from ..mechanics import actuation as act
 from ..simulation.runs import simulate
+from . import shared
 from .controls import choice, offset_sliders, slider
 from .explorer import Explorer, explorer
-from .shared import central_triangle, curves, over_time, path_slider, ready_made, size, usual_gains
 
 
 def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
@@ -31,20 +31,20 @@ def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
     return norm
 
 
-@ready_made
+@shared.ready_made
 def computed_torque(robot: Manipulator) -> Explorer:
     """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves.
 
     >>> computed_torque().numbers["largest feedback map"]
     '0.0476 N m s²/rad'
     """
-    pairs = act.drive_pairs(robot)
+    pairs, width, heavier = act.drive_pairs(robot), shared.size(robot), shared.heavier(robot)
     singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     laws = {word: partial(CTC, independent=pair) for word, pair in fixed.items()}
     laws |= {"switched pair": SwitchedCTC, "redundant coordinates": RedundantCTC}
     # Only two, whose memory the next one takes: fresh memory costs as much as the numbers.
-    path = lru_cache(maxsize=2)(partial(central_triangle, robot))
+    path = lru_cache(maxsize=2)(partial(shared.central_triangle, robot))
     coarse = lru_cache(maxsize=64)(lambda side: path(side)[::10])
 
     @lru_cache(maxsize=64)
@@ -88,8 +88,8 @@ def computed_torque(robot: Manipulator) -> Explorer:
         if largest > 0.9 * most:
             some = path(side)[::50]
             most = max(most, 1.5e3 * float(np.abs(act.inverse_dynamics(robot, some.q, some.qd, some.qdd)).max()))
-        curves(picture, "torque", run.t, torque, 50.0 * min(1.0, heavier), most=most)
-        curves(picture, "error", run.t, error, 5.0, most=100.0)
+        shared.curves(picture, "torque", run.t, torque, shared.least_torque(robot, 50.0), most=most)
+        shared.curves(picture, "error", run.t, error, 5.0, most=100.0)
         if run.switches:
             numbers["switches"] = str(run.switches)
         return numbers | {
@@ -104,22 +104,21 @@ def computed_torque(robot: Manipulator) -> Explorer:
             for line in lines:
                 picture.line("plane", *line.T, linewidth=1.0, **pair_line(robot, pair))
 
-    low, high = robot.base.min(axis=0) - [0, 0.06 * size(robot)], robot.base.max(axis=0) + [0, 0.02 * size(robot)]
+    low, high = robot.base.min(axis=0) - [0, 0.06 * width], robot.base.max(axis=0) + [0, 0.02 * width]
     reach = workspace_outline(robot)
     low, high = (f(np.vstack([end, reach]), axis=0) for f, end in ((np.nanmin, low), (np.nanmax, high)))
     plane = {"xlabel": "x in m", "ylabel": "y in m", "aspect": "equal", "legend": pair_lines(robot)}
     both = [("this law", {"color": AFTER}), ("redundant", {"color": NEUTRAL, "linestyle": "--"})]
-    heavier = usual_gains(robot)[0] / 7.05
     feedback = {"title": "Feedback", "yscale": "log", "ylim": (1e-3 * heavier, 1e2 * heavier), "legend": both}
     panels = {
         "plane": plane | {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])},
-        "map": over_time("norm in N m s²/rad", **feedback),
-        "torque": over_time("torque in mN m", robot=robot, title="Torque"),
-        "error": over_time("angle error in mrad", robot=robot, title="Error"),
+        "map": shared.over_time("norm in N m s²/rad", **feedback),
+        "torque": shared.over_time("torque in mN m", robot=robot, title="Torque"),
+        "error": shared.over_time("angle error in mrad", robot=robot, title="Error"),
     }
     controls = {
         "law": choice("law", laws),
-        "side": path_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
+        "side": shared.path_slider(robot, "side of the triangle in mm", 100, 300, 5, 170),
         "rate": slider("size of both poles in 1/s", 10, 80, 2, 40),
     } | offset_sliders(robot, (1.0, -1.0, 0.5), 10)
     layout = [["plane", "map"], ["torque", "error"]]

@@ -251,14 +251,6 @@ def having(name: str, value: Any, allowed: str, *attributes: str) -> Any:
     return value
 
 
-def solve(what: str, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution of matrix @ x = right, with a ValueError that says `what` is singular instead of LinAlgError."""
-    try:
-        return np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError:
-        raise ValueError(f"{what} is singular; allowed: a regular matrix, so another pose") from None
-
-
 def matvec(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Product of (..., i, j) and (..., j)."""
     if vector.ndim == 1:
