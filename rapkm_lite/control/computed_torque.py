@@ -31,7 +31,7 @@ from ..mechanics.actuation import (
 from ..mechanics.at import at
 from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matrix, minimal_dynamics, redundant_dynamics
 from ..mechanics.kinematics import forward_kinematics
-from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, select_independent
+from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, first_best, select_independent
 from ..mechanics.trajectory import Desired
 from .grammar import LawValue, check_asked, gain, joint_gain, measured, seen
 
@@ -156,10 +156,8 @@ class SwitchedCTC(LawValue):
         """The pairs along the poses q (k, 2N), beginning with the current one."""
         pairs, chosen = drive_pairs(model), []
         now = pairs.index((min(current), max(current))) if current else None
-        for measure in np.abs(distal_cross_products(model, q)).tolist():
-            best = 0
-            for k, value in enumerate(measure):
-                best = k if value > _TIE * measure[best] else best
+        measures = np.abs(distal_cross_products(model, q))
+        for measure, best in zip(measures.tolist(), first_best(measures).tolist(), strict=True):
             if now is None or measure[best] > _TIE * self.hysteresis * measure[now]:
                 now = best
             chosen.append(pairs[now])
