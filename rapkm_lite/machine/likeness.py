@@ -49,7 +49,8 @@ def key(value: Any) -> Any:
         value = np.ma.filled(value, 0) if masked(value) else value
         value = value if value.ndim else value[()]
     if isinstance(value, tuple | np.ndarray):
-        return _key_of_row(value)
+        some = value if len(value) <= _LOOKED_AT else (len(value), *(value[k] for k in (0, len(value) // 2, -1)))
+        return tuple(map(key, some))
     if isinstance(value, set | frozenset):
         return frozenset
     if _decides(value):
@@ -60,15 +61,6 @@ def key(value: Any) -> Any:
         except Exception:
             pass
     return type(value)  # an object may change, its hash may not
-
-
-def _key_of_row(value) -> tuple:
-    """Of tuples and of arrays, which may equal them."""
-    items = value if len(value) <= _LOOKED_AT else (len(value), *(value[k] for k in (0, len(value) // 2, -1)))
-    if isinstance(items, np.ndarray) and items.ndim == 1 and items.dtype.kind in "biuf":
-        numbers = items.astype(float).tolist()  # at a fifth of the cost
-        return tuple(math.nan if number != number else number for number in numbers)
-    return tuple(map(key, items))
 
 
 def _equal_arrays(a, b) -> bool:
