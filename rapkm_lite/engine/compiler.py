@@ -18,22 +18,9 @@ from numba.core.cpu import CPUContext
 from numba.core.typing.context import Context
 from numba.extending import models, register_model
 
-IDLE = {
-    "dump_parfor_diagnostics",
-    "find_literally",
-    "inline_closure_likes",
-    "inline_inlinables",
-    "inline_overloads",
-    "ir_legalization",
-    "literal_unroll",
-    "make_function_op_code_to_jit_function",
-    "nopython_rewrites",
-    "nopython_supported_feature_validation",
-    "Rewrite dynamic raises",
-    "with_lifting",
-}
-"""Passes over every line that look for what kernels do without.  That of legalization says where variables end, too,
-which matters to those with reference counting."""
+IDLE = {"inline_closure_likes", "inline_overloads", "ir_legalization", "nopython_rewrites"}
+"""Slow passes over every line that look for what kernels do without.  That of legalization says where variables end,
+too, which matters to those with reference counting."""
 
 
 class Operator(types.Function):
