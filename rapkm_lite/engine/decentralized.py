@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from .jit import leaf, outlined
+from .jit import outlined
 from .leaves import solve_regular
 from .rows import *
-
-
-@leaf
-def torque(w, p, P):
-    """PD (12) of one drive."""
-    return -(w[GAIN_P * P + p] * w[E * P + p] + w[GAIN_D * P + p] * w[ED * P + p])
 
 
 @outlined
 def proportional(lanes, arms, w):
     """PD (12)."""
     P = len(arms) * len(lanes)
-    if P == 4:
-        # Read before anything is written, as one vector.
-        c0, c1, c2, c3 = torque(w, 0, P), torque(w, 1, P), torque(w, 2, P), torque(w, 3, P)
-        w[C * P], w[C * P + 1], w[C * P + 2], w[C * P + 3] = c0, c1, c2, c3
-    else:
-        for p in range(P):
-            w[C * P + p] = torque(w, p, P)
+    for p in range(P):
+        w[C * P + p] = -(w[GAIN_P * P + p] * w[E * P + p] + w[GAIN_D * P + p] * w[ED * P + p])
 
 
 @outlined
