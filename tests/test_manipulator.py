@@ -223,7 +223,7 @@ def test_plain_values_and_names(tmp_path):
 def test_a_machine_prints_as_it_is_typed():
     made = {"base": [[-0.2, 0.0], [0.2, 0.0]], "lengths": 0.25, "masses": [0.1, 0.2], "mode": [1, -1]}
     robot = rk.Manipulator(**made, friction=[0.1, 0.1])
-    assert repr(robot) == ("Manipulator([[-0.2, 0.0], [0.2, 0.0]], 0.25, [0.1, 0.2], friction=0.1, mode=[1.0, -1.0])")
+    assert repr(robot) == "Manipulator([[-0.2, 0.0], [0.2, 0.0]], 0.25, [0.1, 0.2], friction=0.1, mode=[1.0, -1.0])"
     kept = {"centers": 0.1, "gravity": [0.0, -9.81], "inertias": [[1e-3, 2e-3], [1e-3, 3e-3]], "load": 1.0}
     for each in (robot, robot.replace(**kept), robot.replace(mode=-1, friction_velocity=0.1), *MACHINES.values()):
         assert eval(repr(each), {"Manipulator": rk.Manipulator}) == each
