@@ -15,13 +15,13 @@ class Tree:
 
     N, n, r : arms, joints, constraints.  lengths : (4N,) m, of the links in v.  longest : the longest link, m.
     most : (N,) m^2, l1 l2, which |a x d| = l1 l2 |sin(elbow angle)| does not exceed.
-    absolute : (2N, 2N) angles of the links against the x axis from joint angles.  spread_arms : (N, 4N),
-    spread_links : (2N, 4N), a number per arm, per link, to its entries of v.
+    absolute : (2N, 2N) angles of the links against the x axis from joint angles.  turning : (2N, 4N) their rates from
+    those of the joints, once for each entry of v.  spread_arms : (N, 4N) a number per arm, to its entries of v.
     gaps : (4N, r) and gap : (r,) m, h = v gaps + gap.
     turn : (4N, 4N) the quarter turn of all links.  tips : (4N, 4N) d tip_i / d joint, (2, 2N), the column of every
     joint.  jacobian, jacobian_dot : (4N, 2N r) tables of J and, from v times the rates of the links, of dJ/dt.
     complement : (4N, 4N) table of F from v over the levers.
-    inertia : (4N^2,) and coupling : (2N, 4N^2) kg m^2, G = inertia + cos(q) coupling.
+    inertia : (2N, 2N) and coupling : (2N, 4N^2) kg m^2, G = inertia + cos(q) coupling.
     christoffel : (2N, 4N^2) kg m^2, C = (sin(elbow of the joint's arm) qd) christoffel.
     elbow : (2N,) index of the elbow joint of each joint's arm.  weight : (4N, 2N) kg m/s^2, gravity in Q.
     friction : (2N,) f_c of every joint, N m.
@@ -46,7 +46,7 @@ class Tree:
         n = self.n
         self.absolute = np.eye(n)
         self.absolute[base, elbow] = 1.0
-        self.spread_arms, self.spread_links = np.tile(arm, 2), np.tile(np.eye(n), 2)
+        self.turning, self.spread_arms = np.tile(self.absolute, 2), np.tile(arm, 2)
         unit = np.eye(2 * n).reshape(2 * n, 2, n)
         turned = unit[:, ::-1] * np.array([[-1.0], [1.0]])
         tips = self._gathered(turned)
@@ -75,7 +75,7 @@ class Tree:
         coupling[elbow, base, elbow] = coupling[elbow, elbow, base] = P
         christoffel[elbow, base, base] = christoffel[base, base, elbow] = christoffel[elbow, base, elbow] = -P
         christoffel[base, elbow, base] = P
-        self.inertia, self.coupling = inertia.ravel(), coupling.reshape(n, -1)
+        self.inertia, self.coupling = inertia, coupling.reshape(n, -1)
         self.christoffel = christoffel.reshape(n, -1)
         moments = np.diag((robot.arm_moments / robot.lengths).T.ravel())
         gx, gy = robot.gravity

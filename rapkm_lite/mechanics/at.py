@@ -38,7 +38,7 @@ class quantity(Generic[Kept]):
         value: Any = self.function(pose)
         pose.__dict__[self.name] = value
         for array in value if type(value) is tuple else (value,):
-            array.setflags(write=False)
+            array.setflags(False)
         return value
 
 
@@ -100,8 +100,7 @@ class At(Value):
     @rate
     def _rates(self):
         """Rate of turn of every link against the x axis, once for each entry of _v, (..., 4N)."""
-        tree = self.robot.tree
-        return linear(linear(self.qd, tree.absolute), tree.spread_links)
+        return linear(self.qd, self.robot.tree.turning)
 
     @quantity
     def tip_columns(self) -> np.ndarray:
@@ -198,7 +197,7 @@ class At(Value):
     def G(self) -> np.ndarray:
         """Mass matrix of (2), (..., 2N, 2N), kg m^2; the cosine of an elbow angle couples the joints of its arm."""
         tree = self.robot.tree
-        return linear(np.cos(self.q), tree.coupling, tree.n, tree.n) + tree.inertia.reshape(tree.n, tree.n)
+        return linear(np.cos(self.q), tree.coupling, tree.n, tree.n) + tree.inertia
 
     @rate
     def C(self) -> np.ndarray:
