@@ -109,7 +109,7 @@ def machine(robot: Manipulator) -> Explorer:
     }
     layout = [["machine", *small[k::3]] for k in range(len(small[:3]))]
     widths, size = ([2.7, 1, 1], (9.6, 5.0)) if len(small) > 3 else ([2.7, 1], (8.2, 5.0))
-    scale = partial(marks.Picture.scale, panel="machine", palette=palette, label="σ_min in rad/m")
+    scale = partial(marks.Picture.scale, panel="machine", palette=palette, label="σ_min in rad/m (top class open)")
     return explorer(draw, controls, panels, layout=layout, widths=widths, size=size, setup=scale, live=True)
 
 

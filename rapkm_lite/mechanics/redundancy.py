@@ -79,8 +79,8 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     missed = np.abs(A.T @ c - wrench).max() > 1e-9 * np.abs(A * c[:, None]).max()
     if (missed or slack <= 1e-12) and peak < 1.0 - 1e-6:
         raise ValueError(
-            f"prestress = {c0.tolist()} is so far beyond limit = {limit.tolist()}, or these are so far apart, that "
-            "rounding hides the nearest torques; allowed: a prestress of their size, and limits that differ less"
+            f"prestress = {c0.tolist()} N m is so far beyond limit = {limit.tolist()} N m, or these are so far apart, "
+            "that rounding hides the nearest torques; allowed: a prestress of their size, and limits that differ less"
         )
     return np.clip(edge, -limit, limit) if missed else c
 
@@ -110,7 +110,7 @@ def _demand(A, wrench, limit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _beyond(wrench: np.ndarray, peak: float, limit: np.ndarray) -> ValueError:
     factor = f"{peak:.4g}" if peak > 1.001 else f"1 + {peak - 1.0:.2g}"
     return ValueError(
-        f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} at least; allowed: a wrench "
+        f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} N m at least; allowed: a wrench "
         "inside the force polygon of the limits"
     )
 
