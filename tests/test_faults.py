@@ -295,6 +295,31 @@ def test_a_new_fault_of_two_drives_has_its_times_checked():
         Pair(0, 2, -1.0)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Share(Fault):
+    """A drive gives a share of its torque, with its sign."""
+
+    drive: int
+    share: float
+
+    def mark(self, table, t):
+        table.alive[:, self.drive] *= self.share
+
+
+@pytest.mark.parametrize("law", [PD, InPython(PD)], ids=["engine", "python"])
+def test_a_drive_that_gives_a_share_of_its_torque_is_one_with_other_gains(law):
+    faults, share = [Share(0, -0.2), Share(2, 0.5)], np.array([-0.2, 1.0, 0.5])
+
+    def other(t, q_a, qd_a, desired):
+        return -share * (7.05 * (q_a - desired.q_a) + 0.225 * (qd_a - desired.qd_a))
+
+    for more in ([], [rk.TorqueLimit(0.03)]):
+        run = rk.simulate(ROBOT, law, PATH, OFFSET, faults=[*faults, *more])
+        expected = rk.simulate(ROBOT, other, PATH, OFFSET, faults=more)
+        assert_allclose(run.c, expected.c, rtol=0, atol=1e-10)
+        assert_allclose(run.x, expected.x, rtol=0, atol=1e-10)
+
+
 def test_the_first_samples_of_a_run_have_the_first_rows_of_every_entry_of_the_table():
     setup = prepare(ROBOT, PATH, Sensors(0.0), None, [rk.EncoderDropout(0, 0.0, 0.1)]).begin(50)
     assert {len(rows) for name, rows in setup.faults._asdict().items() if name != "limit"} == {50}
@@ -352,6 +377,7 @@ def test_a_new_fault_with_memory_begins_anew_in_every_run():
         (0, lambda table: table, r"mark returns something; allowed: to write into the table"),
         (0, lambda table: table.jump.fill(np.nan), r"writes a table that no run can have; allowed"),
         (0, lambda table: table.jump.fill(np.inf), r"writes a table that no run can have; allowed"),
+        (0, lambda table: table.alive.fill(np.nan), r"writes a table that no run can have; allowed"),
         (0, lambda table: table.jump.__setitem__((3, 1), np.inf), r"writes a table that no run can have; allowed"),
         (0, lambda table: table.limit.__setitem__(1, np.nan), r"writes a table that no run can have; allowed"),
         (0, lambda table: table.limit.fill(np.nan), r"writes a table that no run can have; allowed"),

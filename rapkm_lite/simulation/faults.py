@@ -23,7 +23,7 @@ class FaultTable(NamedTuple):
     """What is broken at each sample k.
 
     limit : (N,) largest torque, N m, infinite where there is no limit.
-    alive : (k, N) bool, False where the torque of a drive is zero.
+    alive : (k, N) what a torque is multiplied by before the limit: 1, 0 in a dead drive, -1 in one wired in reverse.
     held : (k, N) bool, True where an encoder repeats its last reading.
     jump : (k, N) what has been added to the offset so far, rad.
     """
@@ -35,7 +35,7 @@ class FaultTable(NamedTuple):
 
     def act(self, k: int, c: np.ndarray) -> np.ndarray:
         """The torques that act at sample k when the controller commands c (N,)."""
-        return np.where(self.alive[k], np.clip(c, -self.limit, self.limit), 0.0)
+        return np.clip(self.alive[k] * c, -self.limit, self.limit)
 
 
 class Fault(Value):
@@ -106,7 +106,7 @@ class DeadDrive(Fault):
         super().__post_init__()
 
     def mark(self, table, t):
-        table.alive[_from(t, self.time), self.drive] = False
+        table.alive[_from(t, self.time), self.drive] = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,7 +198,7 @@ def described(fault: Fault) -> str:
 def blank_table(t: np.ndarray, N: int) -> FaultTable:
     """The table of a healthy machine."""
     shape = len(t), N
-    return FaultTable(np.full(N, np.inf), np.ones(shape, bool), np.zeros(shape, bool), np.zeros(shape))
+    return FaultTable(np.full(N, np.inf), np.ones(shape), np.zeros(shape, bool), np.zeros(shape))
 
 
 def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
@@ -217,8 +217,9 @@ def fault_table(faults, t: np.ndarray, N: int) -> FaultTable | None:
         # A copy: what a fault remembers begins anew in every run.
         if copy.deepcopy(fault).mark(table, t) is not None:
             raise ValueError(f"{fault!r}.mark returns something; allowed: to write into the table, and to return None")
-        if not (np.all(table.limit >= 0.0) and np.all(np.isfinite(table.jump))):
-            raise ValueError(f"{fault!r} writes a table that no run can have; allowed: limits >= 0, finite jumps")
+        if not (np.all(table.limit >= 0.0) and np.all(np.isfinite(table.jump)) and np.all(np.isfinite(table.alive))):
+            allowed = "limits >= 0, finite jumps and entries of alive"
+            raise ValueError(f"{fault!r} writes a table that no run can have; allowed: {allowed}")
     return table
 
 
