@@ -265,6 +265,13 @@ def good_arguments(name: str, thing) -> dict[str, Any] | None:
     return arguments
 
 
+def new_words(name: str, thing) -> str:
+    """The arguments without a value that works."""
+    parameters = inspect.signature(thing).parameters.values()
+    new = [p.name for p in parameters if p.default is p.empty and p.name not in GOOD and (name, p.name) not in OTHER]
+    return ", ".join(new)
+
+
 def cases(module, each: int | None = None, seed: int = 0) -> Iterator[Case]:
     """The calls of a module: all, or at random `each` of every argument."""
     for name, thing in functions(module):
