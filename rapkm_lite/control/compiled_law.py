@@ -107,7 +107,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
 
     at : "desired", "measured" or "true" adds an argument: pose, rates and matrices of `rapkm_lite.at` at that pose of
         the model.
-    memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write.
+    memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write, in
+        place: ``memory += dt * e`` or ``memory[:] = ...``; what ``memory = memory + dt * e`` makes is forgotten.
     q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
     read only: Python refuses writes into them, compiled code lets them through, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
