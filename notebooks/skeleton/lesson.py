@@ -122,7 +122,7 @@ speed = safe_speed(A, limit)
 print(f"safe speed {speed:.3f} m/s")
 assert np.all(speed * turning(A) <= limit * (1 + 1e-12)) and speed < typical
 # %% [markdown]
-# ### Dig deeper: an ellipse of safe velocities (1 min)
+# ### Dig deeper: a hexagon of safe velocities (1 min)
 # %% [markdown]
 # A folded part begins with a heading that stands alone in its cell, and ends with the next heading of its level or
 # above. Whoever skips it misses nothing that the core needs. Here: with all drives at most as fast as the limit, the
