@@ -177,11 +177,11 @@ class Picture:
             if value is not None or name == "x":
                 numbers(name, value, *shape)
         for name, values in controls.items():
-            numbers(name, values, -1)
-            if along is None and len(values) not in (2, 3):
+            shape = numbers(name, values, most=1).shape
+            if along is None and shape not in ((2,), (3,)):
                 raise ValueError(f"{name} = {values!r}; allowed: (a, b) or (a, b, c), with value = a x + b y + c")
-            if along is not None and len(values) != len(along):
-                raise ValueError(f"{name} has {len(values)} values for {len(along)} points; allowed: one for each")
+            if along is not None and shape != (len(along),):
+                raise ValueError(f"{name} has shape {shape} for {len(along)} points; allowed: one number for each")
         self.handles.append({"panel": panel, "at": (x, y), "set": controls, "along": along, "grip": grip})
 
     def limits(self, panel: str, x=None, y=None) -> None:
