@@ -1,7 +1,10 @@
 """The pages say what is so: their code runs, their links lead somewhere, the drawing is that of the imports."""
 
+import builtins
+import doctest
 import json
 import re
+import symtable
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -92,6 +95,25 @@ PUBLIC = {
 @pytest.mark.parametrize("name", PUBLIC)
 def test_help_shows_an_example(name):
     assert ">>> " in (PUBLIC[name].__doc__ or "")
+
+
+def scopes(table):
+    """A table of names and those of the functions and classes in it."""
+    yield table
+    for inner in table.get_children():
+        yield from scopes(inner)
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLIC if name.startswith("rk.")])
+def test_an_example_imports_all_that_it_names(name):
+    """So that it runs where a reader types it: pytest lends it all names of its module."""
+    code = "".join(example.source for example in doctest.DocTestParser().get_examples(PUBLIC[name].__doc__))
+    top = symtable.symtable(code, name, "exec")
+    made = {s.get_name() for s in top.get_symbols() if s.is_assigned() or s.is_imported()}
+    used = {
+        s.get_name() for t in scopes(top) for s in t.get_symbols() if s.is_referenced() and (t is top or s.is_global())
+    }
+    assert used - made - set(dir(builtins)) == set()
 
 
 @pytest.mark.parametrize(

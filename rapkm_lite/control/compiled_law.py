@@ -21,7 +21,8 @@ class CompiledLaw(LawValue):
 
     Where Numba is installed the loop calls it compiled, elsewhere as it is.
 
-    >>> CompiledLaw(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory
+    >>> import rapkm_lite as rk
+    >>> rk.CompiledLaw(lambda t, q_a, qd_a, d: -7.0 * (q_a - d.q_a)).memory
     0
     """
 

@@ -47,7 +47,7 @@ class APD(LawValue):
     independent : two 0-based joint indices, or None for the end-effector position.  W : see `weighted_pseudoinverse`.
     Where `independent` or A is singular `torque` raises ValueError, and a run SimulationError.  For pose see `Law`.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
     >>> law = rk.APD(K_P=7.0, K_D=0.2, independent=(0, 1))
     >>> c = law.torque(robot, d.q, d.qd, d.q_a, d.qd_a, d)
     >>> np.allclose(c, rk.inverse_dynamics(robot, d.q, d.qd, d.qdd))
@@ -242,7 +242,7 @@ class RedundantCTC(RedundantAPD):
     Line 1 leads to G~ (edd + K_D ed + K_P e) = 0, which the chapter splits into (33) and (34); in independent
     coordinates that is (35), corrected: see `effective_gain`.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); path = rk.circle(robot, 0.05, 0.1); d = path[50]
     >>> c = rk.RedundantCTC(K_P=400, K_D=40).torque(robot, d.q, d.qd, d.q_a, d.qd_a, d)
     >>> np.allclose(c, rk.inverse_dynamics(robot, d.q, d.qd, d.qdd))
     True

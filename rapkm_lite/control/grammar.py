@@ -45,7 +45,7 @@ class Law:
 
     A law of your own gives `torque`, or `start` and `step` when it remembers something (neither: NotImplementedError):
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> class Push(rk.Law):
     ...     def step(self, memory, sample):
     ...         return np.array([0.01, 0.0, 0.0]), memory

@@ -32,7 +32,8 @@ class PD(LawValue):
     K_P in N m/rad, K_D in N m s/rad: one number, one per drive (N,), or a positive definite (N, N).
     Raises ValueError when a gain is not positive.
 
-    >>> PD(7.05, 0.225)
+    >>> import rapkm_lite as rk
+    >>> rk.PD(7.05, 0.225)
     PD(K_P=7.05, K_D=0.225)
     """
 
@@ -72,7 +73,8 @@ class PID(LawValue):
     Its memory is the integral (N,) in N m.
     Raises ValueError when a gain or the limit is out of range.
 
-    >>> PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
+    >>> import rapkm_lite as rk
+    >>> rk.PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
     PID(K_P=7.05, K_I=20.0, K_D=0.225, limit=0.1)
     """
 
@@ -128,7 +130,8 @@ class AntagonismFilter(LawValue):
     Where there is no R, at input singularities and where an arm is stretched or folded, `torque` raises ValueError, and
     a run ends with SimulationError.
 
-    >>> AntagonismFilter(PD(7.05, 0.225))
+    >>> import rapkm_lite as rk
+    >>> rk.AntagonismFilter(rk.PD(7.05, 0.225))
     AntagonismFilter(PD(K_P=7.05, K_D=0.225), pose='measured')
     """
 

@@ -136,7 +136,7 @@ class Controller:
 
     >>> import rapkm_lite as rk
     >>> robot = rk.load()
-    >>> path, controller = rk.hold(robot, [0.0, 0.0]), Controller(rk.PD(7.0, 0.2), robot)
+    >>> path, controller = rk.hold(robot, [0.0, 0.0]), rk.Controller(rk.PD(7.0, 0.2), robot)
     >>> controller(0.0, path.q_a[0] + 0.01, path.qd_a[0], path[0]).round(6)
     array([-0.07, -0.07, -0.07])
     """

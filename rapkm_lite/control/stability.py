@@ -31,7 +31,7 @@ def closed_loop_projector(A_tilde, delta: int = 2) -> np.ndarray:
     A_tilde : (..., m, n), of any mechanism.  delta : its rank; 2 for the machines of `Manipulator`.
     Raises ValueError at input singularities, and where `delta` is not the rank.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> D = rk.closed_loop_projector(rk.redundant_control_matrix(robot, q))
     >>> np.allclose(D, rk.nullspace_projector(robot, q))
     True
@@ -60,7 +60,7 @@ def effective_gain(F, K) -> np.ndarray:
     F : (..., n, delta).  K : one number, or a matrix (..., n, n), which may be singular (drives only: diag(k, 0)).
     Raises ValueError where F has lost rank.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> np.allclose(rk.effective_gain(rk.orthogonal_complement(robot, q), 400.0), 400.0 * np.eye(2))
     True
     """
@@ -83,7 +83,7 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that a small eps makes the tracking exponential is
     what the chapter states.  Raises ValueError at c-space singularities and for open loops.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))
     0.0021
     """

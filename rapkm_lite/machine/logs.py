@@ -174,7 +174,8 @@ def mystery_run(name: str) -> Log:
     drive has another K_P.  Made by ``notebooks/build.py mystery``.
     Raises ValueError for another name.
 
-    >>> mystery_run("offset_a")
+    >>> import rapkm_lite as rk
+    >>> rk.mystery_run("offset_a")
     Log('offset_a', 901 records, 9 s, 3 drives)
     """
     one_of("name", name, ("offset_a", "offset_b", "offset_c", "gain"))

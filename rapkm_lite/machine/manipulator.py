@@ -49,7 +49,7 @@ class Manipulator(Value):
 
     Raises ValueError naming the argument, its value and what is allowed; also when the arms cannot meet.
 
-    >>> robot = Manipulator(base=[[-0.2, 0], [0.2, 0]], lengths=0.25, masses=0.1)
+    >>> import rapkm_lite as rk; robot = rk.Manipulator(base=[[-0.2, 0], [0.2, 0]], lengths=0.25, masses=0.1)
     >>> robot.n_arms, robot.n_joints, robot.n_constraints
     (2, 4, 2)
     """
@@ -171,8 +171,8 @@ class Manipulator(Value):
         The load goes to the second arm that is kept.
         Raises ValueError for fewer than two arms, a repeated or an unknown one.
 
-        >>> from rapkm_lite import load
-        >>> print(load().with_arms((0, 2)))
+        >>> import rapkm_lite as rk
+        >>> print(rk.load().with_arms((0, 2)))
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
         arms = list(joint_indices("arms", arms, self.n_arms, None, "arm"))
@@ -268,7 +268,7 @@ def load(source: str | Path = "testbed") -> Manipulator:
 
     Raises ValueError for an unknown key, a missing value, a wrong unit or a value out of range.
 
-    >>> print(load())
+    >>> import rapkm_lite as rk; print(rk.load())
     Manipulator('testbed': 3 arms, links 0.2 m, working mode +++)
     """
     tables = read_toml(source)

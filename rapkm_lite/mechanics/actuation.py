@@ -173,7 +173,7 @@ def prestress_projector(A, W=None) -> np.ndarray:
 
     W and errors: see `weighted_pseudoinverse`.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> int(np.linalg.matrix_rank(rk.prestress_projector(rk.control_matrix(robot, q))))
     1
     """

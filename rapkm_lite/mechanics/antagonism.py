@@ -45,7 +45,7 @@ def command_filter(A, K) -> np.ndarray:
     -K R_{A^T K} e has the end-effector force of the filtered -R K e; the same torques in general only for K = k_P I.
     Raises ValueError at input singularities, and for gains that are not positive definite or too far apart.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.control_matrix(robot, q)
     >>> np.allclose(rk.command_filter(A, 7.05), rk.antagonism_filter(A))
     True
@@ -68,7 +68,8 @@ def null_basis(A) -> np.ndarray:
     poses where a reference drops out of the null space.
     Raises ValueError at input singularities, and where a reference drops out exactly.
 
-    >>> null_basis([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])[:, 0]
+    >>> import rapkm_lite as rk
+    >>> rk.null_basis([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])[:, 0]
     array([0., 0., 1.])
     """
     A = tall_matrix("A", A)

@@ -257,9 +257,9 @@ def at(robot: Manipulator, q, qd=None) -> At:
     `forward_dynamics`, `inverse_dynamics` and `required_wrench`, which are about motions.
     Raises ValueError when q or qd is not finite, has another last axis, or leading axes do not fit together.
 
-    >>> from rapkm_lite import load, inverse_kinematics
-    >>> robot = load()
-    >>> pose = at(robot, inverse_kinematics(robot, [0.02, 0.05]))
+    >>> import rapkm_lite as rk
+    >>> robot = rk.load()
+    >>> pose = rk.at(robot, rk.inverse_kinematics(robot, [0.02, 0.05]))
     >>> bool(abs(pose.J @ pose.F).max() < 1e-15), pose.A_tilde.shape
     (True, (3, 6))
     """

@@ -16,7 +16,7 @@ from .at import at
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:
     """Generalized mass matrix G(q) of (2), (..., 2N, 2N) in kg m^2; the cut tree couples only the joints of one arm.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> bool(np.all(np.linalg.eigvalsh(rk.mass_matrix(robot, q)) > 0.0))
     True
     """
@@ -26,7 +26,7 @@ def mass_matrix(robot: Manipulator, q) -> np.ndarray:
 def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
     """C(q, qd) of (2) from the Christoffel symbols, (..., 2N, 2N) in N m s; dG/dt - 2 C is skew-symmetric.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> C = rk.coriolis_matrix(robot, q, 0.1 * q)
     >>> np.allclose(C, 0.1 * rk.coriolis_matrix(robot, q, q))
     True
@@ -122,7 +122,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
     (21) partitions it into the rows of passive and driven joints; the latter are `redundant_control_matrix`.
     Raises ValueError at c-space singularities and for open loops.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> N = rk.nullspace_projector(robot, q)
     >>> np.allclose(N @ N, N), int(N.trace().round())
     (True, 2)
@@ -135,7 +135,7 @@ def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
 
     Raises ValueError at c-space singularities and for open loops.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> N, N_dot = rk.nullspace_projector(robot, q), rk.nullspace_projector_dot(robot, q, q)
     >>> np.allclose(N @ N_dot + N_dot @ N, N_dot)
     True
@@ -150,7 +150,7 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
     G~ = N_J G N_J, C~ = N_J (C N_J + G Ndot_J), both (..., 2N, 2N); Q~ = N_J Q, (..., 2N).
     Raises ValueError at c-space singularities and for open loops.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> G, C, Q = rk.redundant_dynamics(robot, q, q)
     >>> np.allclose(rk.nullspace_projector(robot, q) @ G, G)
     True
@@ -188,7 +188,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
 def kinetic_energy(robot: Manipulator, q, qd) -> np.ndarray:
     """qd^T G qd / 2, (...,) in J.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> np.allclose(rk.kinetic_energy(robot, q, q), q @ rk.mass_matrix(robot, q) @ q / 2)
     True
     """

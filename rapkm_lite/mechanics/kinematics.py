@@ -37,7 +37,7 @@ def unit_vector(angle: ArrayLike) -> np.ndarray:
 def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
     """Proximal vectors a_i and distal vectors d_i of all arms, each (..., N, 2) in m.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> a, d = rk.arm_vectors(robot, q)
     >>> np.allclose(robot.base + a + d, [0.02, 0.05])
     True
@@ -49,7 +49,7 @@ def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
 def tips(robot: Manipulator, q) -> np.ndarray:
     """Tips of the N arms of the cut tree, (..., N, 2) in m; where the loops are open, they differ.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> np.allclose(rk.tips(robot, q), [0.02, 0.05])
     True
     """
@@ -72,9 +72,9 @@ def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
 def loop_constraints(robot: Manipulator, q) -> np.ndarray:
     """h(q) of the first line of (1), (..., 2(N-1)) in m: (tip_1 - tip_2, tip_3 - tip_2, ..., tip_N - tip_2).
 
-    >>> from rapkm_lite import load, inverse_kinematics
-    >>> robot = load()
-    >>> bool(np.abs(loop_constraints(robot, inverse_kinematics(robot, [0.02, 0.05]))).max() < 1e-15)
+    >>> import numpy as np, rapkm_lite as rk
+    >>> robot = rk.load()
+    >>> bool(np.abs(rk.loop_constraints(robot, rk.inverse_kinematics(robot, [0.02, 0.05]))).max() < 1e-15)
     True
     """
     return linear(at(robot, q)._v, robot.tree.gaps) + robot.tree.gap
@@ -99,7 +99,7 @@ def constraint_jacobian(robot: Manipulator, q) -> np.ndarray:
 def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
     """dJ/dt along qd, (..., 2(N-1), 2N) in m/(rad s), so that d2h/dt2 = J qdd + Jdot qd.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> J_dot = rk.constraint_jacobian_dot(robot, q, q)
     >>> np.allclose(rk.constraint_jacobian_dot(robot, q, 2 * q), 2 * J_dot)
     True
@@ -152,8 +152,8 @@ def inverse_kinematics(robot: Manipulator, x, mode=None) -> np.ndarray:
     mode : (..., N) signs of the elbow angles; default ``robot.mode``.
     Raises ValueError naming the point, the arm and its reach when the point lies outside the workspace.
 
-    >>> from rapkm_lite import load
-    >>> inverse_kinematics(load(), [0.0, 0.0]).round(4)
+    >>> import rapkm_lite as rk
+    >>> rk.inverse_kinematics(rk.load(), [0.0, 0.0]).round(4)
     array([-0.4317,  1.6627, -2.5261,  1.9106,  1.9106,  1.9106])
     """
     manipulator(robot)

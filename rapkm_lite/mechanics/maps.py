@@ -20,7 +20,7 @@ from .partition import PARTITION_RULES, first_best
 def sampling_box(robot: Manipulator) -> tuple[float, float, float, float]:
     """The rectangle (x_min, x_max, y_min, y_max) in m inside which all points lie that every arm can reach.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> np.round(rk.sampling_box(rk.load()), 3)
     array([-0.2  ,  0.2  , -0.169,  0.285])
     """
@@ -70,8 +70,8 @@ def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: 
         then the parameterization singularities of the pair.
     Raises ValueError for an unknown measure, pair, mode or box, and for a prestress of two arms or of a pair.
 
-    >>> from rapkm_lite import load, working_modes
-    >>> x, y, sigma = actuation_map(load(), mode=working_modes(load()), n=20)
+    >>> import rapkm_lite as rk
+    >>> x, y, sigma = rk.actuation_map(rk.load(), mode=rk.working_modes(rk.load()), n=20)
     >>> sigma.shape
     (8, 20, 20)
     """
@@ -97,7 +97,7 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
     mode, n, box : see `actuation_map`.  Raises ValueError for another rule, mode or box; no error for points out of
         reach, which are masked, nor for two arms, whose one pair is always the best.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> x, y, pair = rk.switching_map(rk.load(), n=20)
     >>> np.unique(pair.compressed())
     array([0, 1, 2])

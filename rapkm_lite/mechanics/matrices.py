@@ -21,7 +21,8 @@ def complement(J, independent) -> np.ndarray:
     independent : the n - r indices of q2, 0-based; the columns of F follow them, the rows the order of q.
     Raises ValueError where J1, the other columns of J, is singular.
 
-    >>> complement([[1.0, 1.0, 0.0]], independent=(1, 2))
+    >>> import rapkm_lite as rk
+    >>> rk.complement([[1.0, 1.0, 0.0]], independent=(1, 2))
     array([[-1., -0.],
            [ 1.,  0.],
            [ 0.,  1.]])
@@ -36,7 +37,8 @@ def complement_dot(J, J_dot, independent) -> np.ndarray:
 
     J_dot : (..., r, n), dJ/dt.  Raises ValueError where J1 is singular.
 
-    >>> complement_dot([[1.0, 1.0, 0.0]], [[0.0, 2.0, 0.0]], independent=(1, 2))
+    >>> import rapkm_lite as rk
+    >>> rk.complement_dot([[1.0, 1.0, 0.0]], [[0.0, 2.0, 0.0]], independent=(1, 2))
     array([[-2., -0.],
            [ 0.,  0.],
            [ 0.,  0.]])
@@ -51,7 +53,8 @@ def projector(J) -> np.ndarray:
     Where the joints have different units, so have its entries, and feedback through it depends on their choice.
     Raises ValueError where J lacks full rank.
 
-    >>> projector([[1.0, 0.0, 0.0]]) @ [1.0, 2.0, 3.0]
+    >>> import rapkm_lite as rk
+    >>> rk.projector([[1.0, 0.0, 0.0]]) @ [1.0, 2.0, 3.0]
     array([0., 2., 3.])
     """
     return cores.projector(*_row_space(_jacobian(J)))
@@ -62,7 +65,8 @@ def projector_dot(J, J_dot) -> np.ndarray:
 
     J_dot : (..., r, n), dJ/dt.  Raises ValueError where J lacks full rank.
 
-    >>> float(projector_dot([[1.0, 0.0]], [[0.0, 2.0]])[0, 1])
+    >>> import rapkm_lite as rk
+    >>> float(rk.projector_dot([[1.0, 0.0]], [[0.0, 2.0]])[0, 1])
     -2.0
     """
     J, J_dot = _jacobians(J, J_dot)
@@ -75,7 +79,8 @@ def minimal_terms(F, F_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
     Raises ValueError where F and F_dot differ in shape, or G, C (..., n, n), Q (..., n) are of another n.
 
-    >>> Gbar, Cbar, Qbar = minimal_terms([[1.0], [2.0]], [[0.0], [0.0]], np.eye(2), np.zeros((2, 2)), [0.0, 1.0])
+    >>> import numpy as np, rapkm_lite as rk
+    >>> Gbar, Cbar, Qbar = rk.minimal_terms([[1.0], [2.0]], [[0.0], [0.0]], np.eye(2), np.zeros((2, 2)), [0.0, 1.0])
     >>> Gbar, Qbar
     (array([[5.]]), array([2.]))
     """
@@ -90,8 +95,9 @@ def redundant_terms(N, N_dot, G, C, Q) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
     Raises ValueError unless N and N_dot are square and of one shape, or where G, C, Q are of another n.
 
-    >>> N = projector([[1.0, 0.0]])
-    >>> redundant_terms(N, 0 * N, np.eye(2), np.zeros((2, 2)), [1.0, 1.0])[2]
+    >>> import numpy as np, rapkm_lite as rk
+    >>> N = rk.projector([[1.0, 0.0]])
+    >>> rk.redundant_terms(N, 0 * N, np.eye(2), np.zeros((2, 2)), [1.0, 1.0])[2]
     array([0., 1.])
     """
     N, N_dot = real_array("N", N), real_array("N_dot", N_dot)

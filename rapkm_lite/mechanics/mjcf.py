@@ -27,8 +27,8 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     micrometre at 5 ms, and some fifty times that on a circle of 0.1 m in 1 s.
     Raises ValueError for values out of range, point masses, a q with open loops, and where the default finds no place.
 
-    >>> from rapkm_lite import load
-    >>> to_mjcf(load()).count("<motor")
+    >>> import rapkm_lite as rk
+    >>> rk.to_mjcf(rk.load()).count("<motor")
     3
     """
     from xml.sax.saxutils import quoteattr  # only when needed: it brings a tenth of what the package imports

@@ -23,7 +23,7 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     A_tilde : (..., m, n).  rows : the delta row indices of A~_1, (delta,) or (..., delta), with delta the rank of A~,
     which is 2 for every `Manipulator`.  Raises ValueError where A~_1 has lost rank, or fewer rows than the rank of A~.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> A = rk.redundant_control_matrix(robot, q)
     >>> np.allclose(rk.explicit_pseudoinverse(A, (0, 1)), np.linalg.pinv(A.T))
     True

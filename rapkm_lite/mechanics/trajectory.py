@@ -163,7 +163,7 @@ def follow(robot: Manipulator, t, x, xd, xdd) -> Trajectory:
     step), and where x steps otherwise than xd says, by a tenth of the largest step, or xd otherwise than xdd, by half,
     at more than two samples and 5 % of them; xdd may be all 0.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> t = np.linspace(0.0, 1.0, 101)
     >>> rk.follow(rk.load(), t, np.stack([0.05 * t, 0 * t], -1), [[0.05, 0.0]] * 101, np.zeros((101, 2)))
     Trajectory(101 samples, 1 s, 'testbed')
@@ -226,8 +226,8 @@ def triangle(
     side in m; centre (2,) in m; angle turns the triangle about its centre, rad.
     duration, dt, rest in s, and errors: see `polygon`.
 
-    >>> from rapkm_lite import load
-    >>> triangle(load())
+    >>> import rapkm_lite as rk
+    >>> rk.triangle(rk.load())
     Trajectory(5001 samples, 5 s, 'testbed')
     """
     side, angle = positive_number("side", side), float(exact_array("angle", angle))

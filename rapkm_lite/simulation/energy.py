@@ -30,7 +30,7 @@ def copper_loss(robot, c, dt) -> np.ndarray:
 
     Raises ValueError for a single row (N,), for another number of drives, and unless dt is above 0.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> rk.copper_loss(rk.load(), np.full((1000, 3), 0.0259), dt=1e-3).round(3)
     array([0.611, 0.611, 0.611])
     """
@@ -45,7 +45,7 @@ def mechanical_work(run) -> np.ndarray:
     Without friction it sums over the drives to the energy that the machine has gained: to zero in a horizontal plane on
     a closed path from rest to rest.  Raises ValueError for what is no run, such as a `Log`.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()))
     >>> np.allclose(run.energy, rk.copper_loss(run.robot, run.c[:-1], run.dt) + rk.mechanical_work(run))
     True
@@ -64,7 +64,7 @@ def antagonistic_torque(run) -> np.ndarray:
 
     Raises ValueError where a sample is an input singularity, and for what has no true pose, such as a `Log`.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), [4e-3, 0.0, 0.0])
     >>> np.allclose(rk.antagonistic_torque(run)[-1], run.c[-1], atol=1e-3)
     True
@@ -97,7 +97,7 @@ def antagonism_form(robot: Manipulator, trajectory: Trajectory, K_P) -> np.ndarr
     K_P : number, (N,) or (N, N), N m/rad.  Raises ValueError at input singularities, where the path
     leaves the workspace of `robot`, and for another number of arms.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> S = rk.antagonism_form(rk.load(), rk.triangle(rk.load()), 7.05)
     >>> float(np.round([4e-3, -2e-3, 5e-3] @ S @ [4e-3, -2e-3, 5e-3], 2))
     3.58

@@ -69,7 +69,8 @@ class TorqueLimit(Fault):
 
     Raises ValueError for a negative limit, and in a run for another number of drives.
 
-    >>> TorqueLimit(0.3)
+    >>> import rapkm_lite as rk
+    >>> rk.TorqueLimit(0.3)
     TorqueLimit(0.3)
     """
 

@@ -21,7 +21,8 @@ class Sensors(Value):
         the way to the new difference; None for the true rates.
     Raises ValueError for values out of range.
 
-    >>> Sensors(encoder=2000)
+    >>> import rapkm_lite as rk
+    >>> rk.Sensors(encoder=2000)
     Sensors(encoder=2000)
     """
 

@@ -39,7 +39,7 @@ class Sweep(Value):
         broken.
     stopped : (k,) in a few words what stopped each run, None where nothing did; `reasons` says why.
 
-    >>> import rapkm_lite as rk
+    >>> import numpy as np, rapkm_lite as rk
     >>> study = rk.sweep(rk.load(), rk.PD(7.05, 0.225), rk.hold(rk.load(), [0.0, 0.0]), 1e-3 * np.eye(3))
     >>> len(study), study.energies.shape, int(study.failed.sum())
     (3, (3, 3), 0)
