@@ -508,6 +508,40 @@ def test_arguments_are_counted_before_the_run():
         rk.simulate(ROBOT, rk.compiled(pid.function, at="true", memory=2), PATH)
 
 
+def added(t, q_a, qd_a, d, memory):
+    memory = memory + 1e-3 * (q_a - d.q_a)
+    return -7.0 * (q_a - d.q_a) - 5.0 * memory
+
+
+def chosen(t, q_a, qd_a, d, kept):
+    e = q_a - d.q_a
+    if t > 0.5:
+        e, kept = 2.0 * e, kept * 0.5
+    return -7.0 * e - 5.0 * kept
+
+
+def written(t, q_a, qd_a, d, memory):
+    rows, e = memory.reshape(3, 1), q_a - d.q_a
+    e -= 1e-6
+    memory *= 0.99
+    memory[0] += 1e-3 * e[0]
+    rows[1:, 0] = memory[1:] + 1e-3 * e[1:]
+    return -7.0 * e - 5.0 * memory
+
+
+@pytest.mark.parametrize(("law", "name"), [(added, "memory"), (chosen, "kept"), (written, None)])
+def test_a_memory_that_would_be_forgotten_is_refused(law, name):
+    compiled = rk.compiled(law, memory=3)
+    if name is None:  # only written in place: kept from sample to sample, as in Python
+        assert_allclose(
+            rk.simulate(ROBOT, compiled, PATH).c, rk.simulate(ROBOT, InPython(compiled), PATH).c, atol=1e-12
+        )
+        return
+    for run in (rk.simulate, rk.sweep):
+        with pytest.raises(ValueError, match=rf"memory=3\) gives {name} a new value, .* allowed: .*{name} \+= \.\.\."):
+            run(ROBOT, compiled, PATH, np.zeros((1, 3)) if run is rk.sweep else 0.0)
+
+
 FIRST = {
     "too short": (lambda t, q_a, qd_a, d: -q_a[:2], r"law returned the shape \(2,\); allowed: \(3,\)"),
     "too long": (lambda t, q_a, qd_a, d: np.zeros(4), r"law returned the shape \(4,\); allowed: \(3,\)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 import importlib
 import operator
 import sys
@@ -63,9 +64,14 @@ class CompiledLaw(LawValue):
         return CompiledLaw, (self.function, self.at, self.memory)
 
     def check(self) -> None:
-        """Raise ValueError when the function does not take what a run gives it."""
-        more = ["at"] * (self.at is not None) + ["memory"] * (self.memory > 0)
-        callable_with(repr(self), self.function, "t", "q_a", "qd_a", "d", *more)
+        """Raise ValueError when the function does not take what a run gives it, or forgets its memory."""
+        given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
+        callable_with(repr(self), self.function, *given)
+        if self.memory and (name := _replaced(self.function, len(given) - 1)):
+            raise ValueError(
+                f"{self!r} gives {name} a new value, which the next sample would not see; allowed: to write into it, "
+                f"{name} += ... or {name}[:] = ..., and another name for what is made of it"
+            )
 
     def step(self, memory, sample):
         check_asked(type(self), CompiledLaw)
@@ -89,6 +95,21 @@ def _function(module: str, name: str):
     return found.function if isinstance(found, CompiledLaw) else found
 
 
+def _replaced(function, place: int) -> str | None:
+    """The name of a function's argument where its body gives it another value than one changed in place."""
+    code = getattr(function, "__code__", None)  # none of an object with a __call__
+    if code is None or place >= code.co_argcount:
+        return None
+    name, before = code.co_varnames[place], ""
+    for instruction in dis.get_instructions(code):
+        stored = instruction.argval if isinstance(instruction.argval, tuple) else (instruction.argval,)
+        stored = stored[:1] if instruction.opname == "STORE_FAST_LOAD_FAST" else stored
+        if instruction.opname.startswith("STORE_") and name in stored and not before.endswith("="):
+            return name
+        before = instruction.argrepr if instruction.opname == "BINARY_OP" else ""
+    return None
+
+
 def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
     return CompiledLaw(_function(module, name), at, memory)
 
@@ -109,7 +130,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     at : "desired", "measured" or "true" adds an argument: pose, rates and matrices of `rapkm_lite.at` at that pose of
         the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write, in
-        place: ``memory += dt * e`` or ``memory[:] = ...``; what ``memory = memory + dt * e`` makes is forgotten.
+        place: ``memory += dt * e`` or ``memory[:] = ...``.  A run refuses ``memory = ...``, which the next sample would
+        not see.
     q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
     read only: Python refuses writes into them, compiled code lets them through, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but constants, such as
