@@ -26,7 +26,7 @@ def slider(label: str, low: float, high: float, step: float, value: float) -> wi
 
     Raises ValueError unless low < high, low <= value <= high and step > 0.
 
-    >>> slider("offset in mrad", -10, 10, 1, 4).value
+    >>> from rapkm_lite import explore; explore.slider("offset in mrad", -10, 10, 1, 4).value
     4
     """
     _within(low, high, value)
@@ -44,7 +44,7 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
 
     Raises ValueError unless 0 < low < high, low <= value <= high and steps >= 1.
 
-    >>> round(log_slider("K_P in N m/rad", 0.1, 100.0, 7.05).value, 2)
+    >>> from rapkm_lite import explore; round(explore.log_slider("K_P in N m/rad", 0.1, 100.0, 7.05).value, 2)
     7.05
     """
     positive_number("low", low)
@@ -59,7 +59,7 @@ def log_slider(label: str, low: float, high: float, value: float, steps: int = 4
 def choice(label: str, options, value=None) -> widgets.Widget:
     """A drop-down list of words, or of (word, value) pairs; ValueError for a `value` that is no option.
 
-    >>> choice("drive", ["1", "2", "3"]).value
+    >>> from rapkm_lite import explore; explore.choice("drive", ["1", "2", "3"]).value
     '1'
     """
     if isinstance(options, str | bytes) or not isinstance(options, Collection) or len(options) == 0:
@@ -74,7 +74,7 @@ def choice(label: str, options, value=None) -> widgets.Widget:
 def switch(label: str, value: bool = False) -> widgets.Widget:
     """A box to tick.
 
-    >>> switch("filter").value
+    >>> from rapkm_lite import explore; explore.switch("filter").value
     False
     """
     return widgets.Checkbox(truth("value", value), description=label, indent=False, **_COMMON)
@@ -85,8 +85,8 @@ def offset_sliders(robot: Manipulator, values, limit: int = 20) -> dict:
 
     Raises ValueError for values beyond +-`limit`.
 
-    >>> import rapkm_lite as rk
-    >>> sorted(offset_sliders(rk.load(), [4, -2, 5]))
+    >>> import rapkm_lite as rk; from rapkm_lite import explore
+    >>> sorted(explore.offset_sliders(rk.load(), [4, -2, 5]))
     ['offset_1', 'offset_2', 'offset_3']
     """
     values, most = real_array("values", values), positive_number("limit", limit)

@@ -37,7 +37,7 @@ MAP = marks.Palette(
 def machine(robot: Manipulator) -> Explorer:
     """The end-effector by hand in every working mode, a map of sigma_min, and the five-bars of up to six pairs.
 
-    >>> machine().numbers["degree of actuation"]
+    >>> from rapkm_lite import explore; explore.machine().numbers["degree of actuation"]
     '2 of 2 (redundantly actuated)'
     """
     # A goes with one over the lengths.
@@ -117,7 +117,7 @@ def machine(robot: Manipulator) -> Explorer:
 def actuation(robot: Manipulator) -> Explorer:
     """A walk along the path: sigma_min of each pair, the null vector of A^T, and the forces the drives can produce.
 
-    >>> actuation().numbers["σ_min of all drives"]
+    >>> from rapkm_lite import explore; explore.actuation().numbers["σ_min of all drives"]
     '4.62 rad/m'
     """
     pairs, digits = act.drive_pairs(robot), shared.decimals(shared.size(robot))
@@ -195,7 +195,7 @@ def actuation(robot: Manipulator) -> Explorer:
 def prestress(robot: Manipulator) -> Explorer:
     """Prestress along the path: torques with and without it, and the changes of sign that let backlash act.
 
-    >>> prestress().set(level=0).numbers["largest prestress"]
+    >>> from rapkm_lite import explore; explore.prestress().set(level=0).numbers["largest prestress"]
     '0 mN m'
     """
     strong = shared.torque_scale(robot)

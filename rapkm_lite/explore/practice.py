@@ -36,7 +36,7 @@ OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, k
 def imperfections(robot: Manipulator) -> Explorer:
     """Distance from the wanted place and torques that act (dotted: limits), with links too long and one fault.
 
-    >>> imperfections().set(longer=0).numbers["largest torque"]
+    >>> from rapkm_lite import explore; explore.imperfections().set(longer=0).numbers["largest torque"]
     '59 of 150 mN m'
     """
     path = shared.fitting_triangle(robot, 120, duration=2.5, dt=2e-3)
@@ -83,7 +83,8 @@ def imperfections(robot: Manipulator) -> Explorer:
 def controller_choice(robot: Manipulator) -> Explorer:
     """Distance from the wanted place and torques under a law of choice, with offsets, a payload and coarse encoders.
 
-    >>> controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
+    >>> from rapkm_lite import explore
+    >>> explore.controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]
     '1.19 mm'
     """
     path = shared.fitting_triangle(robot, 120, duration=2.5)
@@ -133,7 +134,7 @@ def own_machine(robot: Manipulator) -> Explorer:
     It begins with the layout of the base joints and the working mode of the given machine, and with the mean of each of
     its lengths, as near as the sliders come.
 
-    >>> own_machine().numbers["cost of the offsets, at rest everywhere"]
+    >>> from rapkm_lite import explore; explore.own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
     """
     N, centre = robot.n_arms, robot.base.mean(axis=0)

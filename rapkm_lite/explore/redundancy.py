@@ -34,7 +34,7 @@ RULES = {
 def allocation(robot: Manipulator) -> Explorer:
     """The torques that make one force: of least size (pale bars) and by the chosen rule; dotted: the limits.
 
-    >>> allocation().numbers["largest"]
+    >>> from rapkm_lite import explore; explore.allocation().numbers["largest"]
     '100 % of the limit'
     """
 
@@ -90,7 +90,7 @@ def calibration(robot: Manipulator) -> Explorer:
 
     For three arms or more.
 
-    >>> calibration().set(turn=60).numbers["condition"]
+    >>> from rapkm_lite import explore; explore.calibration().set(turn=60).numbers["condition"]
     '1.36'
     """
     N, centre = robot.n_arms, shared.place(robot)[0]

@@ -27,7 +27,7 @@ from .explorer import Explorer, explorer
 def steady_state(robot: Manipulator) -> Explorer:
     """Offsets and gains of each drive: the error at rest of theory (14) beside a simulation that settles there.
 
-    >>> steady_state().numbers["rest torque"]
+    >>> from rapkm_lite import explore; explore.steady_state().numbers["rest torque"]
     '-23.6 / -23.4 / -23.6 mN m'
     """
     N, usual, heavier = robot.n_arms, shared.usual_gains(robot), shared.heavier(robot)
@@ -81,7 +81,7 @@ def steady_state(robot: Manipulator) -> Explorer:
 def three_opinions(robot: Manipulator) -> Explorer:
     """Where each drive wants the end-effector: drag a line; where all of them meet, the torques vanish.
 
-    >>> three_opinions().set(offset_2=0).numbers["distances from the lines"]
+    >>> from rapkm_lite import explore; explore.three_opinions().set(offset_2=0).numbers["distances from the lines"]
     '0.65 / 0.88 / 0.72 mm'
     """
     N, heavier = robot.n_arms, shared.heavier(robot)
@@ -151,7 +151,7 @@ def landscape(robot: Manipulator) -> Explorer:
 
     For three arms or more.
 
-    >>> landscape().numbers["antagonistic energy"]
+    >>> from rapkm_lite import explore; explore.landscape().numbers["antagonistic energy"]
     '2.83 J'
     """
 

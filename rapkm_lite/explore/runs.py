@@ -29,7 +29,8 @@ LAWS = {"off": lambda law: law, "force form (16)": AntagonismFilter, "command fo
 def decentralized_run(robot: Manipulator) -> Explorer:
     """The 5 s run under PD: offsets, gains, filter, friction, encoder; torques, errors, energies (Table 1: testbed).
 
-    >>> decentralized_run().set(filter="force form (16)").numbers["largest torque"]
+    >>> from rapkm_lite import explore
+    >>> explore.decentralized_run().set(filter="force form (16)").numbers["largest torque"]
     '37 mN m'
     """
     N, damping, heavier = robot.n_arms, shared.usual_gains(robot)[1], shared.heavier(robot)
@@ -85,7 +86,8 @@ def decentralized_run(robot: Manipulator) -> Explorer:
 def animation(robot: Manipulator) -> Explorer:
     """The machine moves along the triangle; arrows are the forces of the drives at the end-effector.
 
-    >>> animation().set(filter="force form (16)").numbers["torque that moves nothing"]
+    >>> from rapkm_lite import explore
+    >>> explore.animation().set(filter="force form (16)").numbers["torque that moves nothing"]
     '0.1 mN m'
     """
     N, heavier = robot.n_arms, shared.heavier(robot)
@@ -160,7 +162,8 @@ def animation(robot: Manipulator) -> Explorer:
 def via_points(robot: Manipulator) -> Explorer:
     """Via points on an edge, a late drive 1, the filter: the place of the end-effector, and torques that only press.
 
-    >>> via_points().set(filter=True).numbers["largest torque that only presses"]
+    >>> from rapkm_lite import explore
+    >>> explore.via_points().set(filter=True).numbers["largest torque that only presses"]
     '0.0 mN m'
     """
     # The lower edge of the triangle of `fitting_triangle`, or as much of it as all arms reach.

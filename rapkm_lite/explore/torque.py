@@ -35,7 +35,7 @@ def feedback_along(robot: Manipulator, law, q) -> np.ndarray:
 def computed_torque(robot: Manipulator) -> Explorer:
     """Computed torque with a fixed pair, a switched pair or redundant coordinates, near the singular curves.
 
-    >>> computed_torque().numbers["largest feedback map"]
+    >>> from rapkm_lite import explore; explore.computed_torque().numbers["largest feedback map"]
     '0.0476 N m s²/rad'
     """
     pairs, width, heavier = act.drive_pairs(robot), shared.size(robot), shared.heavier(robot)

@@ -150,8 +150,8 @@ def film(
     Set the limits of the axes in `draw`.  Raises ValueError without words or time, with fewer than two frames,
     with loops < 1, or when eight frames would make more than 120 kB.
 
-    >>> import numpy as np
-    >>> film(lambda ax, s: ax.plot([0, np.cos(s)], [0, np.sin(s)]), np.linspace(0, 1, 3), "A hand turns.").alt
+    >>> import numpy as np; from rapkm_lite import plotting
+    >>> plotting.film(lambda ax, s: ax.plot([0, np.cos(s)], [0, np.sin(s)]), np.linspace(0, 1, 3), "A hand turns.").alt
     'A hand turns.'
     """
     steps = list(frames)

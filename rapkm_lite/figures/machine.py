@@ -14,8 +14,8 @@ from .style import NEUTRAL, arm_colour, arm_text_colour, axes_or_new
 def arm_points(robot, q) -> np.ndarray:
     """Base, elbow and tip of every arm, (..., N, 3, 2) in m, at q (..., 2N).
 
-    >>> import rapkm_lite as rk
-    >>> arm_points(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))[:, 2].round(12).tolist()
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.arm_points(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))[:, 2].round(12).tolist()
     [[0.02, -0.03], [0.02, -0.03], [0.02, -0.03]]
     """
     a, d = arm_vectors(robot, q)
@@ -28,8 +28,8 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
     Filled circles are driven joints, open circles passive ones, the square is the end-effector.
     alpha : opacity, 0 to 1.  labels : number the drives.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_machine(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_machine(rk.load(), rk.inverse_kinematics(rk.load(), [0.02, -0.03]))
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     chains = arm_points(robot, q)
@@ -51,8 +51,8 @@ def plot_machine(robot, q, ax=None, *, arms=None, alpha=1.0, labels=True):
 def plot_workspace(robot, ax=None, n: int = 240, colour: str = "#EEF2F6"):
     """Shade the points that all arms reach.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_workspace(rk.load())
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_workspace(rk.load())
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     # A little more than the workspace, so that its outline closes.
@@ -67,8 +67,8 @@ def plot_workspace(robot, ax=None, n: int = 240, colour: str = "#EEF2F6"):
 def plot_path(trajectory, ax=None, **line):
     """Draw the end-effector path.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_path(rk.triangle(rk.load()))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_path(rk.triangle(rk.load()))
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     ax.plot(*trajectory.x.T, **({"color": NEUTRAL, "lw": 1.2, "zorder": 2} | line))
@@ -80,8 +80,8 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
 
     margin : room around the elbows, as a share of the longest link.
 
-    >>> import rapkm_lite as rk
-    >>> plane_limits(rk.load())["aspect"]
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.plane_limits(rk.load())["aspect"]
     'equal'
     """
     margin = float(bounded("margin", exact_array("margin", margin), 0.0, strict=False))
@@ -96,8 +96,8 @@ def plane_limits(robot, margin: float = 0.1) -> dict:
 def plane_axes(robot, ax: Axes | None):
     """The axes with the frame of `plane_limits`.
 
-    >>> import rapkm_lite as rk; from matplotlib.figure import Figure
-    >>> plane_axes(rk.load(), Figure().add_subplot()).get_xlabel()
+    >>> import rapkm_lite as rk; from matplotlib.figure import Figure; from rapkm_lite import plotting
+    >>> plotting.plane_axes(rk.load(), Figure().add_subplot()).get_xlabel()
     'x in m'
     """
     ax = axes_or_new(ax)

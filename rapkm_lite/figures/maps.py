@@ -20,7 +20,7 @@ _OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewi
 def pair_name(pair) -> str:
     """The pair with 1-based drive numbers, as in the chapter: (1, 2) becomes '(2,3)'.
 
-    >>> pair_name((1, 2))
+    >>> from rapkm_lite import plotting; plotting.pair_name((1, 2))
     '(2,3)'
     """
     return f"({pair[0] + 1},{pair[1] + 1})"
@@ -29,7 +29,7 @@ def pair_name(pair) -> str:
 def mode_name(mode) -> str:
     """A working mode as signs, as in the lessons: [1, 1, -1] becomes '(+, +, −)'.
 
-    >>> mode_name([1, 1, -1])
+    >>> from rapkm_lite import plotting; plotting.mode_name([1, 1, -1])
     '(+, +, −)'
     """
     return "(" + ", ".join("+" if s > 0 else "−" for s in mode) + ")"
@@ -40,8 +40,8 @@ def pair_line(robot: Manipulator, pair) -> dict:
 
     On other machines no arm has its colour.
 
-    >>> import rapkm_lite as rk; robot = rk.load()
-    >>> pair_line(robot, (1, 2)) == arm_line(0)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
+    >>> plotting.pair_line(robot, (1, 2)) == plotting.arm_line(0)
     True
     """
     if robot.n_arms == 3:
@@ -53,8 +53,8 @@ def pair_line(robot: Manipulator, pair) -> dict:
 def pair_measures(robot: Manipulator, q) -> np.ndarray:
     """Smallest singular value of the rows of A of each pair of drives, (..., pairs) in rad/m; q is (..., 2N).
 
-    >>> import rapkm_lite as rk
-    >>> pair_measures(rk.load(), rk.inverse_kinematics(rk.load(), [0.0, 0.0])).round(3)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.pair_measures(rk.load(), rk.inverse_kinematics(rk.load(), [0.0, 0.0])).round(3)
     array([3.75, 3.75, 3.75])
     """
     A = control_matrix(robot, q)
@@ -66,8 +66,8 @@ def grid_points(robot: Manipulator, n: int, box=None, driven: bool = False):
 
     driven : leave out those at input singularities, where A has lost rank.
 
-    >>> import rapkm_lite as rk
-    >>> x, y, inside, points = grid_points(rk.load(), 50)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> x, y, inside, points = plotting.grid_points(rk.load(), 50)
     >>> points.shape == (inside.sum(), 2)
     True
     """
@@ -83,7 +83,8 @@ def grid_points(robot: Manipulator, n: int, box=None, driven: bool = False):
 def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
     """Values (k, ...) at the points of `grid_points` back on the grid, (n, n, ...); masked outside.
 
-    >>> on_grid(np.array([[True, False], [True, True]]), [1.0, 2.0, 3.0]).tolist()
+    >>> import numpy as np; from rapkm_lite import plotting
+    >>> plotting.on_grid(np.array([[True, False], [True, True]]), [1.0, 2.0, 3.0]).tolist()
     [[1.0, None], [2.0, 3.0]]
     """
     values = np.asarray(values)
@@ -100,8 +101,8 @@ def on_grid(inside: np.ndarray, values) -> np.ma.MaskedArray:
 def plot_map(x, y, values, ax=None, *, label: str = "", vmin=None, vmax=None, bar: bool = True):
     """A measure over the workspace: x (n,), y (n,) in m, masked values (n, n), rows along y, colours vmin to vmax.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min(Ã), all drives")
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_map(*rk.actuation_map(rk.load(), n=41), label="σ_min(Ã), all drives")
     """
     ax = axes_or_new(ax, figsize=(4.6, 3.9))
     # What lies under the mask may be anything; colour maps look at it.
@@ -122,8 +123,8 @@ def plot_pair_curves(robot, ax=None, *, mode=None, pairs=None, on_map: bool = Fa
     pairs : some of `drive_pairs`; default all.
     on_map : draw outlined white lines, readable on top of a map, instead of those of `pair_line`.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_pair_curves(rk.load(), n=81)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_pair_curves(rk.load(), n=81)
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     x, y, inside, points = grid_points(robot, n)
@@ -151,8 +152,8 @@ def touching_arcs(robot, pair, mode=None) -> list[np.ndarray]:
     point.  About it the end-effector runs on a circle on which the distal links are parallel, and the cross product of
     `distal_cross_products` keeps its sign on both sides.
 
-    >>> import rapkm_lite as rk
-    >>> [len(arc) for arc in touching_arcs(rk.load(), (1, 2), (1, 1, -1))]
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> [len(arc) for arc in plotting.touching_arcs(rk.load(), (1, 2), (1, 1, -1))]
     [179]
     """
     base, (l1, l2) = robot.base[list(pair)], robot.lengths[list(pair)].T
@@ -176,8 +177,8 @@ def touching_arcs(robot, pair, mode=None) -> list[np.ndarray]:
 def curve_crossings(trajectory) -> list[np.ndarray]:
     """For each pair of drives the samples just before the path crosses the curve of this pair.
 
-    >>> import rapkm_lite as rk
-    >>> [len(at) for at in curve_crossings(rk.triangle(rk.load()))]
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> [len(at) for at in plotting.curve_crossings(rk.triangle(rk.load()))]
     [2, 2, 2]
     """
     cross = distal_cross_products(trajectory.robot, trajectory.q)

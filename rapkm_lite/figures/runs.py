@@ -13,9 +13,9 @@ from .style import arm_line, axes_or_new
 def plot_torques(run, ax=None, title: str = "", milli: bool = True):
     """Drive torques over time, in mN m, or in N m with ``milli=False``.
 
-    >>> import rapkm_lite as rk
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
-    >>> ax = plot_torques(run)
+    >>> ax = plotting.plot_torques(run)
     """
     scale, unit = (1e3, "mN m") if milli else (1.0, "N m")
     return lines_per_drive(run, scale * run.c, ax, f"torque in {unit}", title, scale * least_torque(run.robot))
@@ -24,9 +24,9 @@ def plot_torques(run, ax=None, title: str = "", milli: bool = True):
 def plot_errors(run, ax=None, title: str = ""):
     """Errors of the true base angles over time.
 
-    >>> import rapkm_lite as rk
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), rk.triangle(rk.load()), [4e-3, -2e-3, 5e-3])
-    >>> ax = plot_errors(run)
+    >>> ax = plotting.plot_errors(run)
     """
     return lines_per_drive(run, 1e3 * run.error, ax, "angle error in mrad", title, LEAST)
 
@@ -36,9 +36,9 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least
 
     least : in the unit of `ylabel`; the axis shows no less, so that rounding is a flat line.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> run, ax = rk.simulate(path.robot, rk.PD(7.05, 0.225), path), axes_or_new()
-    >>> lines_per_drive(run, run.c, ax, "torque in N m", "PD").get_ylabel()
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> run, ax = rk.simulate(path.robot, rk.PD(7.05, 0.225), path), plotting.axes_or_new()
+    >>> plotting.lines_per_drive(run, run.c, ax, "torque in N m", "PD").get_ylabel()
     'torque in N m'
     """
     ax = axes_or_new(ax)

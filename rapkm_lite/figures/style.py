@@ -24,8 +24,8 @@ BEFORE, AFTER, NEUTRAL, ALARM = "#999999", "#222222", "#555555", "#CC3311"
 def use_style() -> None:
     """Make the collection's look the default from now on; called by the first cell of a lesson.
 
-    >>> import matplotlib.pyplot as plt
-    >>> with plt.rc_context(): use_style()
+    >>> import matplotlib.pyplot as plt; from rapkm_lite import plotting
+    >>> with plt.rc_context(): plotting.use_style()
     """
     plt.style.use(STYLE)
 
@@ -33,7 +33,7 @@ def use_style() -> None:
 def arm_colour(i: int) -> str:
     """Colour of arm i (0-based).
 
-    >>> arm_colour(0)
+    >>> from rapkm_lite import plotting; plotting.arm_colour(0)
     '#004488'
     """
     return ARM_COLOURS[i % len(ARM_COLOURS)]
@@ -42,7 +42,7 @@ def arm_colour(i: int) -> str:
 def arm_text_colour(i: int) -> str:
     """Colour of text that belongs to arm i (0-based), readable on white.
 
-    >>> arm_text_colour(0)
+    >>> from rapkm_lite import plotting; plotting.arm_text_colour(0)
     '#004488'
     """
     return ARM_TEXT_COLOURS[i % len(ARM_TEXT_COLOURS)]
@@ -51,7 +51,7 @@ def arm_text_colour(i: int) -> str:
 def arm_line(i: int) -> dict:
     """Colour and dashes of arm i (0-based), as keywords for ``ax.plot``.
 
-    >>> arm_line(0)
+    >>> from rapkm_lite import plotting; plotting.arm_line(0)
     {'color': '#004488', 'linestyle': '-'}
     """
     return {"color": arm_colour(i), "linestyle": ARM_LINES[i % len(ARM_LINES)]}
@@ -60,7 +60,7 @@ def arm_line(i: int) -> dict:
 def axes_or_new(ax=None, **figure):
     """The given axes, or the axes of a new figure in the collection's style.
 
-    >>> ax = axes_or_new(figsize=(4.0, 3.0))
+    >>> from rapkm_lite import plotting; ax = plotting.axes_or_new(figsize=(4.0, 3.0))
     """
     if ax is not None:
         return ax

@@ -38,7 +38,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence]) -> Table:
     Entries are shown as ``str`` gives them; format numbers to the digits that mean something.
     Raises ValueError when a row is longer or shorter than the head.
 
-    >>> table(["law", "error in mm"], [["PD", f"{1.654:.2f}"]])
+    >>> from rapkm_lite import plotting; plotting.table(["law", "error in mm"], [["PD", f"{1.654:.2f}"]])
     law  error in mm
     PD          1.65
     """

@@ -31,7 +31,8 @@ class Palette:
 
     Raises ValueError for levels that do not rise, and unless there is one colour less than levels.
 
-    >>> Palette((0.0, 1.0, 2.0), ("#888888", "#EEEEEE"), ("#777777", "#333333")).classes
+    >>> from rapkm_lite import explore
+    >>> explore.Palette((0.0, 1.0, 2.0), ("#888888", "#EEEEEE"), ("#777777", "#333333")).classes
     2
     """
 

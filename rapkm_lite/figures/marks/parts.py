@@ -17,9 +17,10 @@ from .plane import workspace_outline
 def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -> None:
     """The arms at one pose q (2N,): filled circles are drives with their numbers, open ones passive joints.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
-    >>> draw_machine(picture, "a", robot, q)
+    >>> import rapkm_lite as rk; from rapkm_lite import explore
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> picture = explore.Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
+    >>> explore.draw_machine(picture, "a", robot, q)
     """
     chains = arm_points(robot, q)
     open_joint = {"markersize": 6.5, "markerfacecolor": "white", "markeredgewidth": 2}
@@ -38,8 +39,9 @@ def draw_machine(picture, panel: str, robot, q, arms=None, names: bool = True) -
 def draw_workspace(picture, panel: str, robot, colour: str = "#EEF2F6") -> None:
     """Shade the points that all arms reach.
 
-    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
-    >>> import rapkm_lite as rk; draw_workspace(picture, "a", rk.load())
+    >>> import rapkm_lite as rk; from rapkm_lite import explore
+    >>> picture = explore.Picture({"a": {"xlim": (-0.3, 0.3), "ylim": (-0.3, 0.3)}})
+    >>> explore.draw_workspace(picture, "a", rk.load())
     """
     look = {"facecolor": colour, "edgecolor": NEUTRAL, "linewidth": 0.8}
     picture.polygon(panel, workspace_outline(robot), zorder=0.2, **look)
@@ -58,8 +60,9 @@ def pair_lines(robot) -> list:
 def drive_legend(picture, panel: str, robot) -> None:
     """A legend of the arms' lines.
 
-    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}}); import rapkm_lite as rk
-    >>> drive_legend(picture, "a", rk.load())
+    >>> import rapkm_lite as rk; from rapkm_lite import explore
+    >>> picture = explore.Picture({"a": {"ylim": (0, 2)}})
+    >>> explore.drive_legend(picture, "a", rk.load())
     """
     picture.legend(panel, drive_lines(robot))
 
@@ -67,8 +70,9 @@ def drive_legend(picture, panel: str, robot) -> None:
 def pair_legend(picture, panel: str, robot) -> None:
     """A legend of the pairs' lines.
 
-    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}}); import rapkm_lite as rk
-    >>> pair_legend(picture, "a", rk.load())
+    >>> import rapkm_lite as rk; from rapkm_lite import explore
+    >>> picture = explore.Picture({"a": {"ylim": (0, 2)}})
+    >>> explore.pair_legend(picture, "a", rk.load())
     """
     picture.legend(panel, pair_lines(robot))
 
@@ -94,8 +98,9 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f", ti
 
     times : how many times the testbed's the numbers are, as for `told`.
 
-    >>> from rapkm_lite.explore import Picture; picture = Picture({"a": {"ylim": (0, 2)}})
-    >>> bars(picture, "a", [([1.0, 2.0, 1.5], {})])
+    >>> from rapkm_lite import explore
+    >>> picture = explore.Picture({"a": {"ylim": (0, 2)}})
+    >>> explore.bars(picture, "a", [([1.0, 2.0, 1.5], {})])
     """
     width = positive_number("width", width)
     zero_line(picture, panel)

@@ -44,7 +44,7 @@ class Picture:
     setup : function of the picture that draws once what never changes (workspace, legend).
     Raises ValueError for an unknown keyword of a panel, KeyError for an unknown panel.
 
-    >>> picture = Picture({"a": {"ylim": (0, 2)}})
+    >>> from rapkm_lite import explore; picture = explore.Picture({"a": {"ylim": (0, 2)}})
     >>> picture.line("a", [0, 1], [0, 2], colour="red")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ValueError: line has no style 'colour'; allowed: alpha, color, linestyle, linewidth, marker, markeredgewidth, ...

@@ -19,8 +19,8 @@ from ...simulation.runs import simulate
 def plot_working_modes(robot, x, axes=None):
     """The machine at the point x (2,) in m, once per working mode; returns the axes.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_working_modes(rk.load(), [0.0, 0.0])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_working_modes(rk.load(), [0.0, 0.0])
     """
     modes = working_modes(robot)
     if axes is None:
@@ -52,8 +52,8 @@ def film_workshop(robot, offset, frames: int = 36):
 
     The meters count the electric energy since the start.
 
-    >>> import rapkm_lite as rk
-    >>> film_workshop(rk.load(), [4e-3, -2e-3, 5e-3], frames=3).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.film_workshop(rk.load(), [4e-3, -2e-3, 5e-3], frames=3).size
     (729, 307)
     """
     lap = triangle(robot)

@@ -22,8 +22,9 @@ from .sheets import configuration_sheet, on_sheet
 def plot_joint_angles(robot, q, ax=None):
     """Fig. 1: the closed machine at q (2N,) with its joint angles: base angles from the x axis, elbow relative.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> ax = plot_joint_angles(robot, q)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plotting.plot_joint_angles(robot, q)
     """
     N, size = robot.n_arms, 0.28 * robot.lengths.max()
     ax = plot_machine(robot, q, axes_or_new(ax, figsize=2 * [max(4.2, N + 0.2)]), labels=False)
@@ -66,8 +67,9 @@ def _with_legend(robot, ax):
 def plot_cut_tree(robot, q, ax=None, title: str = ""):
     """Fig. 2: the tree of N free arms at any q (2N,), and the gaps h_i from the tip of arm 2 to the other tips.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> ax = plot_cut_tree(robot, q + [0.1, 0.2, 0, 0, 0, 0])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plotting.plot_cut_tree(robot, q + [0.1, 0.2, 0, 0, 0, 0])
     """
     ax, corner = _with_legend(robot, ax)
     plot_machine(robot, q, ax, labels=False)
@@ -87,8 +89,8 @@ def plot_cut_tree(robot, q, ax=None, title: str = ""):
 def plot_topology(robot, ax=None):
     """Bodies (boxes) and revolute joints (lines) of the machine; dashed lines are the joints that are cut.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_topology(rk.load())
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_topology(rk.load())
     """
     N = robot.n_arms
     ax = axes_or_new(ax, figsize=(max(4.2, 1.4 * N), 4.2))
@@ -119,8 +121,8 @@ def plot_configuration_space(robot, modes, ax=None, q=None, trajectory=None, F=N
     q (2N,) marks a configuration, F (2N, 2) a patch of the tangent plane there, `trajectory` draws its path on V.
     For three arms or more.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_configuration_space(rk.load(), [(1, 1, 1)])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_configuration_space(rk.load(), [(1, 1, 1)])
     """
     if robot.n_arms < 3:
         raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3 or more, whose base angles are the axes")
@@ -165,8 +167,8 @@ def plot_complement_size(trajectory, pairs, ax=None):
 
     With three arms a pair has the colour of the arm it leaves out.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
-    >>> ax = plot_complement_size(path, [(0, 1), (0, 2)])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plotting.plot_complement_size(path, [(0, 1), (0, 2)])
     """
     ax = axes_or_new(ax)
     for pair in pairs:
@@ -183,7 +185,7 @@ def plot_complement_size(trajectory, pairs, ax=None):
 def plot_loop_gaps(t, gaps: dict, ax=None):
     """Largest loop gap over time on a logarithmic axis; `gaps` maps a label to (k,) gaps in m.
 
-    >>> ax = plot_loop_gaps([0.0, 1.0], {"10 ms": [1e-6, 1e-4]})
+    >>> from rapkm_lite import plotting; ax = plotting.plot_loop_gaps([0.0, 1.0], {"10 ms": [1e-6, 1e-4]})
     """
     ax = axes_or_new(ax)
     for k, (label, gap) in enumerate(gaps.items()):
@@ -199,8 +201,9 @@ def plot_pin_forces(robot, q, forces, ax=None, newton_per_metre: float = 5.0, ti
 
     Raises ValueError for another number of forces than arms; `q` may leave the loops open.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> ax = plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plotting.plot_pin_forces(robot, q, [[0.1, 0.0], [0.0, 0.1], [-0.1, -0.1]])
     """
     scale = positive_number("newton_per_metre", newton_per_metre)
     forces = exact_array("forces", forces, robot.n_arms, 2)
@@ -221,8 +224,9 @@ def film_loops(robot, t, gaps: dict, poses: dict, frames: int = 26):
 
     t in s, gaps in m.  Raises ValueError unless `gaps` and `poses` have two entries each.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> film_loops(robot, [0.0, 1.0], {"a": [0, 1e-3], "b": [0, 0]}, {"a": [q, q], "b": [q, q]}, frames=2).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> plotting.film_loops(robot, [0.0, 1.0], {"a": [0, 1e-3], "b": [0, 0]}, {"a": [q, q], "b": [q, q]}, frames=2).size
     (844, 288)
     """
     for what, entries in (("gaps", gaps), ("poses", poses)):

@@ -32,8 +32,8 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
 
     x, y : samples (n,) in m.  marks : a point (2,) in m to mark, or None, for each mode.
 
-    >>> import rapkm_lite as rk; import numpy as np; x = np.linspace(-0.1, 0.1, 5)
-    >>> ax = plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
+    >>> import rapkm_lite as rk; import numpy as np; from rapkm_lite import plotting; x = np.linspace(-0.1, 0.1, 5)
+    >>> ax = plotting.plot_mode_maps(rk.load(), np.ones((8, 5, 5)), x, x)
     """
     modes, rows = working_modes(robot), 2**robot.n_arms // 4
     axes = plt.subplots(rows, 4, figsize=(10.4, 2.7 * rows), sharex=True, sharey=True)[1] if axes is None else axes
@@ -52,8 +52,8 @@ def plot_mode_maps(robot, sigma, x, y, axes=None, marks=None):
 def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
     """A pose as in fig. 8: the five-bar of one pair, distal links parallel at x (2,) in m; the curves of all pairs.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load())
-    >>> ax = plot_parameterization_singularities(path, [0.094, 0.064])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.triangle(rk.load())
+    >>> ax = plotting.plot_parameterization_singularities(path, [0.094, 0.064])
     """
     robot = trajectory.robot
     axes = plt.subplots(1, 2, figsize=(10.8, 4.2))[1] if axes is None else axes
@@ -83,7 +83,7 @@ def plot_parameterization_singularities(trajectory, x, pair=(1, 2), axes=None):
 def plot_prestress_maps(robot, axes=None, n: int = 161):
     """Share |eta_i| of each of three drives in the null vector of A^T, by singular vectors, and the pairs' curves.
 
-    >>> import rapkm_lite as rk; ax = plot_prestress_maps(rk.load(), n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; ax = plotting.plot_prestress_maps(rk.load(), n=21)
     """
     if robot.n_arms != 3:
         raise ValueError(f"robot has {robot.n_arms} arms; allowed: 3, whose torques that move nothing are one vector")
@@ -106,8 +106,8 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
 
     guaranteed : radius in N of a disc to draw, the force that is available in every direction.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> ax = plot_available_forces(robot, q, torque=0.1)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
+    >>> ax = plotting.plot_available_forces(robot, rk.inverse_kinematics(robot, [0.02, 0.05]), torque=0.1)
     """
     ax = axes_or_new(ax, figsize=(3.6, 3.6))
     A = control_matrix(robot, exact_array("q", q, robot.n_joints))
@@ -126,8 +126,8 @@ def plot_available_forces(robot, q, ax=None, *, torque: float = 0.1, guaranteed=
 def plot_modes_and_forces(robot, x, modes, axes=None):
     """The machine at one place x (2,) in m in several working modes, each beside its available forces.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_modes_and_forces(rk.load(), [0.0, 0.0], [(1, 1, 1), (1, 1, -1)])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_modes_and_forces(rk.load(), [0.0, 0.0], [(1, 1, 1), (1, 1, -1)])
     """
     if axes is None:
         widths = [1.1, 1.0] * len(modes)
@@ -151,8 +151,8 @@ def plot_guaranteed_force(robot, poses: dict, radius_of, axes=None, torque: floa
 
     radius_of : function of A (m, 2) and the torque limit in N m that gives the radius in N.
 
-    >>> import rapkm_lite as rk; robot = rk.load()
-    >>> ax = plot_guaranteed_force(robot, {"": rk.inverse_kinematics(robot, [0, 0])}, lambda A, c: 0.5, n=9)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
+    >>> ax = plotting.plot_guaranteed_force(robot, {"": rk.inverse_kinematics(robot, [0, 0])}, lambda A, c: 0.5, n=9)
     """
     if axes is None:
         count = len(poses) + 1
@@ -175,8 +175,7 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
 
     For two arms whose four links are equal and half as long as the base between them, as on the testbed.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_crossed_linkage(rk.load(), (0, 1))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; ax = plotting.plot_crossed_linkage(rk.load(), (0, 1))
     """
     base, length = robot.base[list(pair)], robot.lengths[pair[0], 0]
     if not np.allclose([*robot.lengths[list(pair)].flat, np.linalg.norm(base[1] - base[0]) / 2], length):
@@ -213,7 +212,8 @@ def plot_crossed_linkage(robot, pair=(1, 2), ax=None):
 def plot_pair_measures(trajectory, ax=None):
     """sigma_min in rad/m of the rows of A of every pair (lines of `pair_line`), and of all drives, along the path.
 
-    >>> import rapkm_lite as rk; ax = plot_pair_measures(rk.triangle(rk.load(), dt=5e-3))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_pair_measures(rk.triangle(rk.load(), dt=5e-3))
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.4))
     robot, A = trajectory.robot, control_matrix(trajectory.robot, trajectory.q)
@@ -230,8 +230,8 @@ def plot_pair_measures(trajectory, ax=None):
 def plot_torque_choices(trajectory, choices: dict, axes=None):
     """Drive torques in mN m along a path, one panel per choice; `choices` maps a title to (k, m) torques in N m.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
-    >>> ax = plot_torque_choices(path, {"least torque": rk.inverse_dynamics(path.robot, path.q, path.qd, path.qdd)})
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plotting.plot_torque_choices(path, {"drives off": 0.0 * path.q_a})
     """
     if axes is None:
         axes = plt.subplots(1, len(choices), figsize=(12.0, 3.1), sharey=True, squeeze=False)[1][0]
@@ -248,8 +248,8 @@ def plot_torque_choices(trajectory, choices: dict, axes=None):
 def film_force_polygon(robot, x, pair=(1, 2), frames: int = 36):
     """The machine crossing the curve of a pair at x (2,) in m, beside the forces of the pair and of all drives.
 
-    >>> import rapkm_lite as rk
-    >>> film_force_polygon(rk.load(), [0.094, 0.064], frames=3).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.film_force_polygon(rk.load(), [0.094, 0.064], frames=3).size
     (691, 336)
     """
     x, k, step = np.asarray(x, dtype=float), drive_pairs(robot).index(pair), 1e-5

@@ -24,8 +24,9 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     A line per drive: the points where its measured angle would be right.  Thick bars: how far the rest point misses
     each line, with the torque that this costs.
 
-    >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
-    >>> ax = plot_disagreement(robot, q, [4e-3, -2e-3, 5e-3], 7.05)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
+    >>> ax = plotting.plot_disagreement(robot, q, [4e-3, -2e-3, 5e-3], 7.05)
     """
     ax = axes_or_new(ax, figsize=(4.6, 4.4))
     A, weight, offset = control_matrix(robot, q), required_wrench(robot, q, 0 * q, 0 * q), np.asarray(offset, float)
@@ -56,8 +57,8 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
 def plot_rest_torques(run, theory, ax=None, title: str = ""):
     """Drive torques over time in mN m; in black the static theory in N m, (N,) as thin lines or (k, N) as dots.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_rest_torques(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), [0.0, 0.01, 0.0])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_rest_torques(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), [0.0, 0.01, 0.0])
     """
     ax = plot_torques(run, ax, title)
     dots: dict[str, Any] = {"ls": "", "marker": ".", "ms": 5, "markevery": max(len(run.t) // 40, 1)}
@@ -72,7 +73,8 @@ def plot_gain_ratio(ratio, simulated, theories: dict, ax=None, title: str = ""):
 
     Raises ValueError for more than two theories.
 
-    >>> ax = plot_gain_ratio([0.5, 1.0], [0.03, 0.05], {"printed": [0.04, 0.04], "corrected": [0.03, 0.05]})
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_gain_ratio([0.5, 1.0], [0.03, 0.05], {"printed": [0.04, 0.04], "corrected": [0.03, 0.05]})
     """
     ax = axes_or_new(ax)
     looks: list[dict[str, Any]] = [{"color": ALARM, "linestyle": "--"}, {"color": AFTER}]
@@ -92,8 +94,8 @@ def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, t
 
     trajectory : a path to draw; default none.  For three arms.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_fight_map(rk.load(), [4e-3, -2e-3, 5e-3], 7.05, n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_fight_map(rk.load(), [4e-3, -2e-3, 5e-3], 7.05, n=21)
     """
     ax = axes_or_new(ax, figsize=(5.2, 4.4))
     x, y, inside, points = grid_points(robot, n, driven=True)
@@ -113,8 +115,8 @@ def plot_fight_map(robot, offset, K_P, ax=None, trajectory=None, n: int = 241, t
 def plot_log(log, axes=None):
     """A log: measured minus desired angles above, drive torques in mN m below, over time; returns both axes.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_log(rk.mystery_run("gain"))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_log(rk.mystery_run("gain"))
     """
     axes = plt.figure(figsize=(8.0, 4.4), layout="constrained").subplots(2, sharex=True) if axes is None else axes
     for i in range(log.c.shape[1]):
@@ -134,9 +136,9 @@ def film_three_lines(robot, q, offset, K_P, frames: int = 32):
 
     For three arms.
 
-    >>> import rapkm_lite as rk
-    >>> robot = rk.load()
-    >>> film_three_lines(robot, rk.inverse_kinematics(robot, [0.04, -0.05]), [4e-3, -2e-3, 5e-3], 7.05, frames=3).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> robot = rk.load(); q = rk.inverse_kinematics(robot, [0.04, -0.05])
+    >>> plotting.film_three_lines(robot, q, [4e-3, -2e-3, 5e-3], 7.05, frames=3).size
     (403, 480)
     """
     n = null_vector(robot, q)

@@ -39,7 +39,8 @@ def plot_synchronization(robot, x, offset, axes=None, magnify: float = 20.0):
     as each pair of drives sees it, and the least-squares pose of all of them.  Returns both axes.
     Raises ValueError where the five-bar of a pair is singular, ConvergenceError for larger offsets than fit any pose.
 
-    >>> import rapkm_lite as rk; ax = plot_synchronization(rk.load(), [0.0, 0.0], [4e-3, -2e-3, 5e-3])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_synchronization(rk.load(), [0.0, 0.0], [4e-3, -2e-3, 5e-3])
     """
     axes = plt.subplots(1, 2, figsize=(9.4, 4.6), width_ratios=(1, 1.1))[1] if axes is None else axes
     x, offset = np.asarray(x, dtype=float), np.asarray(offset, dtype=float)
@@ -101,8 +102,8 @@ def plot_joint_moves(robot, start, stop, spacing, gap, marked, axes=None):
     Right: largest contradiction `gap` (k,) in rad over the distance of the via points, `spacing` (k,) in m, a line of
     slope two, and the level `marked` in rad to compare with.  Returns both axes.
 
-    >>> import rapkm_lite as rk; robot, far = rk.load(), [0.015, 0.03]
-    >>> ax = plot_joint_moves(robot, [-0.05, 0.0], [0.05, 0.0], far, [2e-3, 7e-3], 5e-3)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot, far = rk.load(), [0.015, 0.03]
+    >>> ax = plotting.plot_joint_moves(robot, [-0.05, 0.0], [0.05, 0.0], far, [2e-3, 7e-3], 5e-3)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.3), width_ratios=(1.35, 1))[1] if axes is None else axes
     spacing, gap = np.asarray(spacing), np.asarray(gap)
@@ -137,8 +138,8 @@ _RUN_LINES: list[dict[str, Any]] = [
 def plot_antagonism(run, ax=None, title: str = ""):
     """The part N_{A^T} c of the drive torques that moves nothing, over time.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_antagonism(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_antagonism(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
     """
     least = 1e3 * max(least_torque(run.robot), 1e-6 * np.abs(run.c).max())  # beside the torques themselves
     return lines_per_drive(run, 1e3 * antagonistic_torque(run), ax, "antagonism in mN m", title, least)
@@ -149,8 +150,8 @@ def plot_torque_norms(runs: dict, ax=None, title: str = "", *, antagonism: bool 
 
     antagonism : show only the part that moves nothing.  log : logarithmic axis; what is less stands at its end.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_torque_norms({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(9.8, 3.3))
     low, high = min(1e-9, *(least_torque(run.robot) for run in runs.values())), 0.0
@@ -174,8 +175,8 @@ def plot_torque_plane(runs: dict, ax=None, title: str = ""):
 
     The squared distance from the origin times R_el / k_t^2 is the copper loss in W.  One or two runs of equal drives.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_torque_plane({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_torque_plane({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(5.4, 3.4))
     for (label, run), (colour, marker) in with_looks("runs", runs, ((BEFORE, "o"), (AFTER, "."))):
@@ -202,8 +203,8 @@ def plot_filter_share(run, share: float, axes=None):
     share : 0 without, 1 with the filter.  Left the torques of every drive, right each sample as in `plot_torque_plane`;
     pale the samples without filter.  For three arms.  Returns both axes.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_filter_share(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 0.5)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_filter_share(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), 0.5)
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.2))[1] if axes is None else axes
     fight = antagonistic_torque(run)
@@ -230,8 +231,8 @@ def plot_filter_share(run, share: float, axes=None):
 def film_filter(run, frames: int = 18):
     """A film of `plot_filter_share`, for three arms: points of a log land on the axis while the filter is turned on.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> plotting.film_filter(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), frames=3).size
     (768, 307)
     """
     alt = (
@@ -246,7 +247,7 @@ def film_filter(run, frames: int = 18):
 def plot_energies(rows: dict, ax=None, title: str = ""):
     """Grouped bars of energies per drive; `rows` maps a label to (N,) energies in J, plain bars before hatched ones.
 
-    >>> ax = plot_energies({"no filter": [1.3, 1.5, 1.7], "filter": [0.5, 0.7, 1.0]})
+    >>> from rapkm_lite import plotting; ax = plotting.plot_energies({"off": [1.3, 1.5, 1.7], "on": [0.5, 0.7, 1.0]})
     """
     ax = axes_or_new(ax)
     low, high = min(np.min(e) for e in rows.values()), max(np.max(e) for e in rows.values())
@@ -271,7 +272,7 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
 def plot_table1(table, ax=None, title: str = "Table 1"):
     """Measured and simulated energies of Table 1 side by side, without and with filter.
 
-    >>> import rapkm_lite as rk; ax = plot_table1(rk.table1())
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; ax = plotting.plot_table1(rk.table1())
     """
     rows = {}
     for k, when in enumerate(("without filter", "with filter")):

@@ -45,8 +45,8 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
     Raises ValueError where it crosses none of theirs.
     The arrow is the direction in which the end-effector moves while both base joints of the pair stand still.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_singular_poses(rk.triangle(rk.load()))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_singular_poses(rk.triangle(rk.load()))
     """
     robot = trajectory.robot
     crossings = dict(zip(drive_pairs(robot), curve_crossings(trajectory), strict=True))
@@ -73,8 +73,8 @@ def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
 def plot_feedback_map(robot, pair, ax=None, n: int = 220):
     """Norm of the feedback map of CTC in the angles of one pair of drives over the workspace, logarithmic.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_feedback_map(rk.load(), (0, 1), n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_feedback_map(rk.load(), (0, 1), n=21)
     """
     x, y, inside, points = grid_points(robot, n, driven=True)
     level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
@@ -86,8 +86,8 @@ def plot_feedback_map(robot, pair, ax=None, n: int = 220):
 def plot_feedback_along(trajectory, ax=None):
     """Norm of the feedback map along a path, for each fixed pair and for redundant coordinates.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3)
-    >>> ax = plot_feedback_along(path)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.triangle(rk.load(), dt=5e-3)
+    >>> ax = plotting.plot_feedback_along(path)
     """
     ax = axes_or_new(ax)
     robot = trajectory.robot
@@ -103,8 +103,8 @@ def plot_feedback_along(trajectory, ax=None):
 def plot_torques_and_errors(run, axes=None, pair=None, title: str = ""):
     """Torques and angle errors of one run, as in figs. 9 and 10; thin lines where the path crosses the pair's curve.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_torques_and_errors(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_torques_and_errors(rk.simulate(path.robot, rk.PD(7.05, 0.225), path))
     """
     axes = plt.subplots(1, 2, figsize=(9.6, 3.0))[1] if axes is None else axes
     plot_torques(run, axes[0], title, milli=False)
@@ -126,8 +126,8 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
 
     runs : label -> run; a cross marks where a run shorter than the longest one ends.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_ee_paths({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)}, pair=(0, 1))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_ee_paths({"PD": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)}, pair=(0, 1))
     """
     axes = plt.subplots(1, 2, figsize=(10.2, 3.9), width_ratios=[1, 1.55])[1] if axes is None else axes
     longest = max(runs.values(), key=lambda run: run.t[-1])
@@ -158,8 +158,8 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     pair's curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both
     axes.
 
-    >>> import rapkm_lite as rk; robot = rk.load()
-    >>> ax = plot_mirror(rk.simulate(robot, rk.PD(7.05, 0.225), rk.triangle(robot)), 1400, (0, 1))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
+    >>> ax = plotting.plot_mirror(rk.simulate(robot, rk.PD(7.05, 0.225), rk.triangle(robot)), 1400, (0, 1))
     """
     axes = plt.subplots(1, 2, figsize=(8.0, 3.6), width_ratios=[1, 1.2])[1] if axes is None else axes
     robot, desired = run.robot, run.trajectory.x
@@ -187,8 +187,8 @@ def film_mirror(run, pair, frames: int = 23):
 
     Raises ValueError for a path that crosses it less than twice.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load())
-    >>> film_mirror(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), (0, 1), frames=4).size
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.triangle(rk.load())
+    >>> plotting.film_mirror(rk.simulate(path.robot, rk.PD(7.05, 0.225), path), (0, 1), frames=4).size
     (768, 345)
     """
     crossings = curve_crossings(run.trajectory)[drive_pairs(run.robot).index(pair)]
@@ -211,8 +211,8 @@ def film_mirror(run, pair, frames: int = 23):
 def plot_pairs(run, ax=None):
     """The pair of independent joints in use over time, one bar per pair; ValueError for a law that uses no pair.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_pairs(rk.simulate(path.robot, rk.SwitchedCTC(400.0, 40.0), path))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_pairs(rk.simulate(path.robot, rk.SwitchedCTC(400.0, 40.0), path))
     """
     pairs = drive_pairs(run.robot)
     used = np.all(np.sort(run.pairs)[:, None] == pairs, axis=-1)
@@ -232,8 +232,8 @@ def plot_partition_rules(robot, rules=("printed", "sigma_min"), axes=None, n: in
 
     Raises ValueError for what is no rule of `select_independent`.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_partition_rules(rk.load(), n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_partition_rules(rk.load(), n=21)
     """
     axes = plt.subplots(1, len(rules), figsize=(9.0, 3.9), sharey=True, squeeze=False)[1][0] if axes is None else axes
     x, y, inside, points = grid_points(robot, n)
@@ -253,7 +253,7 @@ def plot_lyapunov(t, functions: dict, rate, axes=None):
 
     functions : one or two, of label -> (k,).
 
-    >>> ax = plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
+    >>> from rapkm_lite import plotting; ax = plotting.plot_lyapunov([0.0, 0.1, 0.2], {"V": [1.0, 0.5, 0.3]}, 5.0)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.2))[1] if axes is None else axes
     for (label, V), line in with_looks("functions", functions, ({"color": BEFORE}, {"color": AFTER, "ls": "--"})):

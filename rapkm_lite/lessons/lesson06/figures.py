@@ -15,8 +15,8 @@ def plot_landscape(values, cube, theory, axes=None):
 
     One panel per slice of constant third offset (lowest, middle, highest): colours simulation, dashed lines theory.
 
-    >>> import numpy as np; cube = np.ones((3, 3, 3))
-    >>> ax = plot_landscape([-1.0, 0.0, 1.0], cube, cube)
+    >>> import numpy as np; from rapkm_lite import plotting; cube = np.ones((3, 3, 3))
+    >>> ax = plotting.plot_landscape([-1.0, 0.0, 1.0], cube, cube)
     """
     axes = plt.subplots(1, 3, figsize=(11, 3.7), sharey=True)[1] if axes is None else axes
     levels = np.max(cube) * np.linspace(0, 1, 9) ** 2  # evenly spaced ellipses of a quadratic form
@@ -33,7 +33,7 @@ def plot_landscape(values, cube, theory, axes=None):
 def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
     """Total energies (k,) in J over the gain K_P (k,) in N m/rad, and the antagonistic part.
 
-    >>> ax = plot_gain_curve([1.0, 7.0], [2.2, 5.5], [2.0, 2.1], [0.2, 3.5])
+    >>> from rapkm_lite import plotting; ax = plotting.plot_gain_curve([1.0, 7.0], [2.2, 5.5], [2.0, 2.1], [0.2, 3.5])
     """
     ax = axes_or_new(ax, figsize=(6.2, 3.6))
     ax.loglog(gains, without, "o-", color=BEFORE, label="without filter")
@@ -50,8 +50,9 @@ def plot_gain_curve(gains, without, with_filter, antagonistic, ax=None):
 def plot_placement(robot, centres, values, ax=None, label="antagonistic energy in J", path=None):
     """A value (k,) for each path centre (k, 2) in m as coloured squares on the workspace, and a Trajectory `path`.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_placement(rk.load(), [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02], [0.02, 0.02]], [1.0, 2.0, 3.0, 4.0])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> centres = [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02], [0.02, 0.02]]
+    >>> ax = plotting.plot_placement(rk.load(), centres, [1.0, 2.0, 3.0, 4.0])
     """
     ax = axes_or_new(ax, figsize=(5.6, 4.4))
     plot_workspace(robot, ax, colour="#F7F7F7")
@@ -74,7 +75,8 @@ def plot_bands(samples: dict, ax=None):
 
     Of runs that were lost, masked or NaN, no energy is below any other; ValueError where all were.
 
-    >>> ax = plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_bands({"without filter": [3.0, 5.0, 4.0], "with filter": [2.0, 2.1, 2.0]})
     """
     ax = axes_or_new(ax, figsize=(6.6, 3.5))
     for (label, values), colour in with_looks("samples", samples, (BEFORE, AFTER)):
@@ -92,7 +94,8 @@ def plot_bands(samples: dict, ax=None):
 def plot_readings(names, low, high, readings, reference=None, ax=None):
     """Parameter sets (k, p), and a marked one `reference`, as dots in their ranges low, high (p,), a row per parameter.
 
-    >>> ax = plot_readings(["K_P", "K_D"], [0.0, 0.0], [10.0, 1.0], [[7.05, 0.225], [6.0, 0.3]])
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_readings(["K_P", "K_D"], [0.0, 0.0], [10.0, 1.0], [[7.05, 0.225], [6.0, 0.3]])
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.8))
     share = (np.asarray(readings) - low) / (np.asarray(high) - low)

@@ -18,8 +18,8 @@ def plot_five_bar_curves(robot, start, end, axes=None):
     Left: the end-effector of the pairs (1,2) and (2,3), and the straight line.  Right: the two joint subspaces, the
     moves as they are commanded and as the straight line in the plane would need them (dotted).  Returns both axes.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_five_bar_curves(rk.load(), [-0.05, 0.0], [0.05, 0.0])
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_five_bar_curves(rk.load(), [-0.05, 0.0], [0.05, 0.0])
     """
     axes = plt.subplots(1, 2, figsize=(9.6, 3.7), width_ratios=(1.25, 1))[1] if axes is None else axes
     part = np.linspace(0, 1, 81)[:, None]
@@ -55,7 +55,7 @@ def plot_spacing(spacing, gap, marked=None, ax=None):
 
     marked : a level in rad to compare with, as (words, number).
 
-    >>> ax = plot_spacing([0.015, 0.03], [1.7e-3, 7e-3], ("offsets", 5e-3))
+    >>> from rapkm_lite import plotting; ax = plotting.plot_spacing([0.015, 0.03], [1.7e-3, 7e-3], ("offsets", 5e-3))
     """
     ax, spacing, gap = axes_or_new(ax, figsize=(6.4, 3.4)), np.asarray(spacing), np.asarray(gap)
     ax.loglog(1e3 * spacing, 1e3 * gap[-1] * (spacing / spacing[-1]) ** 2, "--", color=NEUTRAL, label="slope two")
@@ -73,7 +73,8 @@ def plot_demand(part, demand, points: dict, ax=None):
 
     points : one or two, of label -> shares of the way between 0 and 1.
 
-    >>> ax = plot_demand([0.0, 0.5, 1.0], [0.1, 0.05, 0.1], {"equal distances": [0.25, 0.5, 0.75]})
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_demand([0.0, 0.5, 1.0], [0.1, 0.05, 0.1], {"equal distances": [0.25, 0.5, 0.75]})
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.2))
     ax.plot(part, demand, color=AFTER)

@@ -23,8 +23,8 @@ def plot_places(robot, groups, axes=None):
     has no others.
     Returns both axes.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_places(rk.load(), {"three": [[0.1, 0.0], [0.0, 0.1], [-0.1, 0.0]]})
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_places(rk.load(), {"three": [[0.1, 0.0], [0.0, 0.1], [-0.1, 0.0]]})
     """
     axes = plt.subplots(1, 2, figsize=(9.2, 4.0))[1] if axes is None else axes
     plot_workspace(robot, axes[0])
@@ -52,9 +52,9 @@ def plot_counted(t, gap, exact, axes=None):
 
     Returns both axes.
 
-    >>> import numpy as np
+    >>> import numpy as np; from rapkm_lite import plotting
     >>> t = np.linspace(0, 1, 50)
-    >>> ax = plot_counted(t, 1e-3 * np.rint(5 * t), 5e-3 * t)
+    >>> ax = plotting.plot_counted(t, 1e-3 * np.rint(5 * t), 5e-3 * t)
     """
     axes = plt.subplots(1, 2, figsize=(9.2, 3.3), width_ratios=(1.7, 1))[1] if axes is None else axes
     for ax in axes:
@@ -76,7 +76,7 @@ def plot_torque_steps(K_P, quantum, friction, target=0.5, ax=None, title: str = 
 
     K_P in N m/rad, quantum in rad, friction in N m; `target` is where the desired angle lies between two counts.
 
-    >>> ax = plot_torque_steps(7.05, 3.14e-3, 4.2e-3)
+    >>> from rapkm_lite import plotting; ax = plotting.plot_torque_steps(7.05, 3.14e-3, 4.2e-3)
     """
     ax = axes_or_new(ax, figsize=(4.4, 3.4))
     angle = np.linspace(-2.0, 3.0, 4001)
@@ -97,7 +97,7 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
 
     can_rest : (k,); open circles where a place of rest exists, crosses where none does.
 
-    >>> ax = plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
+    >>> from rapkm_lite import plotting; ax = plotting.plot_chatter([0.5, 2.0], [0.0, 40.0], [True, False])
     """
     ax = axes_or_new(ax)
     ratio, jumps, can_rest = np.asarray(ratio), np.asarray(jumps), np.asarray(can_rest, dtype=bool)
@@ -120,8 +120,8 @@ def plot_chatter(ratio, jumps, can_rest, ax=None, title: str = ""):
 def plot_bias(residual, bias, names, ax=None):
     """Errors of offsets (m, k) in rad over the residuals (m, k) in rad that they leave, m <= 3 groups called `names`.
 
-    >>> import numpy as np
-    >>> ax = plot_bias(np.array([[1e-5, 2e-5]]), np.array([[1e-3, 2e-3]]), ["a"])
+    >>> import numpy as np; from rapkm_lite import plotting
+    >>> ax = plotting.plot_bias(np.array([[1e-5, 2e-5]]), np.array([[1e-3, 2e-3]]), ["a"])
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.6))
     residual, bias = np.asarray(residual), np.asarray(bias)

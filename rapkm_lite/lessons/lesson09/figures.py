@@ -21,10 +21,10 @@ from ...mechanics.kinematics import inverse_kinematics
 def plot_clipping(free, clipped, limit, axes=None):
     """Torques of a run without limits beside its `limit` in N m, and the errors of this run and of the clipped one.
 
-    >>> import rapkm_lite as rk
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
     >>> path = rk.circle(rk.load(), 0.05, 1.0)
     >>> run = rk.simulate(rk.load(), rk.PD(7.05, 0.225), path)
-    >>> ax = plot_clipping(run, rk.simulate(rk.load(), run.law, path, faults=[rk.TorqueLimit(0.1)]), 0.1)
+    >>> ax = plotting.plot_clipping(run, rk.simulate(rk.load(), run.law, path, faults=[rk.TorqueLimit(0.1)]), 0.1)
     """
     axes = plt.subplots(1, 2, figsize=(10.0, 3.3))[1] if axes is None else axes
     for i, torque in enumerate(1e3 * free.c.T):
@@ -51,9 +51,9 @@ def plot_room(c, n, limit, room, marks, ax=None):
 
     c : the torques of least size, N m.  limit : N m.  room : (2,) N m.  marks : dict of label -> mu in N m.
 
-    >>> import numpy as np
+    >>> import numpy as np; from rapkm_lite import plotting
     >>> c, n = np.array([0.11, -0.06, -0.05]), np.full(3, 0.577)
-    >>> ax = plot_room(c, n, 0.085, (-0.04, -0.045), {"least size": 0.0})
+    >>> ax = plotting.plot_room(c, n, 0.085, (-0.04, -0.045), {"least size": 0.0})
     """
     ax = axes_or_new(ax, figsize=(7.2, 3.7))
     c, n = np.asarray(c, dtype=float), np.asarray(n, dtype=float)
@@ -79,7 +79,7 @@ def plot_room(c, n, limit, room, marks, ax=None):
 def shortest_reach(A, torque: float, n: int = 720) -> np.ndarray:
     """Outline (n, 2) in N of the forces whose torques of least size stay within `torque` N m, A (m, 2).
 
-    >>> shortest_reach([[1.0, 0.0], [0.0, 1.0]], 0.1, 4).round(3) + 0.0
+    >>> from rapkm_lite import plotting; plotting.shortest_reach([[1.0, 0.0], [0.0, 1.0]], 0.1, 4).round(3) + 0.0
     array([[ 0.1,  0. ],
            [ 0. ,  0.1],
            [-0.1,  0. ],
@@ -93,8 +93,8 @@ def shortest_reach(A, torque: float, n: int = 720) -> np.ndarray:
 def plot_accelerations(robot, places, limit: float, axes=None):
     """Accelerations at rest with torques up to `limit` N m at places (k, 2) in m: all drives, least size, each pair.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_accelerations(rk.load(), [[0.0, 0.0], [-0.05, 0.0]], 0.085)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_accelerations(rk.load(), [[0.0, 0.0], [-0.05, 0.0]], 0.085)
     """
     places = np.asarray(places, dtype=float)
     if axes is None:
@@ -129,8 +129,8 @@ def plot_accelerations(robot, places, limit: float, axes=None):
 def plot_one_sign(trajectory, ax=None, n: int = 201):
     """Where in the workspace a prestress can load all drives with one sign, the curves of the pairs, and a path.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_one_sign(rk.triangle(rk.load()), n=41)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_one_sign(rk.triangle(rk.load()), n=41)
     """
     ax = axes_or_new(ax, figsize=(6.4, 4.2))
     robot = trajectory.robot

@@ -21,8 +21,8 @@ def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
     models : dict of title -> Manipulator, which demands the angles.  K_P : one gain of all drives in N m/rad.
     Returns the axes.  Raises ValueError where a wrong model leads to an input singularity, as with two arms.
 
-    >>> import rapkm_lite as rk; robot = rk.load()
-    >>> ax = plot_geometry_maps(robot, {"longer": robot.replace(lengths=0.2002)}, 7.05, n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
+    >>> ax = plotting.plot_geometry_maps(robot, {"longer": robot.replace(lengths=0.2002)}, 7.05, n=21)
     """
     K_P = positive_number("K_P", K_P)
     axes = plt.subplots(1, len(models), figsize=(4.8 * len(models), 3.9))[1] if axes is None else axes
@@ -47,7 +47,8 @@ def plot_model_share(eps, share, t, leak, axes=None):
     Right, the force leak (j,) in N per N m at the end-effector of a prestress along a path, over time t (j,) in s.
     Returns both axes.
 
-    >>> ax = plot_model_share([1e-3, 1e-2], [2e-4, 2e-3], [0.0, 1.0], [0.01, 0.02])
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_model_share([1e-3, 1e-2], [2e-4, 2e-3], [0.0, 1.0], [0.01, 0.02])
     """
     axes = plt.subplots(1, 2, figsize=(9.6, 3.4))[1] if axes is None else axes
     eps, share, leak = np.asarray(eps), np.asarray(share), np.asarray(leak)
@@ -68,7 +69,8 @@ def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
     jumps : dict of title -> (j, k) jumps per second.  friction : f_c in N m; the line is K_P 2 pi / counts = 2 f_c.
     Returns the axes.
 
-    >>> ax = plot_hunting_maps([1.0, 7.0], [500.0, 2000.0], {"sharp": [[0.0, 9.0], [0.0, 5.0]]}, 4.2e-3)
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_hunting_maps([1.0, 7.0], [500.0, 2000.0], {"sharp": [[0.0, 9.0], [0.0, 5.0]]}, 4.2e-3)
     """
     axes = plt.subplots(1, len(jumps), figsize=(3.6 * len(jumps), 3.4), sharey=True)[1] if axes is None else axes
     axes, steps = np.atleast_1d(axes), [-0.5, 0.5, 10.0, 100.0, 1e4]
@@ -93,7 +95,7 @@ def plot_hunting_maps(gains, counts, jumps: dict, friction, axes=None):
 def plot_saturation(limit, shifts, ax=None):
     """Largest shift (k,) in m that a torque limit (k,) in N m causes; shifts: up to three, of label -> (k,).
 
-    >>> ax = plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
+    >>> from rapkm_lite import plotting; ax = plotting.plot_saturation([0.1, 0.2], {"PD": [1e-3, 1e-4]})
     """
     ax = axes_or_new(ax, figsize=(6.6, 3.4))
     for (label, shift), (colour, mark) in with_looks("shifts", shifts, ((ALARM, "o"), (AFTER, "s"), (BEFORE, "^"))):
@@ -108,8 +110,8 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
 
     The first run is the broad one; distances below `least` in mm are drawn there.
 
-    >>> import rapkm_lite as rk; path = rk.circle(rk.load(), 0.05, 0.5)
-    >>> ax = plot_faulty_runs({"healthy": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting; path = rk.circle(rk.load(), 0.05, 0.5)
+    >>> ax = plotting.plot_faulty_runs({"healthy": rk.simulate(path.robot, rk.PD(7.05, 0.225), path)})
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.4))
     looks = (("#CCCCCC", "-"), (ALARM, "-"), (AFTER, (0, (5, 1.2))), (ALARM, (0, (1.5, 1.2))), (NEUTRAL, "-."))

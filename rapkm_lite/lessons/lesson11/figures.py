@@ -23,8 +23,8 @@ def loop_frequencies(path, stiffness) -> np.ndarray:
 
     stiffness : (2, 2) or (k, 2, 2) in N/m, what a loop makes of an error of the end-effector, whose inertia they move.
 
-    >>> import numpy as np; import rapkm_lite as rk
-    >>> loop_frequencies(rk.hold(rk.load(), [0.0, 0.0], 0.01), 2e3 * np.eye(2))[0].round(2)
+    >>> import numpy as np; import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> plotting.loop_frequencies(rk.hold(rk.load(), [0.0, 0.0], 0.01), 2e3 * np.eye(2))[0].round(2)
     array([12., 12.])
     """
     M, _, _ = minimal_dynamics(path.robot, path.q, 0 * path.q)
@@ -38,8 +38,8 @@ def plot_loop_frequencies(path, springs: dict, nominal, ax=None):
     springs : dict of label -> stiffness, as `loop_frequencies` takes it; at most four.  nominal : frequency in Hz that
     all were designed for.
 
-    >>> import numpy as np; import rapkm_lite as rk
-    >>> ax = plot_loop_frequencies(rk.circle(rk.load(), 0.05), {"APD": 2e3 * np.eye(2)}, 5.0)
+    >>> import numpy as np; import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_loop_frequencies(rk.circle(rk.load(), 0.05), {"APD": 2e3 * np.eye(2)}, 5.0)
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.6))
     for (label, given), look in with_looks("springs", springs, _LOOKS):
@@ -59,7 +59,8 @@ def plot_law_bands(names, columns, axes=None):
     names : of the laws.  columns : dict of axis label -> list of samples, one array for each law; the axes are
     logarithmic where the samples are positive and spread over more than a factor of ten.  Returns the axes.
 
-    >>> ax = plot_law_bands(["PD"], {"energy in J": [[4.0, 5.0]], "error in mm": [[0.5, 1.0]]})
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_law_bands(["PD"], {"energy in J": [[4.0, 5.0]], "error in mm": [[0.5, 1.0]]})
     """
     if axes is None:
         axes = plt.subplots(1, len(columns), figsize=(9.6, 0.42 * len(names) + 1.1), sharey=True)[1]
@@ -79,8 +80,8 @@ def plot_law_bands(names, columns, axes=None):
 def plot_slow_error(t, error, predicted, ax=None):
     """Errors (k, 2) in m of a run over time t (k,) in s, and what the slow theory predicts (dashed).
 
-    >>> import numpy as np
-    >>> ax = plot_slow_error(np.linspace(0, 1, 5), np.zeros((5, 2)), np.full((5, 2), 1e-4))
+    >>> import numpy as np; from rapkm_lite import plotting
+    >>> ax = plotting.plot_slow_error(np.linspace(0, 1, 5), np.zeros((5, 2)), np.full((5, 2), 1e-4))
     """
     ax = axes_or_new(ax, figsize=(8.4, 3.2))
     for axis, (word, colour) in enumerate((("x", AFTER), ("y", ALARM))):
@@ -96,8 +97,9 @@ def plot_slow_error(t, error, predicted, ax=None):
 def plot_effective_gain(trajectory, K, ax=None):
     """Both eigenvalues of the effective gain (F^T F)^-1 F^T K F of (35) along a path; K (2N, 2N) without unit.
 
-    >>> import rapkm_lite as rk; path = rk.triangle(rk.load(), dt=5e-3); import numpy as np
-    >>> ax = plot_effective_gain(path, np.diag([1, 1, 1, 0, 0, 0]))
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> path = rk.triangle(rk.load(), dt=5e-3); import numpy as np
+    >>> ax = plotting.plot_effective_gain(path, np.diag([1, 1, 1, 0, 0, 0]))
     """
     ax = axes_or_new(ax)
     values = np.real(np.linalg.eigvals(effective_gain(orthogonal_complement(trajectory.robot, trajectory.q), K)))
@@ -113,7 +115,8 @@ def plot_effective_gain(trajectory, K, ax=None):
 def plot_step_response(t, measured: dict, predicted: dict, ax=None):
     """Simulated lines and predicted points (every 25th sample) of a deviation (k,) in m, each up to three by label.
 
-    >>> ax = plot_step_response([0.0, 0.1, 0.2], {"run": [1e-3, 4e-4, 1e-4]}, {"theory": [1e-3, 4e-4, 1e-4]})
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_step_response([0.0, 0.1, 0.2], {"run": [1e-3, 4e-4, 1e-4]}, {"theory": [1e-3, 4e-4, 1e-4]})
     """
     ax = axes_or_new(ax)
     marks = (("o", AFTER), ("s", AFTER), ("x", ALARM))

@@ -25,7 +25,7 @@ def plot_four_legs(pose, ax=None, *, lines=False):
 
     Filled circles are driven joints, open ones passive.
 
-    >>> ax = plot_four_legs([0.05, 0.0, 0.2])
+    >>> from rapkm_lite import plotting; ax = plotting.plot_four_legs([0.05, 0.0, 0.2])
     """
     ax = axes_or_new(ax, figsize=(4.2, 4.2))
     chains = four_rrr.legs(four_rrr.angles(pose))
@@ -48,8 +48,8 @@ def plot_four_legs(pose, ax=None, *, lines=False):
 def plot_apex(angle, sigma, pose, axes=None):
     """Left: smallest singular value of A~ (k,) over the platform angle (k,) in rad.  Right: the machine at a pose.
 
-    >>> import numpy as np
-    >>> ax = plot_apex(np.linspace(0, 0.7, 8), np.linspace(0.35, 0.0, 8), [0.0, 0.0, 0.59])
+    >>> import numpy as np; from rapkm_lite import plotting
+    >>> ax = plotting.plot_apex(np.linspace(0, 0.7, 8), np.linspace(0.35, 0.0, 8), [0.0, 0.0, 0.59])
     """
     axes = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained")[1] if axes is None else axes
     axes[0].plot(angle, sigma, color=AFTER)
@@ -66,7 +66,8 @@ def plot_length_choice(lengths, conditions: dict, special, ax=None):
 
     conditions : up to three, of label -> (k,).  special : a length in m to point at, as (words, number).
 
-    >>> ax = plot_length_choice([0.1, 1.0], {"centre": [1.0, 7.0]}, ("platform", 0.14))
+    >>> from rapkm_lite import plotting
+    >>> ax = plotting.plot_length_choice([0.1, 1.0], {"centre": [1.0, 7.0]}, ("platform", 0.14))
     """
     ax = axes_or_new(ax, figsize=(6.4, 3.4))
     for (label, condition), look in with_looks("conditions", conditions, ("-", "--", ":")):
@@ -81,9 +82,9 @@ def plot_length_choice(lengths, conditions: dict, special, ax=None):
 def plot_swing(motion, pose, labels, ax=None):
     """Distance of the platform's centre from its wanted place over time, in mm: poses (runs, k, 3), named by `labels`.
 
-    >>> import numpy as np; from rapkm_lite.lessons.lesson12 import four_rrr
+    >>> import numpy as np; from rapkm_lite.lessons.lesson12 import four_rrr; from rapkm_lite import plotting
     >>> motion = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
-    >>> ax = plot_swing(motion, np.ones((1, 3, 3)), ["PD"])
+    >>> ax = plotting.plot_swing(motion, np.ones((1, 3, 3)), ["PD"])
     """
     ax = axes_or_new(ax, figsize=(8.0, 3.4))
     off = 1e3 * np.linalg.norm((pose - motion.pose)[..., :2], axis=-1)
