@@ -22,26 +22,31 @@ function names() {
   found?.before(Object.assign(make("h1"), { textContent: "Search" }), way);
 }
 
-// On a narrow screen the lists at the sides are drawers: their icons are buttons, and Escape closes them.
+// On a narrow screen the lists at the sides are drawers: the labels that open them become buttons.  Escape closes a
+// drawer, and so does a step of the keyboard to what lies behind it.
 function drawers() {
-  for (const icon of document.querySelectorAll(".nav-overlay-icon, .toc-overlay-icon")) {
-    const box = document.getElementById(icon.htmlFor);
+  for (const label of document.querySelectorAll(".nav-overlay-icon, .toc-overlay-icon")) {
+    const box = document.getElementById(label.htmlFor), button = document.createElement("button");
     const drawer = document.querySelector(box.id === "__toc" ? ".toc-drawer" : ".sidebar-drawer");
-    const say = () => icon.setAttribute("aria-expanded", box.checked);
-    Object.assign(icon, { tabIndex: 0, role: "button", ariaLabel: drawer.ariaLabel });
+    const say = () => button.setAttribute("aria-expanded", box.checked);
+    Object.assign(button, { className: label.className, ariaLabel: drawer.ariaLabel });
+    button.append(...label.childNodes);
+    label.replaceWith(button);
     box.addEventListener("change", say);
     say();
-    icon.addEventListener("keydown", (event) => {
-      if (!["Enter", " "].includes(event.key)) return;
-      event.preventDefault();
-      icon.click();
+    button.onclick = () => {
+      box.click();
       const first = () => [...drawer.querySelectorAll("a, input")].find((one) => one.offsetParent);
       setTimeout(() => box.checked && first()?.focus(), 50);
-    });
+    };
+    const open = () => box.checked && button.getClientRects().length;
     addEventListener("keydown", (event) => {
-      if (event.key !== "Escape" || !box.checked || !icon.getClientRects().length) return;
+      if (event.key !== "Escape" || !open()) return;
       box.click();
-      icon.focus();
+      button.focus();
+    });
+    addEventListener("focusin", (event) => {
+      if (event.target !== button && !drawer.contains(event.target) && open()) box.click();
     });
   }
 }
