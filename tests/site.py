@@ -149,16 +149,16 @@ def search(context, base: str) -> list[str]:
 
 def drawers(context, base: str) -> list[str]:
     """The lists at the sides of a narrow screen, by keys alone: open, the first link, closed and out of the way, also
-    when the keyboard goes on to the page."""
+    when the keyboard or a link goes on to the page."""
     page, wrong = opened(context, base)
-    page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
     both = [(390, ".nav-overlay-icon", ".sidebar-drawer"), (390, ".toc-header-icon", ".toc-drawer")]
     for width, icon, drawer in [*both, (1100, ".toc-content-icon", ".toc-drawer")]:
         page.set_viewport_size({"width": width, "height": 800})
+        page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
         inside = f"document.querySelector('{drawer}').contains(document.activeElement)"
         hidden = f"getComputedStyle(document.querySelector('{drawer}')).visibility === 'hidden'"
-        page.wait_for_function(hidden)
         try:
+            page.wait_for_function(hidden, timeout=5000)
             for key in ("Enter", "Space"):
                 page.focus(f"button{icon}")
                 page.keyboard.press(key)
@@ -166,6 +166,12 @@ def drawers(context, base: str) -> list[str]:
                 page.keyboard.press("Escape")
                 page.wait_for_function(hidden, timeout=5000)
                 page.wait_for_function(f"document.activeElement.matches('{icon}')", timeout=5000)
+            if drawer == ".toc-drawer":
+                page.keyboard.press("Enter")
+                page.wait_for_function(inside, timeout=5000)
+                page.keyboard.press("Enter")  # the link to the first section
+                page.wait_for_function(hidden, timeout=5000)
+                page.focus(f"button{icon}")
             # What the keyboard comes to next is not covered.
             page.keyboard.press("Enter")
             page.wait_for_function(inside, timeout=5000)

@@ -23,7 +23,7 @@ function names() {
 }
 
 // On a narrow screen the lists at the sides are drawers: the labels that open them become buttons.  Escape closes a
-// drawer, and so does a step of the keyboard to what lies behind it.
+// drawer, and so does a link to a place of the page, or a step of the keyboard, to what lies behind it.
 function drawers() {
   for (const label of document.querySelectorAll(".nav-overlay-icon, .toc-overlay-icon")) {
     const box = document.getElementById(label.htmlFor), button = document.createElement("button");
@@ -36,14 +36,17 @@ function drawers() {
     say();
     button.onclick = () => {
       box.click();
-      const first = () => [...drawer.querySelectorAll("a, input")].find((one) => one.offsetParent);
-      setTimeout(() => box.checked && first()?.focus(), 50);
+      const links = [...drawer.querySelectorAll("a, input")];
+      if (box.checked) links.find((one) => one.offsetParent)?.focus({ preventScroll: true });
     };
     const open = () => box.checked && button.getClientRects().length;
     addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !open()) return;
       box.click();
       button.focus();
+    });
+    drawer.addEventListener("click", (event) => {
+      if (event.target.closest('a[href^="#"]') && open()) box.click();
     });
     addEventListener("focusin", (event) => {
       if (event.target !== button && !drawer.contains(event.target) && open()) box.click();
