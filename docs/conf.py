@@ -43,4 +43,5 @@ html_show_search_summary = False
 html_favicon = "pages/static/icon.svg"
 html_copy_source = False
 html_show_sourcelink = False
-html_theme_options = {"navigation_with_keys": True}
+# A letter or sign alone is a key of the browser and of people who speak to it, not of a page; arrows turn the pages.
+html_theme_options = {"navigation_with_keys": True, "enable_search_shortcuts": False}

@@ -2,7 +2,7 @@
 
 Fails on an outside request, a console error, a raw formula, a broken link or anchor, a picture without words,
 horizontal scrolling and broken words of tables at 360 px, a box that the keyboard does not move or that the bar covers,
-an open answer, and a search that finds nothing.  --shots FOLDER takes screenshots.
+keys that do too much or too little, an open answer, and a search that finds nothing.  --shots FOLDER takes screenshots.
 """
 
 from __future__ import annotations
@@ -183,6 +183,28 @@ def drawers(context, base: str) -> list[str]:
     return [f"{base.split(':')[0]} drawers: {what}" for what in wrong]
 
 
+def keys(context, base: str) -> list[str]:
+    """Arrows move a box that is wider than its place, and turn the pages elsewhere; a letter or sign does nothing."""
+    page, wrong = opened(context, base)
+    page.set_viewport_size({"width": 1100, "height": 700})
+    page.goto(f"{base}/lessons/03_steady_state_antagonism.html")
+    page.wait_for_function(READY)
+    page.keyboard.press("/")
+    if page.evaluate("document.activeElement !== document.body"):
+        wrong.append("the key / takes the focus")
+    page.focus("article pre[tabindex='0'] >> nth=0")
+    page.keyboard.press("ArrowRight")
+    try:
+        page.wait_for_function("document.activeElement.scrollLeft > 0", timeout=5000)
+        page.evaluate("document.activeElement.blur()")
+        page.keyboard.press("ArrowRight")
+        page.wait_for_url("**/04_*.html", timeout=5000)
+    except Exception:
+        wrong.append(f"after arrows in a wide box, and outside of it: {page.url}")
+    page.close()
+    return [f"{base.split(':')[0]} keys: {what}" for what in wrong]
+
+
 def covered(context, base: str) -> list[str]:
     """What lies under the bar at the top of a telephone when the keyboard comes to it, from the foot of a page on."""
     page, wrong = opened(context, base)
@@ -236,6 +258,7 @@ def main() -> int:
             wrong += [what for name in names for what in look(context, base, name, None)]
             wrong += search(browser.new_context(viewport={"width": 1280, "height": 800}), base)
             wrong += drawers(context, base)
+            wrong += keys(context, base)
             wrong += covered(context, base)
             context.close()
         wrong += pictures(browser, bases[0], options.shots) if options.shots else []

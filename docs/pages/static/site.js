@@ -70,6 +70,12 @@ function reach() {
     else box.removeAttribute("tabindex");
 }
 
+// There they turn no page.
+function still(event) {
+  if (event.key.startsWith("Arrow") && event.target.closest?.('article [tabindex="0"]')) event.stopPropagation();
+}
+
+addEventListener("keydown", still, true);
 addEventListener("DOMContentLoaded", names);
 addEventListener("DOMContentLoaded", drawers);
 // The page grows when formulas are set, pictures come and folds open, and with the window.
