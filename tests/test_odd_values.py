@@ -367,7 +367,7 @@ PALETTE = explore.Palette((0.0, 1.0), ("#888888",), ("#777777",))
         (lambda p: p.legend("a", ["b"]), r"entries = \['b'\]; allowed: a list of \(words, keywords of a line\)"),
         (lambda p: p.limits("a", y=(1, 1)), r"y = \(1, 1\); allowed: two different numbers"),
         (lambda p: p.fit("a", [1.0], least=0), r"least = 0; allowed: > 0"),
-        (lambda p: p.handle("a", 0, 0, gain=3), r"gain has shape \(\); allowed: \(k,\)"),
+        (lambda p: p.handle("a", 0, 0, gain=3), r"gain = 3; allowed: \(a, b\) or \(a, b, c\)"),
         (lambda p: p.xlim(["a"]), r"there is no panel \['a'\]; allowed: a"),
         (lambda p: explore.Picture({"a": {"xlim": 3}}), r"xlim has shape \(\); allowed: \(2,\)"),
         (lambda p: explore.Picture({"a": {"title": 3}}), r"title = 3; allowed: text"),
