@@ -678,9 +678,11 @@ def test_finished_chunks_are_on_the_exception_and_the_rest_is_cancelled(law, err
     assert_array_equal(energies, rk.sweep(ROBOT, law, PATH, offsets).energies)
 
 
-def test_an_interrupt_before_any_chunk_is_done_has_a_partial_too():
-    with pytest.raises(KeyboardInterrupt) as caught:
-        rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, KeyboardInterrupt()), chunk=2)
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), BrokenProcessPool("a process died")], ids=["Ctrl-C", "died"])
+def test_a_sweep_that_is_stopped_before_any_chunk_is_done_has_a_partial_too(error):
+    """As its docstring says of both."""
+    with pytest.raises(type(error)) as caught:
+        rk.sweep(ROBOT, PD, PATH, np.zeros((4, 3)), executor=Pool(0, error), chunk=2)
     assert caught.value.partial.failed.all() and caught.value.partial.failure_time.mask.all()
 
 

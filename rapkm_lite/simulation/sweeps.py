@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from typing import Any
 
 import numpy as np
@@ -121,9 +121,9 @@ def _collect(pool: Executor | None, chunks: dict, table: Columns, progress: bool
 
 
 def _hand_over_rows(error: BaseException, table: Columns, setup: Setup, law, offsets) -> None:
-    """Give an exception the rows that are finished; an interrupt also when there are none."""
+    """Give an exception the rows that are finished; an interrupt or the end of an executor also when there are none."""
     finished = np.count_nonzero(table.status == DONE)
-    if finished or not isinstance(error, Exception):
+    if finished or isinstance(error, BrokenExecutor) or not isinstance(error, Exception):
         words = "they are in the `partial` of this exception, a Sweep whose other rows are masked."
         partial = _result(table, setup, law, offsets, mask=True)
         hand_over(error, partial, f"{finished} of {len(table.status)} runs were finished; {words}")
