@@ -15,7 +15,7 @@ import pytest
 from test_rooms import ARROWS, DOORS, ROOMS, room
 
 import rapkm_lite as rk
-from rapkm_lite import explore, plotting
+from rapkm_lite import checks, explore, plotting
 
 matplotlib.use("agg")
 
@@ -86,7 +86,7 @@ def test_how_to_add_pages_are_linked_from_the_front_door():
 
 PUBLIC = {
     f"{short}.{name}": thing
-    for short, module in {"rk": rk, "plotting": plotting, "explore": explore}.items()
+    for short, module in {"rk": rk, "plotting": plotting, "explore": explore, "checks": checks}.items()
     for name, thing in vars(module).items()
     if not name.startswith("_") and callable(thing) and thing.__module__.startswith("rapkm_lite.") and name != "guarded"
 }

@@ -30,7 +30,11 @@ def lessons() -> list[str]:
 
 
 def exercises() -> dict[str, Exercise]:
-    """All exercises by name, e.g. "01.loop_constraints": the EXERCISES of every lesson that has some."""
+    """All exercises by name, e.g. "01.loop_constraints": the EXERCISES of every lesson that has some.
+
+    >>> exercises()["04.filtered_torques"].unit
+    'N m'
+    """
     found = {}
     for lesson in lessons():
         if importlib.util.find_spec(f"{__package__}.{lesson}.exercises"):
@@ -56,6 +60,9 @@ def examine(name: str, answer: Any) -> tuple[str, str]:
     """Verdict ("ok", "close", "todo" or "wrong") and a sentence with the measured number for an answer to one exercise.
 
     Raises ValueError for an unknown exercise.
+
+    >>> examine("04.filtered_torques", ...)
+    ('todo', 'not yet')
     """
     return judge(name, answer)[:2]
 
@@ -126,6 +133,9 @@ def hint(name: str, step: int | None = None) -> None:
     """Print the next of three hints for an exercise, or the given one: what to think of, which quantity, the line.
 
     Raises ValueError for an unknown exercise or step.
+
+    >>> hint("04.filtered_torques", 1)  # doctest: +ELLIPSIS
+    Hint 1 of 3 for 04.filtered_torques: ...
     """
     hints = _known(name).hints
     if step is None:

@@ -84,6 +84,9 @@ class Exercise:
     secret : True where `check` must not hand out the package's answer, nor say how far another one is off.
     points : what a right or close answer is worth.
     called : the name of the answer in the lesson, where it is not the last part of the exercise's name.
+
+    >>> Exercise(reference=9.81, unit="m/s^2").is_value([()])
+    True
     """
 
     reference: Any
