@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..machine.manipulator import crossings, load
+from ..machine.manipulator import load
+from ..machine.reach import shared_rims
 
 # Angles in mrad, and places in mm on a machine of 1 m, that differ by less are rounding.
 LEAST = 1e-6
@@ -16,19 +17,13 @@ LEAST = 1e-6
 def workspace_box(robot) -> np.ndarray:
     """The smallest box [[x_min, x_max], [y_min, y_max]] in m, (2, 2), around the points that all arms reach.
 
-    Its sides touch the circles of reach where these are farthest out, or where two of them cross.
+    Its sides touch the rims of reach where these are farthest out, or where two of them cross.
 
     >>> import rapkm_lite as rk
     >>> workspace_box(rk.load()).round(3).tolist()
     [[-0.2, 0.2], [-0.169, 0.231]]
     """
-    inner, outer = np.abs(robot.lengths[:, 0] - robot.lengths[:, 1]), robot.lengths.sum(axis=1)
-    centres, radii = np.concatenate([robot.base, robot.base]), np.concatenate([inner, outer])
-    i, j = np.tril_indices(len(radii), -1)
-    ways = [centres + radii[:, None] * way for way in ([1, 0], [-1, 0], [0, 1], [0, -1])]
-    points = np.concatenate([*ways, crossings(centres[i], centres[j], radii[i], radii[j])])
-    reach, slack = np.linalg.norm(points[:, None] - robot.base, axis=-1), 1e-9 * outer.max()
-    there = points[np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)]
+    there = shared_rims(robot.base, robot.lengths, 1e-9)
     return np.stack([there.min(axis=0), there.max(axis=0)], axis=-1)
 
 

@@ -11,7 +11,7 @@ from ..machine.arguments import shaped, short
 from ..machine.manipulator import Manipulator
 from ..mechanics.actuation import control_matrix, distal_cross_products, drive_pairs, singular_values
 from ..mechanics.kinematics import inverse_kinematics, reachable
-from ..mechanics.maps import workspace_grid
+from ..mechanics.maps import points_inside, workspace_grid
 from .style import ARM_LINES, PAIR_COLOURS, arm_line, axes_or_new
 
 _OUTLINED: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=2.6, foreground="#222222")]
@@ -72,7 +72,7 @@ def grid_points(robot: Manipulator, n: int, box=None, driven: bool = False):
     True
     """
     x, y, inside = workspace_grid(robot, n, box)
-    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
+    points = points_inside(x, y, inside)
     if driven:
         sigma = singular_values(control_matrix(robot, inverse_kinematics(robot, points)))
         regular = sigma[:, 1] > 1e-9 * sigma[:, 0]

@@ -22,6 +22,7 @@ from .arguments import (
     short,
 )
 from .datafiles import UNITS_OF, known, read_toml
+from .reach import shared_rims
 from .tree import Tree
 from .values import Array, FilledArray, Value, default, frozen
 
@@ -98,7 +99,7 @@ class Manipulator(Value):
                 f"inertias = {short(given['inertias'].tolist())} with masses, centers and load = {given['load']:g} let "
                 "an arm move freely; allowed: values with a positive definite mass matrix"
             )
-        if not _arms_meet(base, np.abs(lengths[:, 0] - lengths[:, 1]), lengths.sum(axis=1)):
+        if not len(shared_rims(base, lengths, 1e-12)):
             raise ValueError(
                 f"lengths = {short(lengths.round(6).tolist())} let no point be reached by all {N} arms from base = "
                 f"{short(base.round(6).tolist())}; allowed: arms that can meet (longer links or closer base points)"
@@ -227,31 +228,6 @@ def _shortest(value: np.ndarray) -> Any:
     if np.all(value == value.flat[0]):
         return value.flat[0].item()
     return value[0] if np.all(value == value[0]) else value
-
-
-def _arms_meet(base: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> bool:
-    """Do N annuli share a point?  Then they share a crossing of two circles, or a whole circle."""
-    centers, radii = np.concatenate([base, base]), np.concatenate([inner, outer])
-    i, j = np.tril_indices(len(radii), -1)
-    points = [centers + np.stack([radii, 0 * radii], axis=-1), crossings(centers[i], centers[j], radii[i], radii[j])]
-    reach = np.linalg.norm(np.concatenate(points)[:, None, :] - base, axis=-1)
-    slack = 1e-12 * outer.max()
-    return bool(np.any(np.all((reach >= inner - slack) & (reach <= outer + slack), axis=-1)))
-
-
-def crossings(a: np.ndarray, b: np.ndarray, r_a: np.ndarray, r_b: np.ndarray) -> np.ndarray:
-    """Where circles about a and b (k, ..., 2) of radii r (k,) cross: (2 k, ..., 2), first those left of b - a.
-
-    Circles that do not meet give the point of their line of centres on the radical axis; touching ones touch there.
-    """
-    r_a, r_b = (r.reshape(-1, *[1] * (a.ndim - 1)) for r in (r_a, r_b))
-    gap = b - a
-    distance = np.maximum(np.linalg.norm(gap, axis=-1, keepdims=True), 1e-12 * r_b.max())
-    unit = gap / distance
-    along = (distance**2 + r_a**2 - r_b**2) / (2 * distance)
-    across = np.sqrt(np.maximum(r_a**2 - along**2, 0.0)) * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-    middle = a + along * unit
-    return np.concatenate([middle + across, middle - across])
 
 
 def manipulator(value: Any, name: str = "robot") -> Manipulator:

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..machine.arguments import ConvergenceError, matvec, real_array, shaped
 from ..machine.logs import Log, read_log
-from ..machine.manipulator import Manipulator, crossings
+from ..machine.manipulator import Manipulator
+from ..machine.reach import crossings
 from . import cores
 from .at import At, at
 from .closure import estimate_pose, misfit

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..machine.arguments import check_leading, entry, real_array, short
 from ..machine.manipulator import Manipulator, manipulator
+from ..machine.reach import within
 from . import cores
 from .at import at
 from .cores import wrap as wrap
@@ -116,9 +117,7 @@ def reachable(robot: Manipulator, x) -> np.ndarray:
     """
     manipulator(robot)
     x = real_array("x", x, 2)
-    reach = np.linalg.norm(x[..., None, :] - robot.base, axis=-1)
-    l1, l2 = robot.lengths.T
-    return np.all((reach <= l1 + l2) & (reach >= np.abs(l1 - l2)), axis=-1)
+    return within(np.linalg.norm(x[..., None, :] - robot.base, axis=-1), robot.lengths)
 
 
 def working_modes(robot: Manipulator) -> np.ndarray:

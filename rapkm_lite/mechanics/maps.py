@@ -9,6 +9,7 @@ import numpy as np
 
 from ..machine.arguments import exact_array, joint_indices, one_of, real_array, short, whole_number
 from ..machine.manipulator import Manipulator, manipulator
+from ..machine.reach import within
 from .actuation import distal_cross_products, drive_pairs
 from .at import at
 from .cores import prestress_shares
@@ -50,10 +51,8 @@ def workspace_grid(robot: Manipulator, n: int = 200, box=None) -> tuple[np.ndarr
     x, y = np.linspace(left, right, n), np.linspace(low, high, n)
     dx, dy = x[:, None] - robot.base[:, 0], y[:, None] - robot.base[:, 1]
     reach = np.hypot(dx, dy[:, None])
-    l1, l2 = robot.lengths.T
     # A hair inside the boundary, where an arm is stretched or folded and the end-effector is no coordinate.
-    slack = 1e-9 * (l1 + l2)
-    return x, y, np.all((reach < l1 + l2 - slack) & (reach > np.abs(l1 - l2) + slack), axis=-1)
+    return x, y, within(reach, robot.lengths, -1e-9 * robot.lengths.sum(axis=1))
 
 
 def actuation_map(robot: Manipulator, measure: str = "sigma_min", mode=None, n: int = 200, box=None, pair=None):
@@ -117,9 +116,13 @@ def switching_map(robot: Manipulator, rule: str = "cross", mode=None, n: int = 2
 
 def poses_inside(robot: Manipulator, x: np.ndarray, y: np.ndarray, inside: np.ndarray, mode=None) -> np.ndarray:
     """Joint angles (..., points inside, 2N) on a `workspace_grid`."""
-    points = np.stack(np.meshgrid(x, y), axis=-1)[inside]
     mode = robot.mode if mode is None else real_array("mode", mode, robot.n_arms)
-    return inverse_kinematics(robot, points, mode[..., None, :])
+    return inverse_kinematics(robot, points_inside(x, y, inside), mode[..., None, :])
+
+
+def points_inside(x: np.ndarray, y: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """The points (k, 2) in m of a `workspace_grid` that lie inside."""
+    return np.stack(np.meshgrid(x, y), axis=-1)[inside]
 
 
 def _on_grid(values: np.ndarray, inside: np.ndarray) -> np.ma.MaskedArray:
