@@ -384,7 +384,7 @@ REFUSED = {
     words: "it returns a string",
     silent: "it returns nothing: is a return missing?",
     outside: 'table is of type dict, line # of test_compiled_law.py: return -table["gain"] * e',
-    helped: "helper is a function that is not compiled, line # of test_compiled_law.py: return helper(q_a - d.q_a)",
+    helped: "helper is a function without @numba.njit, line # of test_compiled_law.py: return helper(q_a - d.q_a)",
     undefined: "name 'unknown_gain' is not defined, line # of test_compiled_law.py: return -unknown_gain * e",
     misspelt: "d has no qa, line # of test_compiled_law.py: return -7.0 * (q_a - d.qa)",
     twofold: "c is once a number and once an array, line # of test_compiled_law.py:",

@@ -12,7 +12,7 @@ MATRICES = "x xd q qd F F_dot A A_T_pinv J J_dot N N_dot G C Q minimal redundant
 
 # What Numba says, what is said instead; the first that fits.
 _WORDS = (
-    (r"name '(\w+)': Cannot determine Numba type of <class 'function'>", r"\1 is a function that is not compiled"),
+    (r"name '(\w+)': Cannot determine Numba type of <class 'function'>", r"\1 is a function without @numba.njit"),
     (r"name '(\w+)': Cannot determine Numba type of <class '(?:\w+\.)*(\w+)'>", r"\1 is of type \2"),
     (r"NameError: (name '\w+' is not defined)", r"\1"),
     (r"Unknown attribute '(\w+)' of type Matrices.+", rf"at has no \1 here, but {', '.join(MATRICES)}"),

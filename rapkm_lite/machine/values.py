@@ -118,10 +118,11 @@ class Value:
     """Base of the frozen dataclasses of this package: read-only arrays, compared by value, printed as typed.
 
     `frozen` copies of the caller's arrays are kept, also by pickling and copying, so neither side can change the
-    other's.  (One thing NumPy allows with a read-only array: ``a.shape = ...`` gives it another shape in place, and so
-    changes the value; use ``a.reshape``.)  Values of one type are equal when their fields are, as `likeness.equal`
-    says; equal values have equal hashes, computed once.  What a user's class sets besides its fields is compared,
-    copied and printed with them, and stays as it is.
+    other's.  (Two things NumPy allows with a read-only array: ``a.shape = ...`` gives it another shape in place, and so
+    changes the value, use ``a.reshape``; and ``a.unshare_mask()`` a mask that can be changed, use ``np.ma.copy``.)
+    Values of one type are equal when their fields are, as `likeness.equal` says; equal values have equal hashes,
+    computed once.  What a user's class sets besides its fields is compared, copied and printed with them, and stays as
+    it is.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
