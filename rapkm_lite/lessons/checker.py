@@ -32,7 +32,7 @@ def lessons() -> list[str]:
 def exercises() -> dict[str, Exercise]:
     """All exercises by name, e.g. "01.loop_constraints": the EXERCISES of every lesson that has some.
 
-    >>> exercises()["04.filtered_torques"].unit
+    >>> from rapkm_lite import checks; checks.exercises()["04.filtered_torques"].unit
     'N m'
     """
     found = {}
@@ -61,7 +61,7 @@ def examine(name: str, answer: Any) -> tuple[str, str]:
 
     Raises ValueError for an unknown exercise.
 
-    >>> examine("04.filtered_torques", ...)
+    >>> from rapkm_lite import checks; checks.examine("04.filtered_torques", ...)
     ('todo', 'not yet')
     """
     return judge(name, answer)[:2]
@@ -76,7 +76,7 @@ def check(name: str, answer: Any) -> Any:
     none.  Raises AssertionError instead when the environment variable RAPKM_LITE_STRICT is 1 and the answer is neither
     right nor close; ValueError for an unknown exercise.
 
-    >>> shift = check("04.filtered_torques", ...)
+    >>> from rapkm_lite import checks; shift = checks.check("04.filtered_torques", ...)
     TODO 04.filtered_torques: not yet
     """
     exercise = _known(name)
@@ -134,7 +134,7 @@ def hint(name: str, step: int | None = None) -> None:
 
     Raises ValueError for an unknown exercise or step.
 
-    >>> hint("04.filtered_torques", 1)  # doctest: +ELLIPSIS
+    >>> from rapkm_lite import checks; checks.hint("04.filtered_torques", 1)  # doctest: +ELLIPSIS
     Hint 1 of 3 for 04.filtered_torques: ...
     """
     hints = _known(name).hints

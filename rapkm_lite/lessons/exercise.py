@@ -13,7 +13,7 @@ class Case(tuple):
     beyond : True for a case that goes further than it takes to have the idea, like a fourth drive; an answer that is
     wrong there only is "close".
 
-    >>> Case("a nearly singular pose", 1.0, 2.0).label
+    >>> from rapkm_lite import checks; checks.Case("a nearly singular pose", 1.0, 2.0).label
     'a nearly singular pose'
     """
 
@@ -30,9 +30,9 @@ class Case(tuple):
 class Measured:
     """One measured number of a design beside its limit, at most (or at least) so much.
 
-    >>> print(Measured("largest error", 2.4, "mm", 2.0))
+    >>> from rapkm_lite import checks; print(checks.Measured("largest error", 2.4, "mm", 2.0))
     largest error 2.4 mm (at most 2 mm: missed)
-    >>> print(Measured("largest error", 120.0004, "mm", 120.0))
+    >>> print(checks.Measured("largest error", 120.0004, "mm", 120.0))
     largest error 120.0004 mm (at most 120 mm: missed)
     """
 
@@ -85,7 +85,7 @@ class Exercise:
     points : what a right or close answer is worth.
     called : the name of the answer in the lesson, where it is not the last part of the exercise's name.
 
-    >>> Exercise(reference=9.81, unit="m/s^2").is_value([()])
+    >>> from rapkm_lite import checks; checks.Exercise(reference=9.81, unit="m/s^2").is_value([()])
     True
     """
 

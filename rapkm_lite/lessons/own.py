@@ -20,10 +20,9 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
     Nothing happens when the answer is right or not there yet; one that cannot be drawn ends in a sentence.
     Raises ValueError for an unknown exercise.
 
-    >>> from rapkm_lite.lessons.checker import check
-    >>> shift = check("03.rest_error", ...)
+    >>> from rapkm_lite import checks; shift = checks.check("03.rest_error", ...)
     TODO 03.rest_error: not yet
-    >>> draw_own("03.rest_error", lambda own: ([0.0, 1.0], own), ax=None)
+    >>> checks.draw_own("03.rest_error", lambda own: ([0.0, 1.0], own), ax=None)
     """
     from ..figures.style import ALARM, arm_colour  # matplotlib is not needed for a check
 
