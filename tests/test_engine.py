@@ -95,6 +95,28 @@ def test_every_drive_its_own_gain():
         agrees(machine(3), law, duration=0.1)
 
 
+def test_a_diagonal_that_is_written_as_a_matrix_is_one_to_the_engine_too():
+    """Such as W = diag(R_el / k_t^2) of the filter; what couples coordinates goes through the textbook layer."""
+    robot, drives, joints = machine(3), [7.0, 5.0, 9.0], [7.0, 5.0, 9.0, 0.1, 0.2, 0.3]
+    setup = prepare(robot, rk.hold(robot, [0.02, 0.03], 0.01), rk.Sensors())
+    pd = rk.PD(np.diag(drives), 0.2 * np.eye(3))
+    laws = {
+        rk.PD(drives, 0.2): pd,
+        rk.CommandFilter(rk.PD(drives, 0.2)): rk.CommandFilter(pd),
+        rk.AntagonismFilter(PD, W=drives): rk.AntagonismFilter(PD, W=np.diag(drives)),
+        rk.CTC([900.0, 700.0], 60.0): rk.CTC(np.diag([900.0, 700.0]), 60.0 * np.eye(2)),
+        rk.RedundantAPD(joints, 0.2): rk.RedundantAPD(np.diag(joints), 0.2 * np.eye(6)),
+    }
+    for law, same in laws.items():
+        assert compiled.encode(same, setup) is not None
+        agrees(robot, same, duration=0.1)
+        rows = rk.sweep(robot, [law, same], rk.circle(robot, 0.03, 0.1), OFFSET[:3])
+        np.testing.assert_array_equal(rows.energies[0], rows.energies[1])
+    for coupled in (rk.PD(drives, 0.2 + np.eye(3)), rk.AntagonismFilter(PD, W=0.2 + np.eye(3))):
+        assert compiled.encode(coupled, setup) is None
+        agrees(robot, coupled, duration=0.1)
+
+
 def test_switching_goes_by_the_directions_of_distal_links_whatever_the_lengths():
     robot = rk.load().replace(lengths=[[0.22, 0.2], [0.18, 0.3], [0.27, 0.22]], friction=0.0)
     law = rk.SwitchedCTC(400.0, 40.0, hysteresis=1.0, pose="true")

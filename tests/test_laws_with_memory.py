@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from samples import InPython
 
 import rapkm_lite as rk
 
@@ -127,7 +128,7 @@ def test_pid_with_anti_windup():
     assert_allclose(rk.simulate(ROBOT, rk.PID(7.05, 0.0, 0.225), PATH, OFFSET).c, seen.c, rtol=0, atol=1e-10)
     full = rk.PID(np.diag(gains["K_P"]), 90.0 * np.eye(3), 0.2 * np.eye(3))
     assert_allclose(
-        rk.simulate(ROBOT, full, PATH, OFFSET).c,
+        rk.simulate(ROBOT, InPython(full), PATH, OFFSET).c,
         rk.simulate(ROBOT, rk.PID(**gains), PATH, OFFSET).c,
         rtol=0,
         atol=1e-10,

@@ -51,19 +51,19 @@ FILTERS = {AntagonismFilter: "FORCE_FILTER", CommandFilter: "COMMAND_FILTER"}
 def code_of(law: Any, model) -> Code | None:
     """The engine's form of a law, or None where it has none.
 
-    The engine knows diagonal gains and weights that are not too unequal, and filters that share the pose of the law
-    inside.
+    The engine knows diagonal gains and weights, also as matrices, that are not too unequal, and filters that share the
+    pose of the law inside.
     """
     form, weights, pose = "NO_FILTER", getattr(law, "W", None), getattr(law, "pose", None)
     if type(law) in FILTERS:
         form, law = FILTERS[type(law)], law.law
         if getattr(law, "W", None) is not None or getattr(law, "pose", None) not in (None, pose):
             return None
-    if weights is not None and np.ndim(weights) > 1:
+    if not _diagonal(weights):
         return None
     if type(law) is CompiledLaw:
         code, drives, run, user = "USER", {}, {}, law
-    elif type(law) in FORMS and not any(np.ndim(getattr(law, name, 0.0)) > 1 for name in ("K_P", "K_D", "K_I")):
+    elif type(law) in FORMS and all(_diagonal(getattr(law, name, None)) for name in ("K_P", "K_D", "K_I")):
         (code, drives, run), user = _gains(law, model.n_arms), None
     else:
         return None
@@ -73,6 +73,11 @@ def code_of(law: Any, model) -> Code | None:
         return None
     task, switched = getattr(law, "independent", ()) is None, isinstance(law, SwitchedCTC)
     return Code(code, form, pose == "true", task, switched, drives, run, user)
+
+
+def _diagonal(value) -> bool:
+    """Does each coordinate have a number of its own, if there is a value at all?"""
+    return np.ndim(value) < 2 or not np.any(value - np.diag(np.diagonal(value)))
 
 
 def _one_for_all(ease: np.ndarray) -> bool:
@@ -105,4 +110,5 @@ def _gains(law: Any, N: int) -> tuple[str, dict, dict]:
 def _per(name: str, value, size: int) -> np.ndarray:
     value = np.asarray(value, dtype=float)
     fits = f"one number or ({size},)" if name == "limit" else f"one number, ({size},) or ({size}, {size})"
+    value = np.diagonal(value) if value.shape == (size, size) else value
     return np.full(size, shaped(name, value, value.shape in ((), (size,)), fits))
