@@ -542,6 +542,42 @@ def test_a_memory_that_would_be_forgotten_is_refused(law, name):
             run(ROBOT, compiled, PATH, np.zeros((1, 3)) if run is rk.sweep else 0.0)
 
 
+def integrated(t, q_a, qd_a, d, memory):
+    e = q_a - d.q_a
+    integral = memory + 1e-3 * e
+    return -7.0 * e - 5.0 * integral
+
+
+def counted(t, q_a, qd_a, d, steps):
+    n = steps[0] + 1.0
+    return -7.0 * (q_a - d.q_a) if n > 100.0 else 0.0 * q_a
+
+
+def handed_on(t, q_a, qd_a, d, memory):
+    np.add(memory, 5e-3 * (q_a - d.q_a), memory)
+    return -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a) - memory
+
+
+def aliased(t, q_a, qd_a, d, memory):
+    first, rest = memory[:1], memory
+    first[0] += 5e-3 * (q_a[0] - d.q_a[0])
+    rest[1:] += 5e-3 * (q_a - d.q_a)[1:]
+    return -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a) - memory
+
+
+@pytest.mark.parametrize(("law", "name"), [(integrated, "memory"), (counted, "steps")])
+def test_a_memory_that_is_only_read_is_refused(law, name):
+    """As `rk.compiled` says: what the next sample is to see is written in place."""
+    with pytest.raises(ValueError, match=rf"memory=3\) reads {name} but never writes into it, .* allowed: {name} \+="):
+        rk.simulate(ROBOT, rk.compiled(law, memory=3), PATH)
+
+
+@pytest.mark.parametrize("law", [handed_on, aliased])
+def test_a_memory_that_is_written_under_another_name_is_none_that_is_only_read(law):
+    c = rk.simulate(ROBOT, InPython(rk.compiled(law, memory=3)), PATH, OFFSET).c
+    assert_allclose(c, rk.simulate(ROBOT, rk.PID(7.0, 5.0, 0.2), PATH, OFFSET).c, atol=1e-10)
+
+
 FIRST = {
     "too short": (lambda t, q_a, qd_a, d: -q_a[:2], r"law returned the shape \(2,\); allowed: \(3,\)"),
     "too long": (lambda t, q_a, qd_a, d: np.zeros(4), r"law returned the shape \(4,\); allowed: \(3,\)"),

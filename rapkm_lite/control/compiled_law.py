@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import dis
+import functools
 import importlib
+import inspect
 import operator
 import sys
+import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -72,6 +76,12 @@ class CompiledLaw(LawValue):
                 f"{self!r} gives {name} a new value, which the next sample would not see; allowed: to write into it, "
                 f"{name} += ... or {name}[:] = ..., and another name for what is made of it"
             )
+        code = getattr(self.function, "__code__", None)
+        if self.memory and code is not None and (name := _only_read(code, len(given) - 1)):
+            raise ValueError(
+                f"{self!r} reads {name} but never writes into it, so that it would stay zero; allowed: "
+                f"{name} += ... or {name}[:] = ..., before or after it is read"
+            )
 
     def step(self, memory, sample):
         check_asked(type(self), CompiledLaw)
@@ -110,6 +120,31 @@ def _replaced(function, place: int) -> str | None:
     return None
 
 
+@functools.lru_cache(maxsize=64)
+def _only_read(code, place: int) -> str | None:
+    """The name of an argument that a function reads, and neither writes into nor hands on to what could.
+
+    Found in its source; None where there is none, as for what a string defines, and for lambdas.
+    """
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
+    except (OSError, SyntaxError):
+        return None
+    name = code.co_varnames[place] if place < code.co_argcount else ""
+    above = {below: node for node in ast.walk(tree) for below in ast.iter_child_nodes(node)}
+    uses = [node for node in above if isinstance(node, ast.Name) and node.id == name]
+    named = isinstance(tree.body[0], ast.FunctionDef) and tree.body[0].name == code.co_name
+    return name if named and uses and all(_gives_a_number(above[use]) for use in uses) else None
+
+
+def _gives_a_number(node: ast.AST) -> bool:
+    """Does an expression make something new of an array in it: no view, through which it could be written?"""
+    if isinstance(node, ast.Subscript):
+        parts = {type(part) for part in ast.walk(node.slice)}
+        return isinstance(node.ctx, ast.Load) and not parts & {ast.Slice, ast.Tuple}
+    return isinstance(node, ast.BinOp | ast.UnaryOp | ast.Compare | ast.Return)
+
+
 def _law(module: str, name: str, at: str | None, memory: int) -> CompiledLaw:
     return CompiledLaw(_function(module, name), at, memory)
 
@@ -131,7 +166,7 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
         the model.
     memory : a number of floats adds an argument, an array that is zero at the start of a run and yours to write, in
         place: ``memory += dt * e`` or ``memory[:] = ...``.  A run refuses ``memory = ...``, which the next sample would
-        not see.
+        not see, and a memory that is only read.
     q_a and qd_a are the function's own, too: what it writes into them stays with it.  d and the matrices are to be
     read only: Python refuses writes into them, compiled code lets them through, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but functions under
