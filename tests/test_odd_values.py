@@ -368,6 +368,7 @@ PALETTE = explore.Palette((0.0, 1.0), ("#888888",), ("#777777",))
         (lambda p: p.limits("a", y=(1, 1)), r"y = \(1, 1\); allowed: two different numbers"),
         (lambda p: p.fit("a", [1.0], least=0), r"least = 0; allowed: > 0"),
         (lambda p: p.handle("a", 0, 0, gain=3), r"gain = 3; allowed: \(a, b\) or \(a, b, c\)"),
+        (lambda p: p.handle("a", 0, 0), r"a handle moves no control; allowed: name of a control = \(a, b\)"),
         (lambda p: p.xlim(["a"]), r"there is no panel \['a'\]; allowed: a"),
         (lambda p: explore.Picture({"a": {"xlim": 3}}), r"xlim has shape \(\); allowed: \(2,\)"),
         (lambda p: explore.Picture({"a": {"title": 3}}), r"title = 3; allowed: text"),
@@ -376,6 +377,21 @@ PALETTE = explore.Palette((0.0, 1.0), ("#888888",), ("#777777",))
 def test_marks_of_a_picture(draw, words):
     with pytest.raises((ValueError, KeyError), match=words):
         draw(explore.Picture({"a": {}}))
+
+
+def test_a_logarithmic_panel_has_no_place_for_zero():
+    """log 0 is not finite: the canvas would paint nothing, and Matplotlib would keep other limits."""
+    words = r"y(lim)? = \(.*\) of a panel with yscale = 'log'; allowed: two positive numbers"
+    for panel in ({"yscale": "log"}, {"yscale": "log", "ylim": (0, 10)}, {"ylim": (-1, 1), "yscale": "log"}):
+        with pytest.raises(ValueError, match=words):
+            explore.Picture({"a": panel})
+    picture = explore.Picture({"a": {"yscale": "log", "ylim": (0.1, 10)}, "b": {}})
+    for change in (lambda: picture.limits("a", y=(0, 1)), lambda: picture.fit("a", [1, 100])):
+        with pytest.raises(ValueError, match=words):
+            change()
+    picture.limits("a", x=(-1, 1), y=(1e-3, 1e3))
+    picture.limits("b", y=(-1, 1))
+    assert (picture.ylim("a"), picture.ylim("b")) == ((1e-3, 1e3), (-1.0, 1.0))
 
 
 def test_what_is_masked_or_missing_is_a_gap():

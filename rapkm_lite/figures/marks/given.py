@@ -35,6 +35,14 @@ def two_limits(name: str, value) -> list[float]:
     return [low, high]
 
 
+def vertical_limits(name: str, value, settings: dict) -> list[float]:
+    """Limits of a panel with such keywords: on a logarithmic scale zero has no place."""
+    low, high = two_limits(name, value)
+    if settings.get("yscale") == "log" and not min(low, high) > 0.0:
+        raise ValueError(f"{name} = {low, high} of a panel with yscale = 'log'; allowed: two positive numbers")
+    return [low, high]
+
+
 def legend_entries(name: str, entries) -> list:
     """The entries of a legend."""
     listed = list(entries) if isinstance(entries, list | tuple) else [None]
@@ -56,5 +64,6 @@ def check_panel(settings: dict) -> None:
             legend_entries(name, value)
         elif name == "yscale":
             one_of(name, value, ("linear", "log"))
+            vertical_limits("ylim", settings.get("ylim", (0, 1)), settings)
         elif name == "aspect" and not (isinstance(value, str) and value in ("equal", "auto")):
             positive_number(name, value)

@@ -17,7 +17,7 @@ from ...machine.arguments import (
     switch,
     whole_number,
 )
-from .given import check_panel, legend_entries, numbers, two_limits
+from .given import check_panel, legend_entries, numbers, two_limits, vertical_limits
 from .palette import Palette, checked
 
 # Keywords of a panel, as of ``Axes.set``; `small` panels stand side by side where the page is narrow.
@@ -37,8 +37,8 @@ class Mark(NamedTuple):
 class Picture:
     """Named panels and the marks that a draw function puts into them at every step.
 
-    panels : name -> keywords of ``Axes.set``: xlabel, ylabel, title, xlim, ylim, aspect, xticks, yticks, yscale; and
-        legend, the entries of `legend`.
+    panels : name -> keywords of ``Axes.set``: xlabel, ylabel, title, xlim, ylim, aspect, xticks, yticks, yscale (of
+        "log" with a positive ylim); and legend, the entries of `legend`.
     layout : rows of panel names as in ``Figure.subplot_mosaic``; default one row.
     widths : relative widths of the columns.  size : inches, their ratio is that of the picture.
     setup : function of the picture that draws once what never changes (workspace, legend).
@@ -173,6 +173,8 @@ class Picture:
         grip : two points (2, 2); the line between them takes hold of the handle too.
         """
         self._check(panel)
+        if not controls:
+            raise ValueError("a handle moves no control; allowed: name of a control = (a, b) or (a, b, c)")
         for name, value, shape in (("x", x, ()), ("y", y, ()), ("along", along, (-1, 2)), ("grip", grip, (2, 2))):
             if value is not None or name == "x":
                 numbers(name, value, *shape)
@@ -185,11 +187,11 @@ class Picture:
         self.handles.append({"panel": panel, "at": (x, y), "set": controls, "along": along, "grip": grip})
 
     def limits(self, panel: str, x=None, y=None) -> None:
-        """Set the limits of a panel."""
+        """Set the limits of a panel; those of y are positive where its yscale is "log"."""
         self._check(panel)
         frame = self.frames[panel]
         frame[:2] = two_limits("x", x) if x is not None else frame[:2]
-        frame[2:] = two_limits("y", y) if y is not None else frame[2:]
+        frame[2:] = vertical_limits("y", y, self.panels[panel]) if y is not None else frame[2:]
 
     def xlim(self, panel: str) -> tuple[float, float]:
         """The horizontal limits of a panel."""
@@ -204,8 +206,8 @@ class Picture:
     def fit(self, panel: str, *values, symmetric: bool = True, least: float = 1e-9, most: float = np.inf) -> None:
         """Vertical limits that hold all `values`, in steps of 1, 1.5, 2, 3, 5, 7 so that they seldom change.
 
-        Without `symmetric` they begin at zero.  They shrink only when the values fill less than half of them, and end
-        at the first step not below `most`.
+        Without `symmetric` they begin at zero; a panel with yscale "log" has `limits` instead.  They shrink only when
+        the values fill less than half of them, and end at the first step not below `most`.
         """
         low, now = self.ylim(panel)
         sizes = (np.abs(numbers("values", v, most=9)) for v in values)
