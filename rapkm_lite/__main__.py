@@ -83,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     grades.add_argument("--jobs", type=int, help="submissions at a time (as many as processors)")
     grades.set_defaults(run=_grade)
     options = parser.parse_args(arguments)
+    if options.json and options.run is not _summary:
+        parser.error("--json goes with no command; allowed: python -m rapkm_lite --json")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # whatever letters a name has, a screen shows the others
             stream.reconfigure(errors="backslashreplace")

@@ -66,6 +66,16 @@ def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
     assert "encoder offsets (4, -2, 5) mrad" in text
 
 
+@pytest.mark.parametrize("words", [["lessons", "mine"], ["grade", "."]])
+def test_a_command_has_no_output_for_scripts(words, tmp_path, monkeypatch, capsys):
+    """The help says of --json: print the summary for scripts."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        main(["--json", *words])
+    assert stopped.value.code == 2 and "--json goes with no command; allowed: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_version_is_told():
     assert command("--version").stdout.split() == ["rapkm_lite", rk.__version__]
 
