@@ -597,6 +597,13 @@ def test_readings_stand_between_the_ends_of_their_range():
     assert [line.get_xdata().tolist() for line in ax.lines] == [[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]]
 
 
+def test_readings_beyond_their_range_are_seen():
+    ax = plotting.plot_readings(["a", "b"], [2.0, -1.0], [4.0, 1.0], [[2.0, 1.0], [9.0, 0.0]], [4.0, -4.0])
+    (left, right), places = ax.get_xlim(), np.concatenate([line.get_xdata() for line in ax.lines])
+    assert sorted(places) == [-1.5, 0.0, 0.5, 1.0, 1.0, 3.5]
+    assert left < places.min() and places.max() < right
+
+
 def test_energies_over_the_gain_are_told_apart():
     lines = named(plotting.plot_gain_curve([1.0, 7.0], [2.2, 5.5], [2.0, 2.1], [0.2, 3.5]))
     got = {label: line.get_ydata().tolist() for label, line in lines.items()}
@@ -748,6 +755,14 @@ def test_the_fast_direction_keeps_more_of_a_gain_than_the_slow_one():
     shares = np.linalg.eigvalsh(N_J @ N_J.mT)[:, -2:]
     assert_allclose(y_of(ax, "slow direction"), shares[:, 0], atol=1e-9)
     assert_allclose(y_of(ax, "fast direction"), shares[:, 1], atol=1e-9)
+
+
+def test_effective_gains_are_seen_in_whatever_unit_the_gain_is():
+    """(35) is linear in K: a gain of 400 / s^2 gives 400 times the curves."""
+    drives = np.diag([1.0, 1, 1, 0, 0, 0])
+    shares, gains = (plotting.plot_effective_gain(PATH, k * drives) for k in (1.0, 400.0))
+    assert_allclose(y_of(gains, "slow direction"), 400.0 * y_of(shares, "slow direction"))
+    assert y_of(gains, "fast direction").max() < gains.get_ylim()[1] and shares.get_ylim() == (0.0, 1.05)
 
 
 def test_predicted_points_stand_at_their_times():

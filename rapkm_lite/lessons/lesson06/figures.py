@@ -94,6 +94,8 @@ def plot_bands(samples: dict, ax=None):
 def plot_readings(names, low, high, readings, reference=None, ax=None):
     """Parameter sets (k, p), and a marked one `reference`, as dots in their ranges low, high (p,), a row per parameter.
 
+    What lies beyond a range is shown beyond 0 … 1.
+
     >>> from rapkm_lite import plotting
     >>> ax = plotting.plot_readings(["K_P", "K_D"], [0.0, 0.0], [10.0, 1.0], [[7.05, 0.225], [6.0, 0.3]])
     """
@@ -107,6 +109,8 @@ def plot_readings(names, low, high, readings, reference=None, ax=None):
         ax.plot(at, rows, "D", color=ALARM, ms=7, label="the reading of the data file")
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]".replace("-", "−") for n, a, b in zip(names, low, high, strict=True)])
-    ax.set(xlim=(-0.02, 1.02), xlabel="position in the search range, 0 … 1")
+    places = np.concatenate([np.ravel(line.get_xdata()) for line in ax.get_lines()])
+    ends = min(0.0, places.min()) - 0.02, max(1.0, places.max()) + 0.02
+    ax.set(xlim=ends, xlabel="position in the search range, 0 … 1")
     ax.invert_yaxis()
     return ax

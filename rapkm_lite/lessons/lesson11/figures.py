@@ -107,7 +107,8 @@ def plot_effective_gain(trajectory, K, ax=None):
     ax.plot(trajectory.t, high, color=NEUTRAL, ls="--", label="fast direction")
     ax.plot(trajectory.t, low, color=AFTER, label="slow direction")
     ax.fill_between(trajectory.t, low, high, color="#DDDDDD", alpha=0.6, lw=0)
-    ax.set(xlabel="time in s", ylabel="effective / nominal gain", xlim=(0, trajectory.t[-1]), ylim=(0, 1.05))
+    ax.set(xlabel="time in s", ylabel="effective / nominal gain", xlim=(0, trajectory.t[-1]))
+    ax.set_ylim(0, 1.05 * max(1.0, high.max()))
     ax.legend(ncols=2, loc="upper right")
     return ax
 
