@@ -139,8 +139,8 @@ def drawn(name, world, **given):
         return function(*CALLS[name](world))
     example = doctest.DocTestParser().get_examples(getattr(plotting, name).__doc__)
     assert example, f"{name} has neither arguments in CALLS nor an example in its docstring"
-    names = vars(plotting) | {name: function}
-    exec("".join(line.source for line in example), names)
+    names = {name: function}
+    exec("".join(line.source for line in example).replace(f"plotting.{name}(", f"{name}("), names)
     return names["ax"]
 
 
