@@ -398,6 +398,9 @@ def test_changed_values_of_a_users_class_stay_of_that_class():
     assert rk.Manipulator(**other._fields()) == robot.replace(masses=0.2, load=0.1)
     with pytest.raises(ValueError, match="masses"):
         Tagged(robot, "new").replace(masses=-1.0)
+    fewer = Tagged(robot, "new").with_arms((0, 2))
+    assert type(fewer) is Tagged and fewer.tag == "new"
+    assert rk.Manipulator(**fewer._fields()) == robot.with_arms((0, 2))
     own = Round(robot, 0.05)
     late = own.with_set_points(np.concatenate([own.q_a[:1], own.q_a[:-1]]))
     assert type(late) is Round and late.radius == 0.05 and late.x is own.x and late.q_a[1, 0] == own.q_a[0, 0]
@@ -462,6 +465,7 @@ def test_a_plain_dataclass_of_a_user_is_a_value_too():
         value, twin, other = kind(**fields, **own), kind(**fields, **own), kind(**fields)
         assert value == twin != other and len({value, twin, other}) == 2
         assert repr(value) == kind.__base__.__repr__(value)
+    assert Machine(**robot._fields(), place="hall").with_arms((0, 2)).place == "hall"
     assert rk.simulate(Machine(**robot._fields()), rk.PD(7.0, 0.2), rk.hold(robot, [0.02, 0.05], 0.01)).energy.sum() > 0
     assert (OwnRule(7.0, 0.2) == 1) == "mine"
 

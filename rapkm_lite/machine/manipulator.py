@@ -169,7 +169,7 @@ class Manipulator(Value):
     def with_arms(self, arms) -> Manipulator:
         """The machine that keeps only some arms (0-based); with two, an equivalent non-redundant five-bar (fig. 3).
 
-        The load goes to the second arm that is kept.
+        The load goes to the second arm that is kept.  A machine of your own class keeps its class, see `replace`.
         Raises ValueError for fewer than two arms, a repeated or an unknown one.
 
         >>> import rapkm_lite as rk
@@ -177,9 +177,8 @@ class Manipulator(Value):
         Manipulator('testbed': 2 arms, links 0.2 m, working mode ++)
         """
         arms = list(joint_indices("arms", arms, self.n_arms, None, "arm"))
-        values = self._fields()
-        values |= {k: v[arms] for k, v in values.items() if isinstance(v, np.ndarray) and k != "gravity"}
-        return Manipulator(**values)
+        own = [f.name for f in dataclasses.fields(Manipulator) if f.name != "gravity"]
+        return self._changed(**{k: v[arms] for k in own if isinstance(v := getattr(self, k), np.ndarray)})
 
     def same_kinematics(self, other: Manipulator) -> bool:
         """True when both machines have the same joint motion for the same end-effector motion."""
