@@ -42,7 +42,7 @@ class Fault(Value):
     """Base of the faults."""
 
     def mark(self, table: FaultTable, t: np.ndarray) -> None:
-        """Write this fault into the table of a run with the times t (k,)."""
+        """Write this fault into the table of a run with the times t (k,); ``*=`` and ``+=`` keep the faults before."""
         raise NotImplementedError(f"{type(self).__name__} has no mark; needed: mark(table, t), see the other faults")
 
     def felt(self, c: np.ndarray) -> bool:
