@@ -73,8 +73,8 @@ def check(name: str, answer: Any) -> Any:
     Prints OK, CLOSE, TODO or NOT YET RIGHT; the last two of these go on with the package's answer, and so does CLOSE.
     A function comes back guarded: it is called with copies, so arithmetic in place changes nothing outside.  Where the
     package's answer is a secret (hidden offsets, gains) the student's own numbers come back, or NaN while there are
-    none.  Raises AssertionError instead when the environment variable RAPKM_LITE_STRICT is 1 and the answer is neither
-    right nor close; ValueError for an unknown exercise.
+    none.  Raises AssertionError instead when the environment variable RAPKM_LITE_STRICT is 1, or true, and the answer
+    is neither right nor close; ValueError for an unknown exercise.
 
     >>> from rapkm_lite import checks; shift = checks.check("04.filtered_torques", ...)
     TODO 04.filtered_torques: not yet
@@ -82,13 +82,18 @@ def check(name: str, answer: Any) -> Any:
     exercise = _known(name)
     result = judged(exercise, answer)
     word = _WORDS[result.word]
-    if result.word in ("todo", "wrong") and os.environ.get("RAPKM_LITE_STRICT") == "1":
+    if result.word in ("todo", "wrong") and _strict():
         raise AssertionError(f"{word} {name}: {result.sentence}")
     print(f"{word} {name}: {result.sentence}" + f'. For a hint: hint("{name}")' * (result.word == "wrong"))
     raw = answer.own if isinstance(answer, Answer) else answer
     own = None if result.word == "todo" else raw
     _latest[name] = result.word, own
     return going_on(exercise, result.word, own)
+
+
+def _strict() -> bool:
+    """Is RAPKM_LITE_STRICT set, in the words of RAPKM_LITE_NUMBA?"""
+    return os.environ.get("RAPKM_LITE_STRICT", "0").strip().lower() not in ("", "0", "false", "no", "off")
 
 
 def going_on(exercise: Exercise, word: str, own: Any) -> Any:
