@@ -255,6 +255,16 @@ def test_what_is_only_close_beyond_the_idea_is_right_where_it_is():
     assert "the method is right" not in said.sentence and said.sentence.count("To improve") == 1
 
 
+@pytest.mark.parametrize("made", [lambda found: [], lambda found: tuple(found), lambda found: (c for c in found)])
+def test_an_answer_passes_no_exercise_without_cases(made):
+    """Two wrong answers: one everywhere, one in the case that lies beyond."""
+    found = [Case("a plain one", 1.0), Case("a far one", 5.0, beyond=True)]
+    for wrong in (lambda x: x + 1.0, lambda x: 2.0 * min(x, 2.0)):
+        assert judged(Exercise(lambda x: 2.0 * x, cases=lambda rng: found), wrong).word != "ok"
+        with pytest.raises(ValueError, match=r"cases\(rng\) = .*; allowed: a list of one case at least"):
+            judged(Exercise(lambda x: 2.0 * x, cases=lambda rng: made(found)), wrong)
+
+
 def test_only_the_kinds_beyond_the_idea_that_fail_are_said():
     def more(rng):
         long = Case("four entries", np.ones(4), np.arange(4.0), 2.0, beyond=True)

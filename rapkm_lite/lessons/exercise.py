@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..machine.arguments import short
+
 
 class Case(tuple):
     """Arguments of one case with words for it that a verdict can say: Case("a nearly singular pose", A, c).
@@ -106,5 +108,10 @@ class Exercise:
     called: str = ""
 
     def is_value(self, cases: list[tuple]) -> bool:
-        """True when the answer is a value, not a function."""
+        """True when the answer is a value, not a function.
+
+        Raises ValueError for no list of cases, which is gone through twice, and for an empty one: any answer passes it.
+        """
+        if not isinstance(cases, list) or not cases:
+            raise ValueError(f"cases(rng) = {short(cases)}; allowed: a list of one case at least")
         return not callable(self.reference) if self.judge else cases == [()]
