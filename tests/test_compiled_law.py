@@ -572,7 +572,15 @@ def test_a_memory_that_is_only_read_is_refused(law, name):
         rk.simulate(ROBOT, rk.compiled(law, memory=3), PATH)
 
 
-@pytest.mark.parametrize("law", [handed_on, aliased])
+def viewed(t, q_a, qd_a, d, memory):
+    whole, none, last = memory[...], slice(0, 0), np.arange(3) == 2
+    memory[last] + 0.0
+    memory[none] + 0.0
+    whole += 5e-3 * (q_a - d.q_a)
+    return -7.0 * (q_a - d.q_a) - 0.2 * (qd_a - d.qd_a) - memory
+
+
+@pytest.mark.parametrize("law", [handed_on, aliased, viewed])
 def test_a_memory_that_is_written_under_another_name_is_none_that_is_only_read(law):
     c = rk.simulate(ROBOT, InPython(rk.compiled(law, memory=3)), PATH, OFFSET).c
     assert_allclose(c, rk.simulate(ROBOT, rk.PID(7.0, 5.0, 0.2), PATH, OFFSET).c, atol=1e-10)

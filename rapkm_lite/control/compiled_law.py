@@ -140,8 +140,8 @@ def _only_read(code, place: int) -> str | None:
 def _gives_a_number(node: ast.AST) -> bool:
     """Does an expression make something new of an array in it: no view, through which it could be written?"""
     if isinstance(node, ast.Subscript):
-        parts = {type(part) for part in ast.walk(node.slice)}
-        return isinstance(node.ctx, ast.Load) and not parts & {ast.Slice, ast.Tuple}
+        place = node.slice.operand if isinstance(node.slice, ast.UnaryOp) else node.slice
+        return isinstance(node.ctx, ast.Load) and isinstance(place, ast.Constant) and type(place.value) is int
     return isinstance(node, ast.BinOp | ast.UnaryOp | ast.Compare | ast.Return)
 
 
