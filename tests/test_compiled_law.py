@@ -568,7 +568,7 @@ def aliased(t, q_a, qd_a, d, memory):
 @pytest.mark.parametrize(("law", "name"), [(integrated, "memory"), (counted, "steps")])
 def test_a_memory_that_is_only_read_is_refused(law, name):
     """As `rk.compiled` says: what the next sample is to see is written in place."""
-    with pytest.raises(ValueError, match=rf"memory=3\) reads {name} but never writes into it, .* allowed: {name} \+="):
+    with pytest.raises(ValueError, match=rf"memory=3\) reads {name} but never writes into it; allowed: .*{name} \+="):
         rk.simulate(ROBOT, rk.compiled(law, memory=3), PATH)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import dis
 import functools
 import importlib
 import inspect
@@ -71,16 +70,12 @@ class CompiledLaw(LawValue):
         """Raise ValueError when the function does not take what a run gives it, or forgets its memory."""
         given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
         callable_with(repr(self), self.function, *given)
-        if self.memory and (name := _replaced(self.function, len(given) - 1)):
+        code = getattr(self.function, "__code__", None)  # none of an object with a __call__
+        if self.memory and code is not None and (words := _forgotten(code, len(given) - 1)):
+            name = code.co_varnames[len(given) - 1]
             raise ValueError(
-                f"{self!r} gives {name} a new value, which the next sample would not see; allowed: to write into it, "
-                f"{name} += ... or {name}[:] = ..., and another name for what is made of it"
-            )
-        code = getattr(self.function, "__code__", None)
-        if self.memory and code is not None and (name := _only_read(code, len(given) - 1)):
-            raise ValueError(
-                f"{self!r} reads {name} but never writes into it, so that it would stay zero; allowed: "
-                f"{name} += ... or {name}[:] = ..., before or after it is read"
+                f"{self!r} {words}; allowed: to write into it, {name} += ... or {name}[:] = ..., and another name for "
+                "what is made of it"
             )
 
     def step(self, memory, sample):
@@ -105,36 +100,24 @@ def _function(module: str, name: str):
     return found.function if isinstance(found, CompiledLaw) else found
 
 
-def _replaced(function, place: int) -> str | None:
-    """The name of a function's argument where its body gives it another value than one changed in place."""
-    code = getattr(function, "__code__", None)  # none of an object with a __call__
-    if code is None or place >= code.co_argcount:
-        return None
-    name, before = code.co_varnames[place], ""
-    for instruction in dis.get_instructions(code):
-        stored = instruction.argval if isinstance(instruction.argval, tuple) else (instruction.argval,)
-        stored = stored[:1] if instruction.opname == "STORE_FAST_LOAD_FAST" else stored
-        if instruction.opname.startswith("STORE_") and name in stored and not before.endswith("="):
-            return name
-        before = instruction.argrepr if instruction.opname == "BINARY_OP" else ""
-    return None
-
-
 @functools.lru_cache(maxsize=64)
-def _only_read(code, place: int) -> str | None:
-    """The name of an argument that a function reads, and neither writes into nor hands on to what could.
+def _forgotten(code, place: int) -> str:
+    """What a function does with an argument, if no later call can see it; an empty text else.
 
-    Found in its source; None where there is none, as for what a string defines, and for lambdas.
+    Found in its source; nothing where there is none, as for what a string defines, and for lambdas.
     """
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
     except (OSError, SyntaxError):
-        return None
+        return ""
     name = code.co_varnames[place] if place < code.co_argcount else ""
     above = {below: node for node in ast.walk(tree) for below in ast.iter_child_nodes(node)}
     uses = [node for node in above if isinstance(node, ast.Name) and node.id == name]
-    named = isinstance(tree.body[0], ast.FunctionDef) and tree.body[0].name == code.co_name
-    return name if named and uses and all(_gives_a_number(above[use]) for use in uses) else None
+    if not (uses and isinstance(tree.body[0], ast.FunctionDef) and tree.body[0].name == code.co_name):
+        return ""
+    if any(isinstance(use.ctx, ast.Store) and not isinstance(above[use], ast.AugAssign) for use in uses):
+        return f"gives {name} a new value, which the next sample would not see"
+    return f"reads {name} but never writes into it" if all(_gives_a_number(above[use]) for use in uses) else ""
 
 
 def _gives_a_number(node: ast.AST) -> bool:
