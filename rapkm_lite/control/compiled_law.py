@@ -71,12 +71,13 @@ class CompiledLaw(LawValue):
         given = ["t", "q_a", "qd_a", "d", *["at"] * (self.at is not None), *["memory"] * (self.memory > 0)]
         callable_with(repr(self), self.function, *given)
         code = getattr(self.function, "__code__", None)  # none of an object with a __call__
-        if self.memory and code is not None and (words := _forgotten(code, len(given) - 1)):
+        if self.memory and code is not None and code.co_argcount >= len(given):
             name = code.co_varnames[len(given) - 1]
-            raise ValueError(
-                f"{self!r} {words}; allowed: to write into it, {name} += ... or {name}[:] = ..., and another name for "
-                "what is made of it"
-            )
+            if words := _forgotten(code, name):
+                raise ValueError(
+                    f"{self!r} {words}; allowed: to write into it, {name} += ... or {name}[:] = ..., and another name "
+                    "for what is made of it"
+                )
 
     def step(self, memory, sample):
         check_asked(type(self), CompiledLaw)
@@ -101,23 +102,24 @@ def _function(module: str, name: str):
 
 
 @functools.lru_cache(maxsize=64)
-def _forgotten(code, place: int) -> str:
-    """What a function does with an argument, if no later call can see it; an empty text else.
+def _forgotten(code, name: str) -> str:
+    """What a function does with its argument `name`, if no later call can see it; an empty text else."""
+    tree = _source(code)
+    above = {below: node for node in ast.walk(tree) for below in ast.iter_child_nodes(node)}
+    uses = [node for node in above if isinstance(node, ast.Name) and node.id == name]
+    if any(isinstance(use.ctx, ast.Store) and not isinstance(above[use], ast.AugAssign) for use in uses):
+        return f"gives {name} a new value, which the next sample would not see"
+    return f"reads {name} but never writes into it" if uses and all(_gives_a_number(above[use]) for use in uses) else ""
 
-    Found in its source; nothing where there is none, as for what a string defines, and for lambdas.
-    """
+
+def _source(code) -> ast.Module:
+    """The source of a function; an empty one where there is none, as for what a string defines, and for lambdas."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
     except (OSError, SyntaxError):
-        return ""
-    name = code.co_varnames[place] if place < code.co_argcount else ""
-    above = {below: node for node in ast.walk(tree) for below in ast.iter_child_nodes(node)}
-    uses = [node for node in above if isinstance(node, ast.Name) and node.id == name]
-    if not (uses and isinstance(tree.body[0], ast.FunctionDef) and tree.body[0].name == code.co_name):
-        return ""
-    if any(isinstance(use.ctx, ast.Store) and not isinstance(above[use], ast.AugAssign) for use in uses):
-        return f"gives {name} a new value, which the next sample would not see"
-    return f"reads {name} but never writes into it" if all(_gives_a_number(above[use]) for use in uses) else ""
+        return ast.Module([], [])
+    named = isinstance(tree.body[0], ast.FunctionDef) and tree.body[0].name == code.co_name
+    return tree if named else ast.Module([], [])
 
 
 def _gives_a_number(node: ast.AST) -> bool:
