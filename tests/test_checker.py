@@ -763,8 +763,18 @@ def test_a_right_number_that_breaks_the_law_is_close_only_where_an_exercise_know
 def test_no_answer_needs_more_than_nine_digits():
     """`tolerance` says so: never less than 1e-9 of the largest entry."""
     large = Exercise(lambda v: 1e6 + v, ("a", "b", "c"), "N", lambda rng: [(v,) for v in rng.uniform(0, 1, (4, 3))])
-    assert judged(large, lambda v: 1e6 + v + 5e-4).word == "ok"
     assert judged(large, lambda v: 1e6 + v + 5e-3).word == "wrong"
+    for error, met in ((0.0, "1e-09"), (5e-4, "1e-03")):
+        word, said, _ = judged(large, lambda v, error=error: 1e6 + v + error)
+        assert word == "ok" and said == f"within {met} N of the package at 4 cases"
+
+
+@pytest.mark.parametrize("lost", [np.nan, -np.inf])
+def test_a_reference_that_is_no_number_passes_no_answer(lost):
+    """No deviation from NaN is larger than what is allowed; whoever wrote the exercise is told the case."""
+    holed = Exercise(lambda v: v if v < 2.0 else lost, ("a", "b", "c"), "m", lambda rng: [(1.0,), (3.0,)], close=0.1)
+    with pytest.raises(ValueError, match=r"the reference answers \(3\.0,\) with array\(.*\); allowed: finite numbers"):
+        judged(holed, lambda v: v)
 
 
 def test_a_single_number_that_is_near_is_close():

@@ -6,7 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..machine.arguments import short
+from .answers import copied
 
 
 class Case(tuple):
@@ -115,3 +118,14 @@ class Exercise:
         if not isinstance(cases, list) or not cases:
             raise ValueError(f"cases(rng) = {short(cases)}; allowed: a list of one case at least")
         return not callable(self.reference) if self.judge else cases == [()]
+
+    def answers_to(self, cases: list[tuple]) -> list[np.ndarray]:
+        """The package's answer to each case.
+
+        Raises ValueError, naming the case, for one that is NaN or infinite: no answer would then be told from it.
+        """
+        answers = [np.asarray(self.reference(*map(copied, case)), dtype=float) for case in cases]
+        for case, answer in zip(cases, answers, strict=True):
+            if not np.all(np.isfinite(answer)):
+                raise ValueError(f"the reference answers {short(case)} with {short(answer)}; allowed: finite numbers")
+        return answers
