@@ -110,7 +110,8 @@ def plot_readings(names, low, high, readings, reference=None, ax=None):
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set_yticks(rows, [f"{n}  [{a:g} … {b:g}]".replace("-", "−") for n, a, b in zip(names, low, high, strict=True)])
     places = np.concatenate([np.ravel(line.get_xdata()) for line in ax.get_lines()])
-    ends = min(0.0, places.min()) - 0.02, max(1.0, places.max()) + 0.02
-    ax.set(xlim=ends, xlabel="position in the search range, 0 … 1")
+    low_end, high_end = min(0.0, places.min()), max(1.0, places.max())
+    room = 0.02 * (high_end - low_end)  # for the outermost mark
+    ax.set(xlim=(low_end - room, high_end + room), xlabel="position in the search range, 0 … 1")
     ax.invert_yaxis()
     return ax
