@@ -100,16 +100,6 @@ def read(lanes, arms, sensor, faulty, faults, table, o, w, dt, k):
 
 
 @leaf
-def take_answer(drives, arms, w, buffer):
-    """The torques that a user's law left at the end of the buffer."""
-    N, W = len(drives), len(arms)
-    for i in range(N):
-        c = buffer[len(buffer) - N + i]
-        # A limit of a drive must not make a torque of what is none.
-        w[C * W + i] = c if abs(c) < 1e100 else math.nan
-
-
-@leaf
 def command(lanes, drives, arms, modelled, user, law, table, o, w, t, dt, buffer):
     """The torques C of the law."""
     if law.form == PD:
@@ -121,7 +111,11 @@ def command(lanes, drives, arms, modelled, user, law, table, o, w, t, dt, buffer
     elif user is not None:
         fill(drives, arms, law, t, table, o, w, buffer)
         user(buffer)
-        take_answer(drives, arms, w, buffer)
+        answer = len(buffer) - len(drives)
+        for i in range(len(drives)):
+            c = buffer[answer + i]
+            # A limit of a drive must not make a torque of what is none.
+            w[C * len(arms) + i] = c if abs(c) < 1e100 else math.nan
 
 
 @leaf
