@@ -29,7 +29,7 @@ def kept(w, p, P):
 @outlined
 def true_pose(lanes, drives, arms, modelled, law, w):
     """The true end-effector position and velocity, and A there."""
-    L, W = len(lanes), len(arms)
+    L, N, W = len(lanes), len(drives), len(arms)
     for j in range(L):
         w[of(PX, j, W, L)], w[of(PY, j, W, L)] = w[of(X, j, W, L)], w[of(Y, j, W, L)]
         w[of(PVX, j, W, L)], w[of(PVY, j, W, L)] = w[of(VX, j, W, L)], w[of(VY, j, W, L)]
@@ -38,17 +38,10 @@ def true_pose(lanes, drives, arms, modelled, law, w):
             for j in range(L):
                 w[at(A1, i, j, W, L)], w[at(A2, i, j, W, L)] = w[at(B1, i, j, W, L)], w[at(B2, i, j, W, L)]
     else:
-        link_rows(lanes, drives, arms, w)
-
-
-@outlined
-def link_rows(lanes, drives, arms, w):
-    """The links of the model at the pose, above all the rows b of A."""
-    L, N, W = len(lanes), len(drives), len(arms)
-    for i in range(N):
-        for j in range(L):
-            links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
-            keep(w, i * L + j, W * L, links)
+        for i in range(N):
+            for j in range(L):
+                links, _ = placed(MODEL, w, i, j, W, L, w[of(PX, j, W, L)], w[of(PY, j, W, L)])
+                keep(w, i * L + j, W * L, links)
 
 
 @leaf
