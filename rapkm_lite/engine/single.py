@@ -56,10 +56,8 @@ def sense(arms, extra, table, o, w, dt):
     W = len(arms)
     x, y, vx, vy = w[of(X, 0, W, 1)], w[of(Y, 0, W, 1)], w[of(VX, 0, W, 1)], w[of(VY, 0, W, 1)]
     move(W, w, Q * W, w, OLD * W)
-    fetch(ANGLE, W, table, o, w)
-    fetch(COS, W, table, o, w)
-    fetch(SIN, W, table, o, w)
-    fetch(RATE, W, table, o, w)
+    for block in (ANGLE, RATE, COS, SIN):
+        fetch(block, W, table, o, w)
     for i in range(W):
         links, area2 = get_place(arms, PLACE, w, i)
         m11, m12, m22, fx, fy, bx, by, rate, acc, cotangent, bends = moving(extra, w, i, 0, W, 1, links, vx, vy)
