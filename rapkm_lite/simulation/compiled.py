@@ -81,14 +81,6 @@ def many(setup: Setup, codes: dict[int, Code], offsets: np.ndarray, columns) -> 
                 column[part] = values[: len(part)]
 
 
-@functools.cache
-def _engine():
-    """Rows of the work table, and the loop: Numba is not imported before the first run."""
-    from ..engine import loop, rows
-
-    return rows, loop
-
-
 def _sums(setup: Setup, w) -> tuple:
     """The columns of `many` from the work table."""
     robot, t = setup.robot, setup.trajectory.t
@@ -114,7 +106,8 @@ def _blank(robot, model, width: int, L: int, start: tuple = (), codes: tuple = (
 
     start : end-effector position and velocity, if given; with it the codes of the runs, one each.
     """
-    rows = _engine()[0]
+    from ..engine import rows
+
     N, work = robot.n_arms, np.zeros((rows.BLOCKS * width + rows.SINGLES) * L)
     blocks, runs = _parts(work, width, L)
     for i, arms in enumerate((robot, model)):
@@ -138,7 +131,9 @@ def _blank(robot, model, width: int, L: int, start: tuple = (), codes: tuple = (
 
 def _parts(work: np.ndarray, width: int, L: int) -> tuple[np.ndarray, np.ndarray]:
     """The pair rows (blocks, width, L) and the run rows (rows, L) of a work table."""
-    pairs = _engine()[0].BLOCKS * width * L
+    from ..engine.rows import BLOCKS
+
+    pairs = BLOCKS * width * L
     return work[:pairs].reshape(-1, width, L), work[pairs:].reshape(-1, L)
 
 
@@ -166,7 +161,8 @@ def _run(setup: Setup, codes: list[Code], offsets, history):
 
     history : None for a study; the `History` of a single run.
     """
-    rows, loop = _engine()
+    from ..engine import loop, rows  # not before the first run: they import Numba
+
     robot, model, trajectory, sensors, code = setup.robot, setup.model, setup.trajectory, setup.sensors, codes[0]
     L, N, study = len(codes), robot.n_arms, () if history is None else None
     faulty, counted = setup.faults is not None, sensors.encoder is not None
