@@ -21,16 +21,8 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Array, OptionalArray, OptionalPair, default
-from ..mechanics.actuation import (
-    control_matrix,
-    distal_cross_products,
-    drive_pairs,
-    redundant_control_matrix,
-    weighted_pseudoinverse,
-)
+from ..mechanics.actuation import distal_cross_products, drive_pairs, weighted_pseudoinverse
 from ..mechanics.at import at
-from ..mechanics.dynamics import coriolis_matrix, generalized_forces, mass_matrix, minimal_dynamics, redundant_dynamics
-from ..mechanics.kinematics import forward_kinematics
 from ..mechanics.partition import PARTITION_RULES, explicit_pseudoinverse, first_best, select_independent
 from ..mechanics.trajectory import Desired
 from .grammar import LawValue, check_asked, gain, joint_gain, measured, seen
@@ -73,19 +65,19 @@ class APD(LawValue):
     def _terms(self, model, q, qd, q_a, qd_a, desired):
         """K_P e2 + K_D e2d, q2d^d, q2dd^d and q2d, then Gbar, Cbar, Qbar and (A^T)_W^+."""
         angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
-        qd = np.asarray(qd, dtype=float)
+        pose = at(model, q, qd).using(self.independent)
         if self.independent is None:
-            rate = matvec(np.linalg.pinv(at(model, q).F), qd)
+            rate = matvec(np.linalg.pinv(pose.F), pose.qd)
             motion = desired.xd, desired.xdd, rate
-            e, ed = forward_kinematics(model, q) - desired.x, rate - desired.xd
+            e, ed = pose.x - desired.x, rate - desired.xd
             e = np.broadcast_to(e, (*angles.shape[:-1], 2))  # one torque for each measurement, which do not enter
         else:
-            j = list(joint_indices("independent", self.independent, model.n_joints))
-            motion = desired.qd[..., j], desired.qdd[..., j], qd[..., j]
+            j = list(self.independent)
+            motion = desired.qd[..., j], desired.qdd[..., j], pose.qd[..., j]
             e, ed = angles[..., j] - desired.q[..., j], rates[..., j] - desired.qd[..., j]
         feedback = matvec(positive_definite("K_P", self.K_P, 2), e) + matvec(positive_definite("K_D", self.K_D, 2), ed)
-        pinv = weighted_pseudoinverse(control_matrix(model, q, self.independent), self.W)
-        return feedback, *motion, *minimal_dynamics(model, q, qd, self.independent), pinv
+        pinv = weighted_pseudoinverse(pose.A, self.W)
+        return feedback, *motion, *pose.minimal, pinv
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         feedback, rate, acceleration, _, Gbar, Cbar, Qbar, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
@@ -219,12 +211,10 @@ class RedundantAPD(LawValue):
         angles, rates = _joint_state(model, q, qd, q_a, qd_a, desired)
         K_P, K_D = joint_gain("K_P", self.K_P, model.n_arms), joint_gain("K_D", self.K_D, model.n_arms)
         feedback = matvec(K_P, angles - desired.q) + matvec(K_D, rates - desired.qd)
-        A_tilde = redundant_control_matrix(model, q)
-        pinv = explicit_pseudoinverse(A_tilde, select_independent(A_tilde, self.rule))
-        if self.projected:
-            return feedback, *redundant_dynamics(model, q, qd), pinv
-        # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written.
-        return feedback, mass_matrix(model, q), coriolis_matrix(model, q, qd), generalized_forces(model, q, qd), pinv
+        pose = at(model, q, qd)
+        pinv = explicit_pseudoinverse(pose.A_tilde, select_independent(pose.A_tilde, self.rule))
+        # (A~^T)^+ N_J = (A~^T)^+, so that N_J need not be written in line 2.
+        return feedback, *(pose.redundant if self.projected else (pose.G, pose.C, pose.Q)), pinv
 
     def torque(self, model, q, qd, q_a, qd_a, desired):
         feedback, G, C, Q, pinv = self._terms(model, q, qd, q_a, qd_a, desired)
