@@ -8,7 +8,7 @@ from ..machine.arguments import ConvergenceError, check_leading, matvec, real_ar
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
 from .at import At, at
-from .kinematics import arm_vectors, constraint_jacobian, loop_constraints
+from .kinematics import loop_constraints
 from .linalg import by_minors, least_singular_value
 from .redundancy import base_angle_hessians
 
@@ -34,15 +34,15 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     scale, tolerance = robot.lengths.max(), small_number("tolerance", tolerance)
     gap = max(tolerance * scale, 4.0 * np.spacing(np.abs(robot.base).max()))
     for _ in range(whole_number("iterations", iterations, 1, 10_000)):
-        h, J = loop_constraints(robot, q), constraint_jacobian(robot, q)
-        Q, R = np.linalg.qr(J.mT, mode="complete")
+        pose, h = at(robot, q), loop_constraints(robot, q)
+        Q, R = np.linalg.qr(pose.J.mT, mode="complete")
         if least_singular_value(R[..., :r, :])[0] < 1e-10 * scale:
             break
         range_, tangent = Q[..., :r], Q[..., r:]
         back = -matvec(range_, np.linalg.solve(R[..., :r, :].mT, h[..., None])[..., 0])
         gradient = q - q0
         multiplier = -np.linalg.solve(R[..., :r, :], matvec(range_.mT, gradient)[..., None])[..., 0]
-        hessian = np.eye(n) + _constraint_curvature(robot, q, multiplier)
+        hessian = np.eye(n) + _constraint_curvature(pose, multiplier)
         convex = np.linalg.eigvalsh(tangent.mT @ hessian @ tangent)[..., 0] > 0.1
         hessian = np.where(convex[..., None, None], hessian, np.eye(n))
         remainder = matvec(tangent.mT, gradient)
@@ -61,14 +61,13 @@ def close_loops(robot: Manipulator, q, tolerance: float = 1e-13, iterations: int
     )
 
 
-def _constraint_curvature(robot: Manipulator, q: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
+def _constraint_curvature(pose: At, multiplier: np.ndarray) -> np.ndarray:
     """sum_k lambda_k d2 h_k / dq2, (..., 2N, 2N)."""
-    a, d = arm_vectors(robot, q)
-    N = robot.n_arms
+    N = pose.robot.n_arms
     force = multiplier.reshape(*multiplier.shape[:-1], N - 1, 2)
     force = np.insert(force, 1, -force.sum(axis=-2), axis=-2)
-    base, link = -(force * (a + d)).sum(axis=-1), -(force * d).sum(axis=-1)
-    H = np.zeros((*q.shape[:-1], 2 * N, 2 * N))
+    base, link = -(force * (pose.a + pose.d)).sum(axis=-1), -(force * pose.d).sum(axis=-1)
+    H = np.zeros((*pose.q.shape[:-1], 2 * N, 2 * N))
     i = np.arange(N)
     H[..., i, i] = base
     H[..., i, N + i] = H[..., N + i, i] = H[..., N + i, N + i] = link
