@@ -5,13 +5,15 @@ from __future__ import annotations
 import pickle
 import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 
 
 def pool_of(executor: Executor | None, threads: int):
     """A context with the executor of the caller, or with threads that end with it; with None where one is enough."""
-    if executor is None and threads > 1 and _threads():
-        return ThreadPoolExecutor(threads)
+    if executor is None and threads > 1:
+        with suppress(Exception):  # of whatever kind, where no thread can be started: runs without them lose nothing
+            threading.Thread(target=int).start()
+            return ThreadPoolExecutor(threads)
     return nullcontext(executor)
 
 
@@ -45,12 +47,3 @@ class Stop:
 
     def __reduce__(self):
         return Stop, (RuntimeError(self.words) if kept_here(self.error) else self.error, self.words, self.begun)
-
-
-def _threads() -> bool:
-    """Can a thread be started here?"""
-    try:
-        threading.Thread(target=int).start()
-        return True
-    except Exception:  # of whatever kind: a run without threads loses nothing
-        return False
