@@ -156,9 +156,8 @@ class Manipulator(Value):
         Raises ValueError for an unknown name, and for another number of arms that does not go with what is kept.
         """
         known("argument", changes, [f.name for f in dataclasses.fields(self)])
-        rods = np.array_equal(self.inertias, self.masses * self.lengths**2 / 12)
-        middles = np.array_equal(self.centers, self.lengths / 2)
-        changes = ({"inertias": None} if rods else {}) | ({"centers": None} if middles else {}) | changes
+        rods = _slender_rods(self.lengths, self.masses)
+        changes = {k: None for k, rod in rods.items() if np.array_equal(getattr(self, k), rod)} | changes
         points, N = len(_base_points(changes.get("base", self.base))), self.n_arms
         own = [f.name for f in dataclasses.fields(Manipulator) if f.name not in ("gravity", *changes)]
         kept = [name for name in own if np.ndim(getattr(self, name))]
