@@ -172,8 +172,9 @@ class Panel {
     this.entitle(last("title"), last("legend")?.words);
     if (!wide || !high || !frame) return;
     const ratio = (this.ratio = devicePixelRatio || 1), [width, height] = this.room.map((v) => Math.round(v * ratio));
-    // Setting a size blanks a canvas, so only when it is another one.
+    // Setting a size blanks a canvas, so only when it is another; stretched by part of a pixel it is blurred.
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    [canvas.style.width, canvas.style.height] = [width, height].map((v) => `${v / ratio}px`);
     this.size = (points) => Math.max((points / 10.5) * look.base, look.floor);
     const font = 0.92 * this.size(10.5);
     const plan = layout(this.spec, palette, frame, [wide, high], font, (words) => this.pieces(words, font));
@@ -188,8 +189,7 @@ class Panel {
       ctx.save();
       ctx.globalAlpha = mark.style.alpha ?? 1;
       const more = PAINT[mark.kind] === words ? wide : mark.style.marker ? 8 : 0; // markers on the edge are whole
-      ctx.beginPath();
-      ctx.rect(box.left - more, box.top - more, box.width + 2 * more, box.height + 2 * more);
+      ctx.beginPath(), ctx.rect(box.left - more, box.top - more, box.width + 2 * more, box.height + 2 * more);
       ctx.clip();
       PAINT[mark.kind](this, mark, mark.style);
       ctx.restore();

@@ -77,6 +77,19 @@ def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme
     assert seen.requests == [] and seen.errors == []
 
 
+@pytest.mark.parametrize("scale", [1, 1.25, 2])
+def test_a_canvas_has_the_pixels_of_its_place_and_is_not_stretched(browser, address, scale):
+    """Else the browser would resample it, and its words would be blurred."""
+    sizes = """[...document.querySelectorAll('canvas')].map(c => {
+        const { width, height } = c.getBoundingClientRect();
+        return [c.width, c.height, width * devicePixelRatio, height * devicePixelRatio]; })"""
+    for width in (390, 900, 1280, 1333):
+        seen = Page(browser, address, width, device_scale_factor=scale)
+        made = np.array(seen.page.evaluate(sizes))
+        # A browser keeps lengths in 1/64 px.
+        assert len(made) == 6 and np.allclose(made[:, :2], made[:, 2:], rtol=0, atol=scale / 64)
+
+
 def test_the_end_effector_follows_the_mouse_and_the_keys_and_the_address_brings_it_back(browser, address):
     seen = Page(browser, address)
     knob = seen.page.locator(".rapkm-knob").first
@@ -546,6 +559,10 @@ def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address, 
     # Chromium lays out a page of paper without painting anew; then a canvas must not be stretched.
     fits = "[...document.querySelectorAll('canvas')].map(e => getComputedStyle(e).objectFit)"
     assert set(seen.page.evaluate(fits)) == {"contain"}
+    # It then keeps within its place, whatever size that has on paper.
+    seen.page.evaluate("document.querySelectorAll('.rapkm-plot').forEach(e => { e.style.width = '50%'; })")
+    inside = "[...document.querySelectorAll('canvas')].every(e => e.clientWidth === e.parentElement.clientWidth)"
+    assert seen.page.evaluate(inside)
 
 
 @pytest.mark.parametrize("width", [390, 1280])
