@@ -114,3 +114,25 @@ def test_the_key_a_can_be_switched_off(browser, tmp_path):
     answer.locator("summary").press("Enter")
     assert answer.get_attribute("open") == "", "without the letter a fold opens by its own keys"
     page.close()
+
+
+@pytest.mark.parametrize("stores", [True, False])
+def test_the_switch_of_the_key_a_stays_where_it_is_at_a_reload(browser, tmp_path, stores):
+    page, errors = browser.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    blocked = (
+        "Object.defineProperty(window, 'sessionStorage', { get() { throw new DOMException('', 'SecurityError'); } })"
+    )
+    page.add_init_script("" if stores else blocked)
+    page.goto(made(LESSONS[0], tmp_path))
+    key = page.get_by_role("button", name="Key A")
+    assert key.get_attribute("aria-pressed") == "true"
+    for on in (False, True):
+        key.click()
+        assert key.get_attribute("aria-pressed") == str(on).lower()
+        page.reload()
+        assert key.get_attribute("aria-pressed") == str(on or not stores).lower()
+        if not stores:
+            break
+    assert errors == []
+    page.close()
