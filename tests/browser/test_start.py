@@ -559,6 +559,9 @@ def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address, 
     # Chromium lays out a page of paper without painting anew; then a canvas must not be stretched.
     fits = "[...document.querySelectorAll('canvas')].map(e => getComputedStyle(e).objectFit)"
     assert set(seen.page.evaluate(fits)) == {"contain"}
+    heads = "[...document.querySelectorAll('.rapkm-panel')].map(e => ['.rapkm-head', '.rapkm-plot'].map("
+    heads += "part => e.querySelector(part).getBoundingClientRect()).map((box, k) => k ? box.top : box.bottom))"
+    assert all(above <= below + 0.1 for above, below in seen.page.evaluate(heads))
     # It then keeps within its place, whatever size that has on paper.
     seen.page.evaluate("document.querySelectorAll('.rapkm-plot').forEach(e => { e.style.width = '50%'; })")
     inside = "[...document.querySelectorAll('canvas')].every(e => e.clientWidth === e.parentElement.clientWidth)"
