@@ -70,6 +70,44 @@ def agrees(robot, law, model=None, duration=0.2):
     np.testing.assert_allclose(run.x, states[:, :2], rtol=0, atol=1e-10)
 
 
+def to_singularity(robot, dt, height):
+    """In 0.5 s to a place above the midpoint of a five-bar's base, where its distal links are parallel, and back."""
+    t, w, way = dt * np.arange(round(0.5 / dt) + 1), 4.0 * np.pi, 0.5 * (height - 0.16)
+    y = np.stack([0.16 + way * (1.0 - np.cos(w * t)), way * w * np.sin(w * t), way * w * w * np.cos(w * t)])
+    x, xd, xdd = y[..., None] * [0.0, 1.0]
+    return rk.follow(robot, t, robot.base.mean(axis=0) + x, xd, xdd)
+
+
+@pytest.mark.parametrize(
+    "dt, height, angle, torque, error",
+    [(5e-3, 0.02, 0.2, 0.8, 5e-9), (1e-2, 0.02, 0.2, 0.8, 1e-7), (5e-3, 0.01, 0.1, 2.35, 2e-8)],
+)
+def test_near_an_input_singularity_holds_err_as_little_as_simulate_says(dt, height, angle, torque, error):
+    robot, law = rk.load("five_bar"), rk.CTC(400.0, 40.0, (0, 1))
+    path = to_singularity(robot, dt, height)
+    assert np.arcsin(np.abs(rk.distal_cross_products(robot, path.q)).min()) == pytest.approx(angle, rel=0.01)
+    states, _, c = reference(robot, law, path, np.zeros(2))
+    assert np.abs(c).max() < torque
+    run = rk.simulate(robot, law, path)
+    assert np.linalg.norm(run.x - states[:, :2], axis=1).max() < error
+    study = rk.sweep(robot, law, path, np.zeros((2, 2)))
+    np.testing.assert_allclose(study.x_final[1], run.x[-1], rtol=0, atol=1e-12)
+
+
+def test_near_an_input_singularity_what_a_hold_errs_is_its_step():
+    """The same torques in holds of one, two and four steps: the error falls with the fourth power of the step."""
+    robot, law = rk.load("five_bar").replace(friction=0.0), rk.CTC(400.0, 40.0, (0, 1))
+    # To the nearest place: afterwards the same torques would throw a machine ever further that is not controlled.
+    states, _, c = reference(robot, law, to_singularity(robot, 5e-3, 0.02), np.zeros(2), samples=51)
+    held, errors = np.append(c, np.zeros((50, 2)), axis=0), []
+    for times in (1, 2, 4):
+        path = to_singularity(robot, 5e-3 / times, 0.02)
+        run = rk.simulate(robot, lambda t, q_a, qd_a, want: held[int(t / 5e-3 + 1e-6)], path)
+        errors.append(np.abs(run.x[: 50 * times + 1 : times] - states[:, :2]).max())
+    orders = np.log2(errors[:-1]) - np.log2(errors[1:])
+    assert np.round(orders).tolist() == [4.0, 4.0]
+
+
 @pytest.mark.parametrize("name", LAWS)
 def test_three_arms(name):
     agrees(machine(3), LAWS[name])
