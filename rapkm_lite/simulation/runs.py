@@ -191,10 +191,8 @@ def simulate(
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s under PD it errs by less than 1 nm at
     dt = 2 ms, by less than 0.2 micrometres at 10 ms.  Near an input singularity laws with a model hold torques that
-    grow without limit, and the error, still of order 4, grows with them: a five-bar (``load("five_bar")``) under
-    ``CTC(400, 40)`` that comes from 0.16 m off and returns in 0.5 s errs by less than 5 nm at 5 ms, 0.1 micrometres at
-    10 ms, on a path to within 0.2 rad of parallel distal links (0.8 N m), by less than 20 nm at 5 ms on one to within
-    0.1 rad (2.3 N m).
+    grow without limit, and the error, still of order 4, grows with them: a five-bar under `CTC` that goes to within
+    0.2 rad of parallel distal links and back in 0.5 s (0.8 N m) errs by less than 5 nm at 5 ms, 0.1 micrometres at 10.
     Near the edge of the workspace a hold takes more steps: the run ends at the sample after which an arm stretches or
     folds.
     Stiff friction costs time: a hold in which a drive is nearly at rest takes as many Runge-Kutta steps as dt f_c / v0
