@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import platform
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,12 @@ if COMPILED:
     from .compiler import Wide
 
 
-# Multiply-adds may be fused; sums are never reordered, so that a number does not depend on how loops are vectorised.
+# Multiply-adds may be fused where LLVM fuses all copies of a loop alike: on ARM it does not, and a run would feel by
+# rounding which way through a hold its neighbours need.  Sums are never reordered, so that a number does not depend on
+# how loops are vectorised.
+_FUSED = {"contract"} if platform.machine().lower() in ("x86_64", "amd64") else set()
 # Kernels write into arrays that they are given: without reference counting a sample takes up to a third less.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": _FUSED, "_nrt": False}
 if COMPILED:
     _OPTIONS["pipeline_class"] = Wide
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
