@@ -120,7 +120,7 @@ def _first(cells, pattern: str) -> int | None:
 
 # Below the title of a lesson; a link to the lesson in the browser takes its place, if the site gets them.
 STILL = (
-    '<p>On this page pictures are still: <a href="../run.html">run the lessons</a> to move them, or take the machine '
+    '<p>On this page pictures are still: <a href="../run.html">run the lessons</a> to move them, or drag the machine '
     'on the <a href="../index.html">start page</a>.</p>'
 )
 

@@ -371,7 +371,7 @@ mount($("stage"), {
   labels: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, c.words])),
   ranges: Object.fromEntries(Object.entries(controls).map(([name, c]) => [name, [c.low, c.high]])),
   panels: {
-    machine: { title: "Take the end-effector", aspect: "equal", xticks: [], yticks: [], xlabel: "mm; grey: all forces of drives with at most 40 mN m" },
+    machine: { title: "Drag the end-effector", aspect: "equal", xticks: [], yticks: [], xlabel: "mm; grey: all forces of drives with at most 40 mN m" },
     offset: { title: "Encoder errors, mrad", xticks: [1, 2, 3] },
     torque: { xticks: [1, 2, 3] },
     forces: { title: "Forces in a chain, mN", aspect: "equal" },

@@ -1,4 +1,4 @@
-"""The students' formula sheet: one page A4 as PDF, formulas only, no numbers.
+"""The students' formula sheet: one A4 page as PDF, formulas only, no numbers.
 
     python docs/teaching/formula_sheet.py            # writes formula_sheet.pdf
     python docs/teaching/formula_sheet.py sheet.pdf
@@ -53,7 +53,7 @@ ROWS = [
         "(17), (18)*",
         r"$e_\mathrm{eff}=R_{A^TK_P}\tilde e_a,\quad q_\mathrm{eff}^d=\tilde q_a-e_\mathrm{eff}$",
     ),
-    ("heat removed", "", r"$(R_\mathrm{el}/k_t^2)\int\Vert c-Rc\Vert^2\,dt$, in sum over equal drives"),
+    ("heat removed", "", r"$(R_\mathrm{el}/k_t^2)\int\Vert c-Rc\Vert^2\,dt$, summed over equal drives"),
     ("Model-based control, minimal coordinates", "", ""),
     ("APD", "(19)", r"$c=(A^T)^+(\bar G\ddot q_2^d+\bar C\dot q_2^d+\bar Q-K_D\dot e_2-K_Pe_2)$"),
     ("CTC", "(20)", r"$c=(A^T)^+(\bar Gv_2+\bar C\dot q_2+\bar Q),\quad v_2=\ddot q_2^d-K_D\dot e_2-K_Pe_2$"),

@@ -64,7 +64,7 @@ def minutes_page() -> str:
     text = [
         WRITTEN,
         "# Minutes per section\n",
-        "The minutes are an estimate, not taken in a class: `python -m tests.minutes` counts 130 words of prose or 8",
+        "The minutes are an estimate, not timed in a class: `python -m tests.minutes` counts 130 words of prose or 8",
         "lines of code a minute, 0.7 minutes for a displayed formula, 1.5 for a figure and 10 for an exercise; a",
         "heading may differ from its count by a minute or by 15 %. The core is what everybody reads. It is not the sum",
         "of its sections, because the opening, which has no heading, takes two to six minutes more, and every number",
@@ -104,17 +104,17 @@ def map_page() -> str:
 
 
 def mistakes_page() -> str:
-    """The mistakes that the checks call by their name."""
+    """The mistakes that the checks call by name."""
     from rapkm_lite.checks import exercises
 
     kinds = course()["kinds"]
     text = [
         WRITTEN,
         "# What students get wrong\n",
-        "For each exercise the mistakes that its check calls by their name. Besides these every check knows the",
+        "For each exercise the mistakes that its check calls by name. Besides these every check knows the",
         "opposite sign, transposed answers, wrong units (factors 1000 and $180/\\pi$), rows or entries in another",
-        "order, a forgotten factor, another frame, and the complement of the right answer. Which of them a class",
-        "makes most often, the table at the end of `python -m rapkm_lite grade SUBMISSIONS --csv FILE` says. The",
+        "order, a forgotten factor, another frame, and the complement of the right answer. The table at the end of",
+        "`python -m rapkm_lite grade SUBMISSIONS --csv FILE` says which of them a class makes most often. The",
         "sentences stand here as students read them in the notebook, in plain letters: A^T is the transpose, Gbar",
         "is $\\bar G$.\n",
     ]

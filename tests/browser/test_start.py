@@ -334,11 +334,11 @@ def test_no_ring_of_an_encoder_covers_a_number(browser, address, width):
 # Triangles filled on the canvas of the machine, as their corners in px: the heads of arrows.
 HEADS = """window.heads = []; { const kind = CanvasRenderingContext2D.prototype;
 for (const [name, note] of Object.entries({
-  clearRect: ({ canvas }) => canvas.ariaLabel === 'Take the end-effector' && (heads = []),
+  clearRect: ({ canvas }) => canvas.ariaLabel === 'Drag the end-effector' && (heads = []),
   beginPath: context => (context.path = []),
   moveTo: ({ path }, x, y) => path?.push([x, y]),
   lineTo: ({ path }, x, y) => path?.push([x, y]),
-  fill: ({ canvas, path }) => canvas.ariaLabel === 'Take the end-effector' && path?.length === 3 && heads.push(path),
+  fill: ({ canvas, path }) => canvas.ariaLabel === 'Drag the end-effector' && path?.length === 3 && heads.push(path),
 })) {
   const once = kind[name];
   kind[name] = function (...given) { note(this, ...given); return once.apply(this, given); };

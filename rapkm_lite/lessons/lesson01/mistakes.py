@@ -199,7 +199,7 @@ COMPLEMENTS = {
     "these are two columns of the projector N_J: same plane, but no identity in the independent rows": (
         lambda robot, q, independent: _projector(robot, q)[:, independent]
     ),
-    "the columns are scaled to unit length: the rows of the independent joints are no identity any more": (
+    "the columns are scaled to unit length: the rows of the independent joints are no longer the identity": (
         lambda robot, q, independent: (F := orthogonal_complement(robot, q, independent)) / np.linalg.norm(F, axis=0)
     ),
     "this is the projector N_J; F has two columns": lambda robot, q, independent: _projector(robot, q),

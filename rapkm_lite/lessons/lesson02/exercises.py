@@ -105,7 +105,7 @@ EXERCISES = {
                 lambda A, torque: torque * np.linalg.norm(A, axis=1).sum()
             ),
             "the absolute value is missing: each drive chooses the sign that helps": tasks.force_without("abs"),
-            "the direction across a row has not unit length: the factor 1 / |A_i| is missing": tasks.force_without(
+            "the direction across a row is not of unit length: the factor 1 / |A_i| is missing": tasks.force_without(
                 "size"
             ),
             "the length of the row is divided out twice (a factor too many)": tasks.force_without("unit"),

@@ -152,7 +152,7 @@ EXERCISES = {
         ),
         judge=places.judge,
         close=0.02,
-        improve="a finer search around the place that you found",
+        improve="search more finely around the place that you found",
         mistakes=places.MISTAKES,
         points=10.0,
     ),

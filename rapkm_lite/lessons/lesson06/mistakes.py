@@ -55,7 +55,7 @@ FORMS = {
     "the gain is missing: a factor K_P² (N m/rad squared)": (
         lambda robot, trajectory, K_P: antagonism_form(robot, trajectory, 1.0)
     ),
-    "the last sample is counted too; a torque is held from each sample to the next, so there is one hold less": _form(
+    "the last sample is counted too; a torque is held from each sample to the next, so there is one hold fewer": _form(
         lambda N, path: N.sum(axis=0) * path.dt
     ),
     "the factor dt is missing: a sum over the samples is no integral": _form(lambda N, path: N[:-1].sum(axis=0)),

@@ -50,7 +50,7 @@ EXERCISES = {
             "this is the part along (1, 1, 1), the null vector at the centroid; it turns with the pose": (
                 lambda robot, *angles: np.abs(np.sum(tasks.left_over(robot, *angles), axis=-1)) / robot.n_arms**0.5
             ),
-            "this is the part along the null space at the guess, which turns until the pose that fits best": (
+            "this is the part along the null space at the guess, which turns on the way to the pose that fits best": (
                 tasks.seen_from_the_guess
             ),
             "one number for all rows: the norm goes over the drives only (axis=1)": (

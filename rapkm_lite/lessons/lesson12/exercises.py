@@ -24,7 +24,7 @@ EXERCISES = {
         invariant=tasks.moves,
         tolerance=1e-9,
         close=1e-3,
-        improve="project exactly; a cut-off of 1e-9 for pinv does",
+        improve="project exactly; a cut-off of 1e-9 for pinv will do",
         mistakes={
             "the sign: a drive is pulled back by its offset": lambda J, m, K_P, offset: -tasks.fight(J, m, K_P, offset),
             "nothing is projected: part of these torques moves the machine": (
