@@ -51,7 +51,7 @@ SETTINGS = {"@jupyterlab/notebook-extension:tracker": {"windowingMode": "none"}}
 
 
 def lacking(pyodide: Path) -> list[str]:
-    """What a distribution must have and has not; its core, without packages, is not enough."""
+    """What a distribution must have and does not have; its core, without packages, is not enough."""
     missing = [name for name in ("pyodide.js", "pyodide-lock.json") if not (pyodide / name).is_file()]
     if missing:
         return missing

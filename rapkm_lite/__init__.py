@@ -1,8 +1,8 @@
 """Robust modeling and control of parallel manipulators with actuation redundancy, after Mueller and Hufnagel.
 
 Joint vectors q (..., 2N) in rad hold the base angles of arms 1 to N, then their elbow angles, relative to the proximal
-links; rates qd and accelerations qdd likewise.  Points x (..., 2) are in m; of the drives, angles q_a (..., N) are in
-rad and torques c (..., N) in N m.  Dots are any leading axes: none for one pose, one for those of a trajectory;
+links; rates qd and accelerations qdd likewise.  Points x (..., 2) are in m, base angles q_a (..., N) in rad, and drive
+torques c (..., N) in N m.  Dots are any leading axes: none for one pose, one for those of a trajectory;
 those of several arguments broadcast.  One bad pose among many stops the whole call.
 Indices count from 0; "arm 2" in words is the second one, of index 1.  Numbers in brackets are equations of the chapter.
 

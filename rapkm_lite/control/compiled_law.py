@@ -21,7 +21,7 @@ from .grammar import LawValue, check_asked
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompiledLaw(LawValue):
-    """A function ``(t, q_a, qd_a, d[, at][, memory]) -> c`` as a law; made by `compiled`, which tells the errors, too.
+    """A function ``(t, q_a, qd_a, d[, at][, memory]) -> c`` as a law; made by `compiled`, which lists the errors, too.
 
     Where Numba is installed the loop calls it compiled, elsewhere as it is.
 

@@ -1,5 +1,5 @@
 """Numba's compiler for kernels and their parts: less work before the first result, wider vector registers after it.
-What a user compiles, in a law or elsewhere, Numba compiles as ever.
+What a user compiles, in a law or elsewhere, Numba compiles as usual.
 
 Most of a first run's time goes to Python code of Numba, not to LLVM, and grows with the lines that are compiled.
 """

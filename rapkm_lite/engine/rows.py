@@ -1,7 +1,7 @@
 """The work table `w` of runs side by side: one flat array, because the compiler then sees that no two rows overlap.
 
 First the pair rows, one number per arm and run: row b of arm i and run j is entry (b W + i) L + j; then the run rows,
-one number per run.  W is the number of arms, in a compiled single run filled up to whole vector registers with arms
+one number per run.  W is the number of arms, in a compiled single run padded to whole vector registers with arms
 that weigh and do nothing; L is the number of runs.  Both come as tuples, whose length the compiler knows.
 """
 

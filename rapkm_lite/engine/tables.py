@@ -90,7 +90,7 @@ def extra(robot) -> tuple | None:
 
 
 def width(N: int, alone: bool) -> int:
-    """Arms in a row of the work table: in a single compiled run filled up to vector registers of four."""
+    """Arms in a row of the work table: in a single compiled run padded to vector registers of four."""
     return -(-N // 4) * 4 if alone and compiled() else N
 
 

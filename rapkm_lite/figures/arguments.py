@@ -54,7 +54,7 @@ def _guard(picture: Callable) -> Callable:
             bound = signature.bind(*args, **named)
         except TypeError as error:  # as Python says it, with the name of the function
             raise TypeError(f"{picture.__name__}() {error}") from None
-        bound.apply_defaults()  # a pair that the machine of the call has not
+        bound.apply_defaults()  # a pair that the machine of the call does not have
         given = bound.arguments
         parameters = [signature.parameters[name] for name in given]
         plain = [p for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]

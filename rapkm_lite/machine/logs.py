@@ -171,7 +171,7 @@ def mystery_run(name: str) -> Log:
     """A log of ``data/mystery_runs``: "offset_a", "offset_b", "offset_c" or "gain".
 
     The testbed under PD control, K_P = 7.05 N m/rad and K_D = 0.225 N m s/rad, each with hidden offsets; in "gain" one
-    drive has another K_P.  Made by ``notebooks/build.py mystery``.
+    drive has a different K_P.  Made by ``notebooks/build.py mystery``.
     Raises ValueError for another name.
 
     >>> import rapkm_lite as rk

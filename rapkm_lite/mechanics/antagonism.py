@@ -205,7 +205,7 @@ def rest_exists(robot: Manipulator, q, K_P, offset, quantum: float, friction: fl
     friction : number, N m of each drive.
     Decided by mixed-integer programming, to its tolerance, a millionth of a count.
     Raises ValueError at input singularities, for open loops, stretched or folded arms and values out of range, and for
-    gains of more than 1e4 times one another: soft drives would have too many counts to try.
+    gains more than a factor of 1e4 apart: soft drives would have too many counts to try.
 
     >>> import rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> rk.rest_exists(robot, q, 7.05, [4e-3, -2e-3, 5e-3], quantum=3e-3, friction=0.02)

@@ -1,4 +1,4 @@
-"""Maps over the workspace: actuation measures, and the pair of drives that is best where (sections 2.2 and 4.2).
+"""Maps over the workspace: actuation measures, and which pair of drives is best where (sections 2.2 and 4.2).
 
 Every map samples the end-effector position on a rectangular grid; points that not all arms reach are masked.
 """

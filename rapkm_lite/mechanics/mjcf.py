@@ -18,7 +18,7 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
     elbow1, base2, ..., so look them up by name; sites "tip1" .. "tipN",
     tied to tip 2 by equality constraints; motors "drive1" .. "driveN" whose control is the torque c in N m; sensors:
     angles and rates of the base joints, in rad and rad/s, and the position of tip 2 in m.  The load is lumped into the
-    distal link of arm 2.  Not exported: Coulomb friction (another model there), resistance and torque constant.
+    distal link of arm 2.  Not exported: Coulomb friction (modelled differently there), resistance and torque constant.
 
     q : (2N,) rad, where MuJoCo starts, at rest, and the keyframe "start"; default: with the end-effector at the
     mean of the base points, or, where not all arms reach that bent, where the arms bend most evenly.

@@ -33,7 +33,7 @@ def allocate_torques(A, wrench, limit, W=None, prestress=None) -> np.ndarray:
     W : symmetric positive definite, one number, (m,) or (m, m); default the identity.  prestress : c0 (m,), N m,
     default none.
     Raises ValueError at input singularities, for a wrench beyond the limits, with the factor by which they fall
-    short, for limits of more than 1e12 times one another, and where rounding hides the nearest torques: for a
+    short, for limits more than a factor of 1e12 apart, and where rounding hides the nearest torques: for a
     prestress far beyond the limits, or a force that takes most of limits far apart.
 
     >>> import rapkm_lite as rk; A = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
@@ -90,7 +90,7 @@ def minimax_torques(A, wrench, limit=1.0) -> np.ndarray:
 
     A : (m, delta).  wrench : (delta,).  limit : number or (m,), N m, positive: which drive counts for how much.
     The force is right to rounding; the peak is least to rounding times the ratio of the limits.
-    Raises ValueError at input singularities and for limits of more than 1e12 times one another.
+    Raises ValueError at input singularities and for limits more than a factor of 1e12 apart.
 
     >>> import rapkm_lite as rk
     >>> rk.minimax_torques([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [1.0, 1.0]).round(3)

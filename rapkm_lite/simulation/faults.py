@@ -42,7 +42,7 @@ class Fault(Value):
     """Base of the faults."""
 
     def mark(self, table: FaultTable, t: np.ndarray) -> None:
-        """Write this fault into the table of a run with the times t (k,); ``*=`` and ``+=`` keep the faults before."""
+        """Write this fault into the table of a run with the times t (k,); ``*=`` and ``+=`` keep earlier faults."""
         raise NotImplementedError(f"{type(self).__name__} has no mark; needed: mark(table, t), see the other faults")
 
     def felt(self, c: np.ndarray) -> bool:
@@ -92,7 +92,7 @@ class TorqueLimit(Fault):
 class DeadDrive(Fault):
     """A drive (0-based) gives no torque from `time` in s on; it goes on measuring.
 
-    Raises ValueError for a time or drive below 0, and in a run for a drive that the machine has not.
+    Raises ValueError for a time or drive below 0, and in a run for a drive that the machine does not have.
 
     >>> import rapkm_lite as rk
     >>> rk.DeadDrive(drive=1, time=0.5)

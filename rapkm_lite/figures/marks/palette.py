@@ -27,9 +27,9 @@ _ORDER = {"image": 0.0, "bar": 1.0, "polygon": 1.0, "line": 2.0}
 
 @dataclass(frozen=True)
 class Palette:
-    """Classes of a map: one colour between each two neighbouring `levels`, for white paper and for a dark theme.
+    """Classes of a map: one colour between every two neighbouring `levels`, for white paper and for a dark theme.
 
-    Raises ValueError for levels that do not rise, and unless there is one colour less than levels.
+    Raises ValueError for levels that do not rise, and unless there is one colour fewer than levels.
 
     >>> from rapkm_lite import explore
     >>> explore.Palette((0.0, 1.0, 2.0), ("#888888", "#EEEEEE"), ("#777777", "#333333")).classes

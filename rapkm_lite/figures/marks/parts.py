@@ -134,7 +134,7 @@ def _far(times: float) -> bool:
 
 
 def told(value: float, digits: int, times: float = 1.0) -> str:
-    """A number with so many decimals and no negative zero; three digits that count where it is far from the testbed's.
+    """A number with so many decimals and no negative zero; three significant digits where it is far from the testbed's.
 
     times : how many times the testbed's such numbers are; what would be zero there is zero here.
 
