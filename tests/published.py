@@ -381,7 +381,7 @@ def controllers() -> list[Number]:
         Number("11", "highest effective gain on the triangle", lambda: effective()[1], 1e-6, "0.73"),
         Number("11", "frequency of PD, centroid, Hz", lambda: np.sqrt(_top_of(pull()) * 7.05) / (2 * np.pi), EXACT),
         Number("11", "mean miss of computed torque, m", lambda: rms("CTC"), RUN, "0.84 to 0.85 mm"),
-        Number("11", "largest miss of PD, m", lambda: raced("PD").path_error.max(), RUN, "2 mm it is"),
+        Number("11", "largest miss of PD, m", lambda: raced("PD").path_error.max(), RUN, "at worst they miss by 2 mm"),
         Number("11", "antagonistic energy of PD, J", lambda: rk.antagonistic_energy(raced("PD")), RUN, "2.4 J on"),
         Number("11", "largest jump of the switched law, N m", lambda: _jump(raced("switched")), RUN, "over 50 mN m"),
     ]
