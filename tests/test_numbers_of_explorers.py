@@ -177,7 +177,7 @@ def test_imperfections_are_those_of_the_built_machine_and_the_drawings_law(filte
     law = rk.AntagonismFilter(law) if filter else law
     run = rk.simulate(built, law, path, model=robot, faults=[rk.TorqueLimit(0.12)])
     off = 1e3 * np.linalg.norm(run.x - path.x, axis=1).max()
-    assert said(explorer, "farthest from the wanted place")[0] == pytest.approx(off, abs=6e-3)
+    assert said(explorer, "farthest from the desired position")[0] == pytest.approx(off, abs=6e-3)
     pressing = least_and_prestress(rk.control_matrix(built, run.q[-1:]), run.c[-1:])[1][0]
     assert_allclose(said(explorer, "torque that only presses, at the end"), 1e3 * pressing, atol=0.051)
     assert said(explorer, "largest torque").tolist() == [round(1e3 * np.abs(run.c).max()), 120]
@@ -352,7 +352,7 @@ def test_a_late_drive_follows_its_set_points_so_many_milliseconds_later(robot):
     assert energy == pytest.approx(run.energy.sum(), abs=6e-3)
     assert lost == pytest.approx(PRICE * 2e-3 * np.sum(pressing[:-1] ** 2), abs=6e-4)
     off = 1e3 * (run.x - path.x)[: len(path) // 2 + 1]
-    assert said(explorer, "farthest from the wanted place")[0] == pytest.approx(np.hypot(*off.T).max(), abs=6e-3)
+    assert said(explorer, "farthest from the desired position")[0] == pytest.approx(np.hypot(*off.T).max(), abs=6e-3)
     for data, values in zip(curve(explorer, "way"), off.T, strict=True):
         assert data[:, 1].max() == pytest.approx(values.max()) and data[:, 1].min() == pytest.approx(values.min())
 

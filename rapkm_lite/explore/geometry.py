@@ -226,7 +226,7 @@ def prestress(robot: Manipulator) -> Explorer:
     without, also = shared.over_time("torque in mN m", robot=robot), shared.over_time("torque in mN m")
     panels = {"without": without | {"title": "No prestress"}, "with": also | {"title": "With prestress"}}
     controls = {
-        "level": slider("prestress wished for in mN m", -100 * strong, 100 * strong, 2 * strong, 40 * strong),
+        "level": slider("desired prestress in mN m", -100 * strong, 100 * strong, 2 * strong, 40 * strong),
         "side": shared.path_slider(robot, "side of the triangle in mm", 60, 300, 5, 240 if robot.n_arms > 2 else 160),
     }
     return explorer(draw, controls, panels, live=True)

@@ -34,7 +34,7 @@ OFFSET, GAIN, ROD = np.array([4e-3, -2e-3, 5e-3]), 7.05, 0.67  # rad, N m/rad, k
 
 @partial(shared.ready_made, friction=True)
 def imperfections(robot: Manipulator) -> Explorer:
-    """Distance from the wanted place and torques that act (dotted: limits), with links too long and one fault.
+    """Distance from the desired position and torques that act (dotted: limits), with links too long and one fault.
 
     >>> from rapkm_lite import explore; explore.imperfections().set(longer=0).numbers["largest torque"]
     '59 of 150 mN m'
@@ -61,7 +61,7 @@ def imperfections(robot: Manipulator) -> Explorer:
         if lost:
             picture.text("error", 0.98, 0.97, lost[2:], inside=True, ha="right", va="top", fontsize=9, color=ALARM)
         return {
-            "farthest from the wanted place": f"{off.max():.2f} mm{lost}",
+            "farthest from the desired position": f"{off.max():.2f} mm{lost}",
             "largest torque": " of ".join(marks.told(v, 0, strong) for v in (np.abs(torque).max(), limit)) + " mN m",
             "torque that only presses, at the end": marks.per_drive(press, 1, strong) + " mN m",
             "electric energy": marks.told(run.energy.sum(), 2, strong**2) + " J",
@@ -81,7 +81,7 @@ def imperfections(robot: Manipulator) -> Explorer:
 
 @shared.ready_made
 def controller_choice(robot: Manipulator) -> Explorer:
-    """Distance from the wanted place and torques under a law of choice, with offsets, a payload and coarse encoders.
+    """Distance from the desired position and torques under a law of choice, with offsets, payload and coarse encoders.
 
     >>> from rapkm_lite import explore
     >>> explore.controller_choice().set(offset_1=0, offset_2=0, offset_3=0).numbers["largest error"]

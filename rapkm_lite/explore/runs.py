@@ -147,7 +147,7 @@ def animation(robot: Manipulator) -> Explorer:
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},
         "torque": shared.over_time("torque in mN m", robot=robot, title="Torque"),
-        "error": shared.over_time("path error in mm", title="Distance from the wanted place"),
+        "error": shared.over_time("path error in mm", title="Distance from the desired position"),
     }
     controls = {
         "time": slider("time in ms", 0, 5000, 40, 400),
@@ -191,12 +191,12 @@ def via_points(robot: Manipulator) -> Explorer:
         lost = marks.told(copper_loss(robot, null[:-1], done.dt).sum(), 3, heavier**2)
         return {
             "largest torque that only presses": marks.told(np.abs(pressing).max(), 1, heavier) + " mN m",
-            "farthest from the wanted place": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
+            "farthest from the desired position": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
             "electric energy": f"{energy} J, of which antagonism {lost} J",
             "at the end": marks.per_drive(pressing[-1], 1, heavier) + " mN m",
         }
 
-    along = {"xlabel": "way along the edge in mm", "ylabel": "true − wanted place in mm", "xlim": (0, edge)}
+    along = {"xlabel": "way along the edge in mm", "ylabel": "true − desired position in mm", "xlim": (0, edge)}
     torque = shared.over_time("torque that only presses in mN m", 3.0, robot)
     counts = [(f"{edge / legs:.4g} mm", legs) for legs in (1, 2, 4, 8, 16, 32, 64)]
     controls = {

@@ -198,11 +198,11 @@ def curves(picture, panel: str, t, values, least: float, most: float = np.inf, b
 
 def distance_panels(robot: Manipulator, end: float, torque: str = "torque in mN m") -> dict:
     """The panels of `draw_distance`."""
-    return {"error": over_time("distance from the wanted place in mm", end), "torque": over_time(torque, end, robot)}
+    return {"error": over_time("path error in mm", end), "torque": over_time(torque, end, robot)}
 
 
 def draw_distance(picture, run, least: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of a run from the wanted place (k,) in mm, torques (k, N) in mN m; least: limits, mm on the testbed."""
+    """Path error of a run (k,) in mm, torques (k, N) in mN m; least: limits, mm on the testbed."""
     off, torque = 1e3 * run.path_error, 1e3 * run.c
     picture.trace("error", run.t, off, color=ALARM)
     picture.fit("error", off, symmetric=False, least=least[0] * size(run.robot))

@@ -95,7 +95,7 @@ def pd(k, d):
 
 
 def fed_forward(k, d):
-    """Filtered PD around the torques of the wanted motion, as a function."""
+    """Filtered PD around the torques of the desired motion, as a function."""
     robot = rk.load().replace(friction=0.0)
 
     def law(t, q_a, qd_a, desired):

@@ -52,7 +52,7 @@ def _acceleration(Phi, robot, q, pair) -> tuple[float, str]:
     falling = forward_dynamics(robot, q, still, np.zeros(robot.n_arms))[0]
     gained = [forward_dynamics(robot, q, still, Phi @ v)[0] - falling for v in np.eye(2)]
     worst = max(np.abs(a[list(pair)] - v).max() for a, v in zip(gained, np.eye(2), strict=True))
-    return worst, "the multiplier form (2) answers 1 rad/s^2 of wanted acceleration with an error in rad/s^2 of"
+    return worst, "the multiplier form (2) answers 1 rad/s^2 of desired acceleration with an error in rad/s^2 of"
 
 
 def _mapped(change):

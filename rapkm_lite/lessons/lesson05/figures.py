@@ -154,7 +154,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
 def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     """Sample k of a run that a law in the angles of `pair` drives, beside the desired point and its mirror line.
 
-    Left the machine, the third arm pale; right the box `zoom` (4,) in m: the wanted point and the run up to here, the
+    Left the machine, the third arm pale; right the box `zoom` (4,) in m: the desired point and the run up to here, the
     pair's curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both
     axes.
 
@@ -174,7 +174,7 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     axes[1].plot(*run.x[: k + 1].T, zorder=4, **_LAW_LINES["fixed pair"])
     axes[1].plot(*np.stack([run.x[k], desired[k]]).T, color=NEUTRAL, lw=1.0, zorder=4)
     axes[1].plot(*run.x[k], "s", color=ALARM, ms=8, zorder=6, label="end-effector")
-    axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="wanted")
+    axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="desired")
     axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
     axes[0].set(**scaled_frame(robot, -0.31, 0.31, -0.31, 0.31, drives=True), title=f"{run.t[k]:.2f} s")
     axes[1].set(**_box(robot, zoom, 0.088, 0.13, -0.09, -0.054), title="enlarged")
@@ -198,7 +198,7 @@ def film_mirror(run, pair, frames: int = 23):
     steps = np.linspace(first - 0.09 / run.dt, second + 0.1 / run.dt, frames).astype(int)
     alt = (
         "Left the machine, right the lower right corner of the triangle, enlarged. At the curve on which the distal "
-        "links are parallel the end-effector is thrown back, while the wanted point goes on over the curve; until the "
+        "links are parallel the end-effector is thrown back, while the desired point goes on over the curve; until the "
         "path comes back each is the mirror image of the other in the line through the two elbows."
     )
 

@@ -26,7 +26,7 @@ def plot_five_bar_curves(robot, start, end, axes=None):
     line = start + part * np.subtract(end, start)
     needed = np.unwrap(inverse_kinematics(robot, line), axis=0)
     straight = needed[0] + part * (needed[-1] - needed[0])
-    axes[0].plot(*(1e3 * line.T), color="#BBBBBB", lw=5, label="wanted", zorder=1)
+    axes[0].plot(*(1e3 * line.T), color="#BBBBBB", lw=5, label="desired", zorder=1)
     axes[1].plot([], [], ":", color=NEUTRAL, label="what the edge needs")
     for pair in ((0, 1), (1, 2))[: robot.n_arms - 1]:
         five_bar, (j, k), style = robot.with_arms(pair), pair, pair_line(robot, pair)

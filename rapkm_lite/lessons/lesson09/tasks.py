@@ -135,7 +135,7 @@ def carriage():
 
 @functools.cache
 def probes() -> list[tuple]:
-    """Control matrices and forces of the wanted motion, every quarter of a second."""
+    """Control matrices and forces of the desired motion, every quarter of a second."""
     robot, path = carriage()
     A, f = control_matrix(robot, path.q), required_wrench(robot, path.q, path.qd, path.qdd)
     return [(A[k], f[k]) for k in range(25, len(path), 50)]

@@ -106,7 +106,7 @@ def plot_saturation(limit, shifts, ax=None):
 
 
 def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
-    """Distance of the end-effector from its wanted place over time, in mm, for each of up to five runs (label -> Run).
+    """Distance of the end-effector from its desired position over time, in mm, for up to five runs (label -> Run).
 
     The first run is the broad one; distances below `least` in mm are drawn there.
 
@@ -118,6 +118,6 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
     for k, ((label, run), (colour, dash)) in enumerate(with_looks("runs", runs, looks)):
         off = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         ax.semilogy(run.t, np.maximum(off, least), color=colour, ls=dash, lw=1.5 if k else 5.0, label=label)
-    ax.set(xlabel="time in s", ylabel="distance from the wanted place in mm", xlim=(0, None))
+    ax.set(xlabel="time in s", ylabel="distance from the desired position in mm", xlim=(0, None))
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return ax

@@ -142,12 +142,12 @@ EXERCISES = {
         invariant=tasks.balance,
         tolerance=1e-9,
         close=1e-3,  # of what the velocity terms make
-        improve="take the terms of both machines from rk.minimal_dynamics at the wanted motion, without differences",
+        improve="take the terms of both machines from rk.minimal_dynamics at the desired motion, without differences",
         mistakes={
             "robot and model are exchanged (the order of the arguments)": (
                 lambda robot, model, *rest: tasks.model_error(model, robot, *rest)
             ),
-            "the sign: with too little force the machine stays behind, true minus wanted is wanted": (
+            "the sign: with too little force the machine stays behind, true minus desired is asked for": (
                 lambda *case: -tasks.model_error(*case)
             ),
             "the gain K_P is missing: these are accelerations": lambda *case: case[-1] * tasks.model_error(*case),

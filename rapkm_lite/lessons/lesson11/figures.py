@@ -88,7 +88,7 @@ def plot_slow_error(t, error, predicted, ax=None):
         ax.plot(t, 1e3 * error[:, axis], color=colour, label=f"run, {word}")
         ax.plot(t, 1e3 * predicted[:, axis], color=colour, ls="--", lw=1.2, label=f"theory, {word}")
     ax.axhline(0, color="#BBBBBB", lw=0.8)
-    ax.set(xlabel="time in s", ylabel="true − wanted place in mm", xlim=(t[0], t[-1]))
+    ax.set(xlabel="time in s", ylabel="true − desired position in mm", xlim=(t[0], t[-1]))
     no_finer(ax, LEAST)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=4)
     return ax

@@ -55,7 +55,7 @@ def no_determinant(got, robot, q, K_P) -> tuple[float, str]:
 
 
 def model_error(robot, model, q, qd, xd, xdd, K_P) -> np.ndarray:
-    """Errors (k, 2) in m, true minus wanted, of a slow motion under computed torque with a model that is wrong."""
+    """Errors (k, 2) in m, true minus desired, of a slow motion under computed torque with a model that is wrong."""
     G, C, Q = minimal_dynamics(robot, q, qd, None)
     G_model, C_model, Q_model = minimal_dynamics(model, q, qd, None)
     missed = np.einsum("kij,kj->ki", G_model - G, xdd) + np.einsum("kij,kj->ki", C_model - C, xd) + Q_model - Q

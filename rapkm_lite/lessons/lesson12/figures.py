@@ -80,7 +80,7 @@ def plot_length_choice(lengths, conditions: dict, special, ax=None):
 
 
 def plot_swing(motion, pose, labels, ax=None):
-    """Distance of the platform's centre from its wanted place over time, in mm: poses (runs, k, 3), named by `labels`.
+    """Distance of the platform's centre from its desired position over time, in mm: poses (runs, k, 3) of the `labels`.
 
     >>> import numpy as np; from rapkm_lite.lessons.lesson12 import four_rrr; from rapkm_lite import plotting
     >>> motion = four_rrr.Motion(np.arange(3.0), np.zeros((3, 3)), *3 * [np.zeros((3, 9))])
@@ -90,6 +90,6 @@ def plot_swing(motion, pose, labels, ax=None):
     off = 1e3 * np.linalg.norm((pose - motion.pose)[..., :2], axis=-1)
     for label, row, look in zip(labels, off, _LAWS, strict=False):
         ax.plot(motion.t, row, label=label, **look)
-    ax.set(xlabel="time in s", ylabel="distance from the wanted place in mm", ylim=(0, 1.35 * off.max()))
+    ax.set(xlabel="time in s", ylabel="distance from the desired position in mm", ylim=(0, 1.35 * off.max()))
     ax.legend(ncols=2, loc="upper center")
     return ax
