@@ -16,7 +16,7 @@ from ...mechanics.kinematics import inverse_kinematics
 from ...mechanics.trajectory import polygon
 from ...simulation.energy import antagonistic_torque
 from ...simulation.runs import simulate
-from ..answers import Ended, given, numbers
+from ..answers import Ended, fitting, given, numbers
 from ..checker import Case, Measured
 
 START, END = np.array([-0.12, -0.12 / np.sqrt(3)]), np.array([0.12, -0.12 / np.sqrt(3)])
@@ -114,8 +114,9 @@ def edge_demand() -> tuple[np.ndarray, np.ndarray]:
 def chosen(answer) -> np.ndarray:
     """The via points that a student's function chooses."""
     shares = np.atleast_1d(numbers(given(answer, edge_demand())))
-    if shares.ndim != 1 or not np.all((shares >= 0) & (shares <= 1)):
-        raise Ended("wrong", "the via points are shares of the way, numbers between 0 and 1, in one row", "no shares")
+    shares = fitting(shares, (shares.size,))
+    if not np.all((shares >= 0) & (shares <= 1)):
+        raise Ended("wrong", "the via points are shares of the way, numbers between 0 and 1", "no shares")
     if np.any((shares == 0) | (shares == 1)):
         raise Ended("wrong", "the shares 0 and 1 are the ends of the way, which are given: leave them out", "ends")
     return np.unique(shares)
