@@ -208,6 +208,7 @@ ANSWERS = {
         ("right", "characteristic polynomial", polynomial),
         ("close", "rounded to a hundredth", lambda *case: np.round(right(*case), 2)),
         ("wrong", "rad/s", scaled(right, 2 * np.pi), "2 pi"),
+        ("wrong", "/ 2 * np.pi", scaled(right, np.pi**2), "brackets"),
         ("wrong", "squares", lambda *case: (2 * np.pi * right(*case)) ** 2, "root"),
         ("wrong", "squares in Hz", lambda *case: right(*case) ** 2, "root"),
         ("wrong", "x and y apart", uncoupled, "diagonals"),

@@ -94,6 +94,9 @@ EXERCISES = {
             "this is in rad/s; the factor 2 pi is missing (units)": (
                 lambda robot, q, K_P: 2 * np.pi * tasks.pd_frequencies(robot, q, K_P)
             ),
+            "/ 2 * np.pi multiplies by pi: brackets are missing around 2 * np.pi": (
+                lambda robot, q, K_P: np.pi**2 * tasks.pd_frequencies(robot, q, K_P)
+            ),
             "the higher one comes first: wrong order": lambda robot, q, K_P: tasks.pd_frequencies(robot, q, K_P)[::-1],
             "the inertia is missing: these are roots of stiffnesses": (
                 lambda robot, q, K_P: _frequencies(_terms(robot, q)[1].T @ (K_P[:, None] * _terms(robot, q)[1]))
