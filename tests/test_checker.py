@@ -329,7 +329,11 @@ def test_what_stops_for_one_kind_of_case_only_says_for_which():
     said = judged(single, lambda K, v, m: (K * v)[:3] / m).sentence
     assert said.endswith("; for four, while it goes through for three entries")
     nothing = judged(single, lambda K, v, m: None if len(K) == 4 else K * v / m)
-    assert nothing.word == "wrong" and nothing.sentence.endswith("; some other case has one")
+    assert nothing.word == "wrong"
+    assert nothing.sentence == f"{NOTHING}; for four, while it goes through for three entries"
+    unnamed = Exercise(scaled, ("a", "b", "c"), "N m", cases)
+    nothing = judged(unnamed, lambda K, v, m: None if m < 1.15 else K * v / m)
+    assert nothing.word == "wrong" and nothing.sentence == f"{NOTHING}; some other case has one"
     # What stops everywhere stops for no kind in particular.
     assert "while it goes through" not in judged(known, lambda K, v, m: K[:2]).sentence
 
@@ -856,6 +860,13 @@ def test_arithmetic_in_place_reaches_nothing_that_a_function_is_given():
 def test_an_answer_of_several_numbers_is_an_array_in_the_cells_that_follow(kind):
     """`return low, high` makes a tuple, which has no method round, and SymPy makes objects."""
     assert Answer(lambda: kind([4, 2.25]))().round(1).tolist() == [4.0, 2.2]
+
+
+def test_who_returns_an_array_for_a_number_is_told_that_one_is_wanted():
+    """One gain for each drive, as a law takes them."""
+    gain = exercises()["11.gain_for_bandwidth"]
+    said = judged(gain, lambda robot, *case: np.full(robot.n_arms, gain.reference(robot, *case))).sentence
+    assert said == "the answer has shape (3,), expected (); one number is wanted"
 
 
 def test_nothing_that_can_be_told_stays_so_when_it_is_checked_again(capsys):

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..simulation.runs import SimulationError
 
-NOTHING = "no value is returned: is a return missing, or has a solver found nothing?"
+NOTHING = "no value is returned (is a return missing, or has a solver found nothing?)"
 # Where the code of the package, of libraries and of Python itself lies.
 _HOMES = Path(__file__).parents[1], Path(np.__file__).parents[1], Path(os.__file__).parent
 
@@ -252,6 +252,7 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
             raise Ended("wrong", words, "transposed")
         flat, other = "; a flat array is wanted", "; their number is right, the rows and columns are not"
         extra = (flat if len(shape) == 1 else other) * (got.size == int(np.prod(shape)) and got.size > 1)
+        extra += "; one number is wanted" * (shape == ())
         raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
     if isinstance(got, Masked):
         raise Ended("wrong", "the answer is masked in some entries; numbers are wanted", "masked")

@@ -111,13 +111,14 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
         try:
             got.append(ask(k))
         except Ended as end:
+            only = all(labels[: k + 1]) and label not in labels[:k] and k > 0
             if end.result.sentence == NOTHING and got:
-                raise Ended("wrong", f"{NOTHING}; some other case has one", "none") from None
-            if all(labels[: k + 1]) and label not in labels[:k] and k > 0:
+                end = Ended("wrong", NOTHING + "; some other case has one" * (not only), "none")
+            if only:
                 before = {repr(v) for case in cases[:k] for v in case}
                 own = _OWN * any(isinstance(v, Manipulator) and repr(v) not in before for v in cases[k])
                 end.add_note(f"; for {label}, while it goes through for {labels[0]}{own}")
-            raise
+            raise end from None
     return got
 
 
