@@ -3,12 +3,14 @@
 import json
 import re
 import warnings
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import sympy
 
 import rapkm_lite as rk
 from rapkm_lite.checks import Case, Exercise, Measured, check, draw_own, examine, exercises, hint
@@ -860,6 +862,18 @@ def test_arithmetic_in_place_reaches_nothing_that_a_function_is_given():
 def test_an_answer_of_several_numbers_is_an_array_in_the_cells_that_follow(kind):
     """`return low, high` makes a tuple, which has no method round, and SymPy makes objects."""
     assert Answer(lambda: kind([4, 2.25]))().round(1).tolist() == [4.0, 2.2]
+
+
+@pytest.mark.parametrize("wrap", [Fraction, Decimal, sympy.Float, lambda v: np.full((1, 1), v)])
+def test_a_number_is_one_in_the_cells_that_follow_however_it_is_wrapped(wrap):
+    """Rows times columns make arrays of one number, which no format takes."""
+    assert f"{Answer(lambda: wrap(2.25))():.2f}" == "2.25"
+
+
+def test_a_matrix_of_sympy_is_an_array_in_the_cells_that_follow():
+    """What a check accepts can be used: the norm of such a matrix with an array has no root."""
+    got = Answer(lambda: sympy.Matrix([[3, 0], [0, 4]]))() - np.zeros((2, 2))
+    assert np.linalg.norm(got @ [1.0, 1.0]) == 5.0
 
 
 def test_who_returns_an_array_for_a_number_is_told_that_one_is_wanted():

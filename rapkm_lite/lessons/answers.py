@@ -8,6 +8,7 @@ import inspect
 import os
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
@@ -89,16 +90,15 @@ class Handed(Answer):
 
 
 def tidied(got: Any) -> Any:
-    """Numbers, lists and tuples of numbers as floating-point arrays, one number as a number; anything else as it is."""
-    if isinstance(got, np.ndarray | list | tuple | int | float | np.number) and not isinstance(got, bool):
-        try:
+    """What a check reads as numbers, as a floating-point array, one number as a number; anything else as it is."""
+    like = isinstance(got, list | tuple) or hasattr(got, "__array__") or hasattr(got, "__float__")
+    if like and not isinstance(got, bool):
+        with suppress(Exception):  # objects that others made stop in many ways
             numbers = np.asarray(got)
             if numbers.dtype.kind == "O":  # such as those of SymPy
                 numbers = numbers.astype(float)
             if numbers.dtype.kind in "iuf":
-                return numbers.astype(float).reshape(() if numbers.shape == (1,) else numbers.shape)[()]
-        except (TypeError, ValueError, OverflowError):
-            return got
+                return numbers.astype(float).reshape(() if numbers.size == 1 else numbers.shape)[()]
     return got
 
 
