@@ -1082,6 +1082,15 @@ def test_who_stops_for_the_same_machine_is_not_asked_about_machines():
 
     said = judged(exercise, answer).sentence
     assert "for a pose near the curve of the pair" in said and "n_arms" not in said
+    # Nor is who divides by the masses that a model misses, where it misses nothing but friction.
+    exercise = exercises()["11.model_error"]
+
+    def over_the_masses(robot, model, q, qd, *rest):
+        missed = rk.mass_matrix(robot, q) - rk.mass_matrix(model, q)
+        return exercise.reference(robot, model, q, qd, *rest) * (1.0 if missed.any() else np.nan)
+
+    said = judged(exercise, over_the_masses).sentence
+    assert "for friction that the model does not know" in said and "n_arms" not in said
 
 
 def test_a_law_that_gives_no_number_is_told_without_one():

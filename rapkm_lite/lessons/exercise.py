@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..machine.arguments import short
+from ..machine.manipulator import Manipulator
 from .answers import copied
 
 
@@ -29,6 +30,11 @@ class Case(tuple):
         case = super().__new__(cls, arguments)
         case.label, case.beyond = label, beyond
         return case
+
+
+def arms(cases: list[tuple]) -> set[str]:
+    """The arms of all machines of these cases; who takes them from another machine stops, or finds no pose."""
+    return {repr((v.base, v.lengths)) for case in cases for v in case if isinstance(v, Manipulator)}
 
 
 @dataclass(frozen=True)

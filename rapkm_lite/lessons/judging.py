@@ -10,10 +10,9 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from ..machine.manipulator import Manipulator
 from .answers import NOTHING, REFERENCE, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import coarse, named, where
-from .exercise import Case, Exercise, Measured
+from .exercise import Case, Exercise, Measured, arms
 from .seen import Seen, largest, ratio_of
 
 _OWN = " (is it the robot of the arguments, and does robot.n_arms or robot.n_joints stand where it counts?)"
@@ -115,8 +114,7 @@ def _each(cases: list[tuple], ask: Callable) -> list[np.ndarray]:
             if end.result.sentence == NOTHING and got:
                 end = Ended("wrong", NOTHING + "; some other case has one" * (not only), "none")
             if only:
-                before = {repr(v) for case in cases[:k] for v in case}
-                own = _OWN * any(isinstance(v, Manipulator) and repr(v) not in before for v in cases[k])
+                own = _OWN * bool(arms(cases[k : k + 1]) - arms(cases[:k]))
                 end.add_note(f"; for {label}, while it goes through for {labels[0]}{own}")
             raise end from None
     return got
