@@ -503,6 +503,12 @@ def test_several_arrays_are_no_answer():
     # The whole of what lstsq gives.
     said = judged(VECTOR, lambda K, v, m: np.linalg.lstsq(np.outer(K, v), v, rcond=None)).sentence
     assert said.endswith("of type tuple: 4 arrays, of shapes (3,), (0,), (), (3,), where one is wanted")
+    said = judged(VECTOR, lambda K, v, m: ((0.1, 0.2), m)).sentence
+    assert said.endswith("of type tuple: 2 arrays, of shapes (2,), (), where one is wanted")
+
+
+def test_where_one_number_is_wanted_no_empty_pair_of_brackets_is_asked_for():
+    assert examine("06.cheapest_offsets", lambda S, size: np.diag(S))[1].endswith("shape (3,), expected one number")
 
 
 def test_a_design_is_judged_by_its_numbers_beside_their_limits():
@@ -874,13 +880,6 @@ def test_a_matrix_of_sympy_is_an_array_in_the_cells_that_follow():
     """What a check accepts can be used: the norm of such a matrix with an array has no root."""
     got = Answer(lambda: sympy.Matrix([[3, 0], [0, 4]]))() - np.zeros((2, 2))
     assert np.linalg.norm(got @ [1.0, 1.0]) == 5.0
-
-
-def test_who_returns_an_array_for_a_number_is_told_that_one_is_wanted():
-    """One gain for each drive, as a law takes them."""
-    gain = exercises()["11.gain_for_bandwidth"]
-    said = judged(gain, lambda robot, *case: np.full(robot.n_arms, gain.reference(robot, *case))).sentence
-    assert said == "the answer has shape (3,), expected (); one number is wanted"
 
 
 def test_nothing_that_can_be_told_stays_so_when_it_is_checked_again(capsys):

@@ -91,8 +91,8 @@ class Handed(Answer):
 
 def tidied(got: Any) -> Any:
     """What a check reads as numbers, as a floating-point array, one number as a number; anything else as it is."""
-    like = isinstance(got, list | tuple) or hasattr(got, "__array__") or hasattr(got, "__float__")
-    if like and not isinstance(got, bool):
+    # Every number has __float__, one of SymPy too; arrays of other packages, and matrices of SymPy, have __array__.
+    if isinstance(got, list | tuple) or hasattr(got, "__array__") or hasattr(got, "__float__"):
         with suppress(Exception):  # objects that others made stop in many ways
             numbers = np.asarray(got)
             if numbers.dtype.kind == "O":  # such as those of SymPy
@@ -219,15 +219,19 @@ def _array(got: Any) -> np.ndarray:
     return array
 
 
+def _shape(part: Any) -> tuple[int, ...]:
+    return getattr(part, "shape", (len(part),) if isinstance(part, list | tuple) else ())
+
+
 def numbers(got: Any) -> np.ndarray:
     """An answer as an array of floating-point numbers, a copy; ends the examination where it is none."""
     try:
         array = guarded(_array, got)
     except Ended:
         kind, parts = type(got).__name__, ""
-        if isinstance(got, tuple | list) and any(isinstance(part, np.ndarray) for part in got):
-            shapes = ", ".join(str(getattr(part, "shape", ())) for part in got)
-            parts = f": {len(got)} arrays, of shapes {shapes}, where one is wanted"
+        shapes = [str(_shape(part)) for part in got] if isinstance(got, tuple | list) else []
+        if len(set(shapes)) > 1:
+            parts = f": {len(got)} arrays, of shapes {', '.join(shapes)}, where one is wanted"
         large = ", or too large" * isinstance(got, int | list | tuple | np.ndarray)
         sentence = f"the answer is not numeric but of type {kind}{parts or large}"
         raise Ended("wrong", sentence, "not numeric") from None
@@ -252,8 +256,8 @@ def fitting(got: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
             raise Ended("wrong", words, "transposed")
         flat, other = "; a flat array is wanted", "; their number is right, the rows and columns are not"
         extra = (flat if len(shape) == 1 else other) * (got.size == int(np.prod(shape)) and got.size > 1)
-        extra += "; one number is wanted" * (shape == ())
-        raise Ended("wrong", f"the answer has shape {got.shape}, expected {shape}{extra}", "another shape")
+        wanted = shape or "one number"
+        raise Ended("wrong", f"the answer has shape {got.shape}, expected {wanted}{extra}", "another shape")
     if isinstance(got, Masked):
         raise Ended("wrong", "the answer is masked in some entries; numbers are wanted", "masked")
     if not np.all(np.isfinite(got)):
