@@ -477,6 +477,20 @@ def test_a_law_that_listens_to_dead_encoders_only_does_listen():
     assert said.word == "wrong" and said.mistake.startswith("the frozen reading still moves its drive")
 
 
+def test_a_law_that_goes_by_the_clock_is_not_said_to_follow_the_frozen_reading():
+    """Without any feedback after 0.75 s it follows none."""
+
+    def make(robot):
+        def law(t, q_a, qd_a, desired):
+            feedback = 7.05 * (q_a - desired.q_a) + 0.225 * (qd_a - desired.qd_a)
+            return rk.inverse_dynamics(robot, desired.q, desired.qd, desired.qdd) - (t < 0.75) * feedback
+
+        return law
+
+    said = judged(exercises()["05.dead_encoder"], make)
+    assert said.word == "wrong" and said.sentence.startswith("encoder 1 dead: largest error")
+
+
 def test_a_bill_that_is_too_high_is_not_to_be_mended_by_a_gain():
     """Square roots of the right weights: with the least heat's own, the bill is lower at the same gains."""
     exercise = exercises()["04.lean_law"]

@@ -188,7 +188,7 @@ def blind(law: Any, desired: Any) -> bool:
     return np.shape(given)[2:] == q_a.shape and bool(np.ptp(given, axis=1).max() < 1e-12)
 
 
-def stiffness(law: Any, desired: Any, frozen: bool = False) -> np.ndarray:
+def stiffness(law: Any, desired: Any, frozen: bool = False, t: float = 0.6) -> np.ndarray:
     """Change of a function's torques with each measured angle, (N, N) in N m/rad: row i holds drive i.
 
     frozen : the encoder of that angle gives no rate, as a dead one.  NaN for a law that is no function.
@@ -196,7 +196,7 @@ def stiffness(law: Any, desired: Any, frozen: bool = False) -> np.ndarray:
     drives, columns = np.eye(len(desired.q_a)), []
     for drive in drives if inspect.isfunction(law) else ():
         rates = desired.qd_a * (1.0 - drive) if frozen else desired.qd_a
-        more, less = (np.array(law(0.6, desired.q_a + s * drive, rates, desired), float) for s in (1e-3, -1e-3))
+        more, less = (np.array(law(t, desired.q_a + s * drive, rates, desired), float) for s in (1e-3, -1e-3))
         columns.append((more - less) / 2e-3)
     return np.array(columns).T if columns else np.full(drives.shape, np.nan)
 

@@ -304,6 +304,11 @@ def not_noticed(robot):
     return law
 
 
+def without_start(robot):
+    """Every drive whose rate is zero counts as dead, so none ever moves."""
+    return lambda t, q, qd, d: (qd != 0.0) * (7.05 * (d.q_a - q) + 0.225 * (d.qd_a - qd))
+
+
 def latching(robot):
     """What never moves is dead for good: the law remembers it, with its last reading, from call to call."""
     seen = {"last": None, "dead": np.zeros(robot.n_arms, dtype=bool)}
@@ -351,6 +356,7 @@ SURVIVORS = [
     ("wrong", "nothing", lambda robot: lambda t, q, qd, d: np.zeros(3), "not used"),
     ("wrong", "not noticed", not_noticed, "mm"),
     ("wrong", "no feed-forward", masked(7.05, 0.225), "mm"),
+    ("wrong", "no drive at rest", without_start, "never starts"),
     ("wrong", "opposite sign", feed_forward(-7.05, -0.225), "lost"),
     ("wrong", "the law itself", rk.PD(7.05, 0.225), "function itself"),
     ("wrong", "no law", lambda robot: 3.0, "law"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 
 from ...control.computed_torque import CTC, RedundantAPD, RedundantCTC, SwitchedCTC
@@ -65,9 +67,16 @@ def _probed(test, frozen=False):
 
     def made(make) -> bool:
         path = triangle(_model(), side=0.12, duration=2.5, dt=2e-3)
-        return bool(np.all(test(np.diagonal(stiffness(make(_model()), path[300], frozen)))))
+        # At 1 s, since a law may go by the clock and let go of its drives when an encoder dies.
+        return bool(np.all(test(np.diagonal(stiffness(make(_model()), path[500], frozen, t=1.0)))))
 
     return made
+
+
+def _never_starts(make) -> bool:
+    """True for a function that gives no torque at rest, wherever the machine stands: there every rate is zero."""
+    law, desired = make(_model()), triangle(_model(), side=0.12, duration=2.5, dt=2e-3)[300]
+    return inspect.isfunction(law) and not np.any(law(0.6, desired.q_a + 0.01, 0.0 * desired.qd_a, desired))
 
 
 DEAD_ENCODER = Exercise(
@@ -90,6 +99,7 @@ DEAD_ENCODER = Exercise(
         "the feedback pushes away from the path (sign): a drive ahead of its desired angle must be held back": (
             _probed(lambda own: own > 1e-6)
         ),
+        "the machine never starts: at rest every rate is zero, and not every encoder is dead": _never_starts,
         "the frozen reading still moves its drive: a dead encoder must be noticed, and its rate is zero": (
             _probed(lambda own: own < -1e-6, frozen=True)
         ),
