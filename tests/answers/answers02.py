@@ -168,6 +168,12 @@ FORCES = [
     ("wrong", "singular value", lambda A, torque: torque * np.linalg.svd(A)[1][-1], "singular value"),
     (
         "wrong",
+        "shortest torques",
+        lambda A, torque: torque / max(np.linalg.norm(row) for row in np.linalg.pinv(A.T)),
+        "other torques",
+    ),
+    (
+        "wrong",
         "singular value and root of m",
         lambda A, torque: torque * np.linalg.svd(A)[1][-1] * np.sqrt(len(A)),
         "singular value",

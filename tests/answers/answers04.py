@@ -170,6 +170,7 @@ SAVINGS = [
         lambda r, A, c, dt: saved(r.replace(resistance=r.resistance[0]), A, c, dt),
         "motor of the first one",
     ),
+    ("wrong", "the lesson's machine", lambda r, A, c, dt: saved(rk.load(), A, c, dt), "wrong for other motors"),
     (
         "wrong",
         "motors forgotten",

@@ -98,6 +98,10 @@ EXERCISES = {
             "this is the largest singular value; it belongs to a ball of torques, and to the best direction": (
                 lambda A, torque: torque * np.linalg.svd(A, compute_uv=False)[0]
             ),
+            "this is what the shortest torques, pinv(A.T) @ f, give before one of them is at its limit; other torques "
+            "for the same force go further": (
+                lambda A, torque: torque / np.linalg.norm(np.linalg.pinv(A.T), axis=1).max()
+            ),
             "this is the force of the weakest drive alone, in its own direction": (
                 lambda A, torque: torque * np.linalg.norm(A, axis=1).min()
             ),

@@ -80,8 +80,8 @@ def _command_with(change):
 def _log_cases(rng):
     robot = load()
     cases: list[tuple] = [
-        (robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
-        for R, dt in ((0.611, 1e-3), ([0.5, 0.7, 1.1], 2e-3), (0.611, 1e-2))
+        Case(words, robot.replace(resistance=R), _control_matrices(rng, 200), rng.normal(0, 0.04, (200, 3)), dt)
+        for words, R, dt in (("a log", 0.611, 1e-3), ("other motors", [0.5, 0.7, 1.1], 2e-3), ("a log", 0.611, 1e-2))
     ]
     # Antagonism that takes most of the load off drive 1: with the filter this drive pays more.
     A = _control_matrices(rng, 200)
