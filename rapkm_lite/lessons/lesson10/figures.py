@@ -118,6 +118,6 @@ def plot_faulty_runs(runs, ax=None, least: float = 1e-2):
     for k, ((label, run), (colour, dash)) in enumerate(with_looks("runs", runs, looks)):
         off = 1e3 * np.linalg.norm(run.x - run.trajectory.x[: len(run)], axis=-1)
         ax.semilogy(run.t, np.maximum(off, least), color=colour, ls=dash, lw=1.5 if k else 5.0, label=label)
-    ax.set(xlabel="time in s", ylabel="distance from the desired position in mm", xlim=(0, None))
+    ax.set(xlabel="time in s", ylabel="path error in mm", xlim=(0, None))
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return ax

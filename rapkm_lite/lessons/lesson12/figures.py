@@ -90,6 +90,6 @@ def plot_swing(motion, pose, labels, ax=None):
     off = 1e3 * np.linalg.norm((pose - motion.pose)[..., :2], axis=-1)
     for label, row, look in zip(labels, off, _LAWS, strict=False):
         ax.plot(motion.t, row, label=label, **look)
-    ax.set(xlabel="time in s", ylabel="distance from the desired position in mm", ylim=(0, 1.35 * off.max()))
+    ax.set(xlabel="time in s", ylabel="position error in mm", ylim=(0, 1.35 * off.max()))
     ax.legend(ncols=2, loc="upper center")
     return ax
