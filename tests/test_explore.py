@@ -548,6 +548,17 @@ def test_code_names_the_machine_that_was_given():
     assert light().set(slope=0.5).code == "explorer.set(slope=0.5)"
 
 
+@pytest.mark.parametrize("name", ["machine", "own_machine"])
+def test_the_working_mode_that_is_shown_first_is_that_of_the_machine(name):
+    """The signs of sin(elbow angle), read off the links that are drawn."""
+    robot = rk.load("four_arms").replace(mode=[1, 1, -1, 1])
+    shown = getattr(explore, name)(robot)
+    assert shown.values["mode"] == "(+, +, −, +)"
+    chains = [m.data for m in shown.picture.marks if (m.kind, m.panel) == ("line", "machine") and len(m.data) == 3]
+    turns = [np.sign(np.linalg.det(np.diff(chain, axis=0))) for chain in chains[-4:]]
+    assert turns == [1, 1, -1, 1]
+
+
 def test_a_machine_with_weight_rests_where_its_run_ends():
     """(14) with the force of gravity is of first order; with stiff drives that is near."""
     stiff = explore.steady_state(rk.load("asymmetric")).set(K_P_1=49.0, K_P_2=49.0, K_P_3=49.0)

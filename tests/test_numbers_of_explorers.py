@@ -103,6 +103,24 @@ def test_more_than_three_drives_have_a_null_space_and_no_null_vector():
     assert np.sum(said(explorer, "null space") ** 2) == pytest.approx(2.0, abs=0.03)
 
 
+@pytest.mark.parametrize(
+    "name, number",
+    [
+        ("controller_choice", "energy"),
+        ("via_points", "electric energy"),
+        ("own_machine", "cost of the offsets, at rest everywhere"),
+        ("prestress", "heat without"),
+        ("steady_state", "heat at rest"),
+        ("three_opinions", "heat at rest"),
+    ],
+)
+def test_gears_that_make_the_same_torques_of_a_thirtieth_of_the_current_take_a_nine_hundredth_of_the_heat(name, number):
+    """R (c / k_t)^2: the motion does not know k_t, and a heat that is none of the testbed's is not shown as none."""
+    geared = ROBOT.replace(torque_constant=30 * ROBOT.torque_constant)
+    direct, less = (said(getattr(explore, name)(robot), number)[-1] for robot in (ROBOT, geared))
+    assert less > 0 and direct / less == pytest.approx(900.0, rel=0.05)
+
+
 def test_areas_of_the_pairs_forces_add_to_that_of_all_drives():
     """McMullen: the area of a zonotope is the sum over the parallelograms of its pairs."""
     *pairs, whole = map(area, marks(explore.actuation().set(place=30, torque=100), "polygon", "force"))

@@ -104,7 +104,7 @@ def machine(robot: Manipulator) -> Explorer:
     bare = {k: plane[k] for k in ("aspect", "xlim", "ylim")} | {"xticks": [], "yticks": [], "title": " ", "small": True}
     panels = {"machine": plane | {"title": "Machine and map of σ_min"}} | dict.fromkeys(small, bare)
     controls = shared.place_sliders(robot, 20, 30) | {
-        "mode": choice("working mode", modes),
+        "mode": choice("working mode", modes, mode_name(robot.mode)),
         "drives": choice("map for", which.keys(), list(which)[-1]),
     }
     layout = [["machine", *small[k::3]] for k in range(len(small[:3]))]
@@ -199,6 +199,7 @@ def prestress(robot: Manipulator) -> Explorer:
     '0 mN m'
     """
     strong = shared.torque_scale(robot)
+    heat = shared.hotter(robot, strong)
 
     @lru_cache(maxsize=8)
     def along(side: int):
@@ -218,8 +219,8 @@ def prestress(robot: Manipulator) -> Explorer:
         return {
             "changes of sign without": marks.per_drive(sign_changes(least), 0),
             "changes with": marks.per_drive(sign_changes(c), 0),
-            "heat without": marks.told(energy[0], 2, strong**2) + " J",
-            "heat with": marks.told(energy[1], 2, strong**2) + " J",
+            "heat without": marks.told(energy[0], 2, heat) + " J",
+            "heat with": marks.told(energy[1], 2, heat) + " J",
             "largest prestress": marks.told(1e3 * np.abs(stress).max(), 0, strong) + " mN m",
         }
 

@@ -64,7 +64,7 @@ def imperfections(robot: Manipulator) -> Explorer:
             "farthest from the desired position": f"{off.max():.2f} mm{lost}",
             "largest torque": " of ".join(marks.told(v, 0, strong) for v in (np.abs(torque).max(), limit)) + " mN m",
             "torque that only presses, at the end": marks.per_drive(press, 1, strong) + " mN m",
-            "electric energy": marks.told(run.energy.sum(), 2, strong**2) + " J",
+            "electric energy": marks.told(run.energy.sum(), 2, shared.hotter(robot, strong)) + " J",
         }
 
     controls = {
@@ -106,11 +106,11 @@ def controller_choice(robot: Manipulator) -> Explorer:
         sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
         run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
         off, torque = shared.draw_distance(picture, run, (2.0, shared.least_torque(robot, 60.0)))
-        both = run.energy.sum(), antagonistic_energy(run)
+        both, heat = (run.energy.sum(), antagonistic_energy(run)), shared.hotter(robot, strong)
         return {
             "largest error": f"{off.max():.2f} mm",
             "largest jump of a torque": marks.told(np.abs(np.diff(torque, axis=0)).max(), 1, strong) + " mN m",
-            "energy": " J, of which antagonism ".join(marks.told(v, 2, strong**2) for v in both) + " J",
+            "energy": " J, of which antagonism ".join(marks.told(v, 2, heat) for v in both) + " J",
         }
 
     controls = {
@@ -169,7 +169,7 @@ def own_machine(robot: Manipulator) -> Explorer:
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
-            "cost of the offsets, at rest everywhere": f"{heat:.2f} J",
+            "cost of the offsets, at rest everywhere": marks.told(heat, 2, shared.hotter(robot, 1.0)) + " J",
             "largest torques that press": marks.per_drive(1e3 * np.abs(pressing).max(axis=0), 0) + " mN m",
             "smallest σ_min on the triangle": f"{act.singular_values(A)[:, 1].min():.2f} rad/m",
         }

@@ -31,6 +31,7 @@ def steady_state(robot: Manipulator) -> Explorer:
     '-23.6 / -23.4 / -23.6 mN m'
     """
     N, usual, heavier = robot.n_arms, shared.usual_gains(robot), shared.heavier(robot)
+    heat = shared.hotter(robot, heavier)
     still = lru_cache(maxsize=64)(lambda x, y: hold(robot, [x, y], 1.5, 2e-3))
 
     def draw(picture, x, y, **values):
@@ -58,7 +59,7 @@ def steady_state(robot: Manipulator) -> Explorer:
             "simulated": marks.per_drive(error[-1], 2) + " mrad" + ", not at rest yet" * moves,
             "largest difference": f"{1e3 * np.abs(theory - error[-1]).max():.1f} µrad",
             "rest torque": marks.per_drive(held, 1, heavier) + " mN m",
-            "heat at rest": marks.told(copper_loss(robot, 1e-3 * held[None], 1.0).sum(), 3, heavier**2) + " W",
+            "heat at rest": marks.told(copper_loss(robot, 1e-3 * held[None], 1.0).sum(), 3, heat) + " W",
         } | stop
 
     space = partial(marks.draw_workspace, panel="plane", robot=robot)
@@ -85,6 +86,7 @@ def three_opinions(robot: Manipulator) -> Explorer:
     '0.65 / 0.88 / 0.72 mm'
     """
     N, heavier = robot.n_arms, shared.heavier(robot)
+    heat = shared.hotter(robot, heavier)
 
     def draw(picture, x, y, K_P, **offsets):
         offset = marks.offset_values(offsets, N)
@@ -131,7 +133,7 @@ def three_opinions(robot: Manipulator) -> Explorer:
             "rest": f"({rest[0]:z.2f}, {rest[1]:z.2f}) mm beside the desired point",
             "distances from the lines": marks.per_drive(np.abs(normal @ rest - level), 2) + " mm",
             "torque at rest": marks.per_drive(torque, 1, heavier) + " mN m",
-            "heat at rest": marks.told(copper_loss(robot, 1e-3 * torque[None], 1.0).sum(), 3, heavier**2) + " W",
+            "heat at rest": marks.told(copper_loss(robot, 1e-3 * torque[None], 1.0).sum(), 3, heat) + " W",
         } | ({"desired point": words} if words else {})
 
     seen = (-3 * shared.size(robot), 3 * shared.size(robot))

@@ -34,7 +34,7 @@ def decentralized_run(robot: Manipulator) -> Explorer:
     '37 mN m'
     """
     N, damping, heavier = robot.n_arms, shared.usual_gains(robot)[1], shared.heavier(robot)
-    heat = heavier**2
+    heat = shared.hotter(robot, heavier)
     friction = robot.friction if np.any(robot.friction) else damping / 0.225 * load().friction[0]
     machines = {on: robot.replace(friction=friction if on else 0.0) for on in (False, True)}
     paths, table = {"centred triangle": shared.fitting_triangle(robot)}, None
@@ -172,6 +172,7 @@ def via_points(robot: Manipulator) -> Explorer:
     ends = middle + min(1.0, room / (0.16 * wide)) * line
     path = polygon(robot, ends, duration=3.0, dt=2e-3)
     edge, heavier = 1e3 * np.linalg.norm(ends[1] - ends[0]), shared.heavier(robot)
+    heat = shared.hotter(robot, heavier)
     way = 1e3 * np.linalg.norm(path.x - ends[0], axis=-1)[: len(path) // 2 + 1]  # there, not back
     axes = [("along x", {"color": ALARM}), ("along y", {"color": ALARM, "linestyle": (0, (5, 1.2))})]
 
@@ -187,8 +188,8 @@ def via_points(robot: Manipulator) -> Explorer:
             picture.trace("way", way, values, **look)
         picture.fit("way", off, least=shared.size(robot))
         shared.curves(picture, "torque", done.t, pressing, shared.least_torque(robot, 5.0))
-        energy = marks.told(done.energy.sum(), 2, heavier**2)
-        lost = marks.told(copper_loss(robot, null[:-1], done.dt).sum(), 3, heavier**2)
+        energy = marks.told(done.energy.sum(), 2, heat)
+        lost = marks.told(copper_loss(robot, null[:-1], done.dt).sum(), 3, heat)
         return {
             "largest torque that only presses": marks.told(np.abs(pressing).max(), 1, heavier) + " mN m",
             "farthest from the desired position": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",

@@ -84,8 +84,19 @@ def usual_gains(robot: Manipulator) -> tuple[float, float]:
 
 
 def heavier(robot: Manipulator) -> float:
-    """How many times the testbed's torques those of PD are; heat goes with its square."""
+    """How many times the testbed's torques those of PD are."""
     return usual_gains(robot)[0] / 7.05
+
+
+def hotter(robot: Manipulator, times: float) -> float:
+    """How many times the testbed's heat that of torques is that are `times` the testbed's, with the robot's motors.
+
+    >>> import rapkm_lite as rk; geared = rk.load().replace(torque_constant=10 * 0.0259)
+    >>> hotter(rk.load(), 3.0), round(hotter(geared, 3.0), 12)
+    (9.0, 0.09)
+    """
+    watts, testbed = (np.mean(r.resistance / r.torque_constant**2) for r in (robot, load()))  # of 1 N m
+    return float(times**2 * watts / testbed)
 
 
 def least_torque(robot: Manipulator, torque: float) -> float:

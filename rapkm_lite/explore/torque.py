@@ -39,6 +39,7 @@ def computed_torque(robot: Manipulator) -> Explorer:
     '0.0476 N m s²/rad'
     """
     pairs, width, heavier = act.drive_pairs(robot), shared.size(robot), shared.heavier(robot)
+    heat = shared.hotter(robot, heavier)
     singular = singular_curves(robot)
     fixed = {f"fixed pair {pair_name(p)}": p for p in pairs}
     laws = {word: partial(CTC, independent=pair) for word, pair in fixed.items()}
@@ -95,7 +96,7 @@ def computed_torque(robot: Manipulator) -> Explorer:
         return numbers | {
             "largest torque": per_drive([largest], 0, heavier) + " mN m",
             "largest error": f"{np.abs(error).max():.1f} mrad",
-            "energy": f"{per_drive(energy, 2, heavier**2)} J, in all {per_drive([energy.sum()], 2, heavier**2)} J",
+            "energy": f"{per_drive(energy, 2, heat)} J, in all {per_drive([energy.sum()], 2, heat)} J",
         }
 
     def setup(picture):
