@@ -551,6 +551,15 @@ def test_the_line_of_a_mirror_goes_through_both_elbows():
             assert a[0] * d[1] > a[1] * d[0]  # the arms bend to the left
 
 
+def test_a_mirror_of_a_run_far_from_the_corner_shows_where_the_machine_is():
+    path = rk.circle(ROBOT, 0.03, 0.5, centre=[0.0, 0.08])
+    ax = plotting.plot_mirror(rk.simulate(ROBOT, rk.PD(7.05, 0.225), path, OFFSET), 300, (0, 1))[1]
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    for x in (path.x, *(xy(line) for line in ax.lines if line.get_marker() in ("s", "o"))):
+        assert np.all((x > [left, low]) & (x < [right, high]))
+    assert right - left < 0.15
+
+
 def test_a_cross_marks_the_end_of_a_lost_run_and_a_box_its_limits():
     with pytest.raises(rk.SimulationError) as caught:
         rk.simulate(ROBOT, rk.CTC(400.0, 40.0), PATH, OFFSET)

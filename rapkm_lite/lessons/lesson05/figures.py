@@ -34,9 +34,16 @@ def _frame(robot, ax):
     return ax
 
 
-def _box(robot, zoom, *testbed: float) -> dict:
-    """Limits of a box (left, right, low, high) in m, or of the one that shows the testbed's corner on this machine."""
-    return scaled_frame(robot, *testbed) if zoom is None else {"xlim": tuple(zoom[:2]), "ylim": tuple(zoom[2:])}
+def _box(runs, zoom, *testbed: float) -> dict:
+    """Limits of a box (left, right, low, high) in m; of the testbed's corner on this machine, or about the runs."""
+    if zoom is not None:
+        return {"xlim": tuple(zoom[:2]), "ylim": tuple(zoom[2:])}
+    box, seen = scaled_frame(runs[0].robot, *testbed), np.concatenate([run.x for run in runs])
+    (left, right), (low, high) = box.values()
+    if np.any(np.all((seen > [left, low]) & (seen < [right, high]), axis=-1)):
+        return box
+    room = 0.2 * np.ptp(seen, axis=0).max() + 0.05 * runs[0].robot.lengths.max()
+    return dict(zip(box, zip(seen.min(axis=0) - room, seen.max(axis=0) + room, strict=True), strict=True))
 
 
 def plot_singular_poses(trajectory, pairs=((0, 1), (0, 2)), axes=None):
@@ -140,11 +147,7 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
             if run.t[-1] < longest.t[-1]:
                 ax.plot(*run.x[-1], "x", color=_law_line(label).get("color"), ms=9, mew=2.5, zorder=5)
         _frame(longest.robot, ax)
-    box, seen = _box(longest.robot, zoom, -0.13, 0.14, -0.105, -0.045), np.concatenate([run.x for run in runs.values()])
-    (left, right), (low, high) = box.values()
-    if zoom is None and not np.any(np.all((seen > [left, low]) & (seen < [right, high]), axis=-1)):
-        room = 0.2 * np.ptp(seen, axis=0).max() + 0.05 * longest.robot.lengths.max()
-        box = dict(zip(box, zip(seen.min(axis=0) - room, seen.max(axis=0) + room, strict=True), strict=True))
+    box = _box([longest, *runs.values()], zoom, -0.13, 0.14, -0.105, -0.045)
     axes[1].set(**box, aspect="auto", title="enlarged, axes unequal")
     beside = len(axes[1].get_legend_handles_labels()[1]) > 9  # of four arms or more it would hide the paths
     axes[1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.02) if beside else (0.12, 0.98))
@@ -154,9 +157,10 @@ def plot_ee_paths(runs: dict, axes=None, pair=None, zoom=None):
 def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     """Sample k of a run that a law in the angles of `pair` drives, beside the desired point and its mirror line.
 
-    Left the machine, the third arm pale; right the box `zoom` (4,) in m: the desired point and the run up to here, the
+    Left the machine, the other arms pale; right the box `zoom` (4,) in m: the desired point and the run up to here, the
     pair's curve, and the line through both elbows in which the tips of two base angles are mirror images.  Returns both
     axes.
+    Default of `zoom`: the testbed's corner, as large as the machine, or, where the run never gets there, about the run.
 
     >>> import rapkm_lite as rk; from rapkm_lite import plotting; robot = rk.load()
     >>> ax = plotting.plot_mirror(rk.simulate(robot, rk.PD(7.05, 0.225), rk.triangle(robot)), 1400, (0, 1))
@@ -177,7 +181,7 @@ def plot_mirror(run, k: int, pair, axes=None, zoom=None):
     axes[1].plot(*desired[k], "o", mfc="none", mec=AFTER, mew=1.8, ms=10, zorder=6, label="desired")
     axes[1].plot([], [], ":", color=NEUTRAL, label="line through the elbows")
     axes[0].set(**scaled_frame(robot, -0.31, 0.31, -0.31, 0.31, drives=True), title=f"{run.t[k]:.2f} s")
-    axes[1].set(**_box(robot, zoom, 0.088, 0.13, -0.09, -0.054), title="enlarged")
+    axes[1].set(**_box([run], zoom, 0.088, 0.13, -0.09, -0.054), title="enlarged")
     axes[1].legend(loc="lower right", framealpha=1.0, frameon=True, edgecolor="white")
     return axes
 
