@@ -1405,6 +1405,16 @@ def test_a_small_machine_shows_its_bars_and_arrows():
     assert 0.4 < largest / unit < 5.0
 
 
+def test_the_words_at_the_arrow_of_scale_stay_in_a_wide_picture():
+    """10 points are 0.14 in, of a panel that is 3.6 in high; drives far from a small workspace make it show more."""
+    square = 0.4 * np.array([[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    for robot in (rk.load(), rk.Manipulator(base=square, lengths=0.3, masses=0.2)):
+        picture = explore.animation(robot).picture
+        low, high = picture.ylim("plane")
+        ((_, y),) = next(m.data for m in picture.fixed if " N" in str(m.words))
+        assert y + 0.14 / 3.6 * (high - low) < high
+
+
 @pytest.mark.parametrize("base, lengths", [ODD["a ring"], ODD["a crescent"]], ids=["a ring", "a crescent"])
 def test_sliders_of_places_reach_around_the_place_of_paths_and_a_point_beyond_reach_is_told(base, lengths):
     """Where the middle is out of reach, a place between both would be all that its sliders could say."""

@@ -139,7 +139,9 @@ def animation(robot: Manipulator) -> Explorer:
     def setup(picture):
         marks.draw_workspace(picture, "plane", robot)
         picture.line("plane", *path.x.T, color=NEUTRAL, linewidth=1.2, zorder=2)
-        corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, picture.ylim("plane")[1] - 0.06 * times])
+        low, high = picture.ylim("plane")
+        down = max(0.06 * times, 0.065 * (high - low))  # where drives are far from the workspace, words need more room
+        corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, high - down])
         picture.arrow("plane", corner, [scale * unit, 0], wide, facecolor=AFTER)
         words = {"ha": "center", "va": "bottom", "fontsize": 10}
         picture.text("plane", corner[0] + scale * unit / 2, corner[1] + 0.015 * times, f"{unit:g} N", **words)
