@@ -32,7 +32,7 @@ class Manipulator(Value):
     """A planar 2-DOF parallel manipulator with N >= 2 driven RR arms; read-only, compared by value, SI units.
 
     Per-link values are given as one number, as (2,) = (proximal, distal) for all arms, or as (N, 2);
-    per-drive values as one number or (N,).
+    per-drive values, at the base joint even where a gear is between, as one number or (N,).
 
     base : (N, 2) base joints, m.
     lengths : link lengths, m.
