@@ -83,6 +83,18 @@ def test_a_gain_buys_nothing_but_the_fight():
         assert_allclose(run.c[-1] / k, tasks.geometry_fight(longer(1e-2), DRAWING, X, 1.0), rtol=0, atol=1e-9)
 
 
+def test_the_filter_needs_a_model_whose_null_vector_is_not_at_right_angles_to_the_true_one():
+    """Lesson 10: det(A_true^T A_model) is the product of both areas and of the cosine between the null vectors."""
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        true, model = (
+            rk.control_matrix(robot, rk.inverse_kinematics(robot, rng.uniform(-0.08, 0.08, 2)))
+            for robot in (DRAWING, DRAWING.replace(mode=[1, 1, -1], lengths=rng.uniform(0.19, 0.23, (3, 2))))
+        )
+        normals = [np.cross(*A.T) for A in (true, model)]
+        assert_allclose(np.linalg.det(true.T @ model), normals[0] @ normals[1], rtol=1e-9)
+
+
 @pytest.mark.parametrize("eps", [1e-3, 1e-2])
 def test_filter_leaves_nothing_at_rest_with_a_wrong_model(eps):
     """c = A_model f and A_true^T A_model regular: A_true^T c = 0 only for c = 0."""
