@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
 
 import rapkm_lite as rk
 
@@ -264,6 +264,32 @@ def test_no_singularity_up_to_045_and_one_in_the_other_mode():
     assert np.linalg.svd(rk.projector(mixed)[:4])[1][2] < 1e-12
 
 
+@pytest.mark.parametrize(
+    ("shift", "near"),
+    [((0.05, 0.0), (-0.22, -0.02)), ((0.0, 0.1), (-0.17, -0.03)), ((-0.15, 0.05), (-0.05, -0.11))],
+)
+def test_a_fourth_leg_mounted_differently_moves_the_singular_poses_and_leaves_a_curve(monkeypatch, shift, near):
+    """Distal lines of four legs through one point: two conditions on x, y, alpha.  One more leg, one condition more."""
+    monkeypatch.setattr(four_rrr, "BASE", four_rrr.BASE + [[0, 0], [0, 0], [0, 0], shift])
+
+    def lines(pose):
+        """Direction and moment about the centre, over 0.1 m, of the distal links (4, 3)."""
+        elbow, corner = four_rrr.legs(four_rrr.angles(pose))[:, 1:].swapaxes(0, 1)
+        (x, y), (u, v) = (corner - pose[:2]).T, (corner - elbow).T / four_rrr.LINK
+        return np.stack([u, v, (x * v - y * u) / 0.1], axis=-1)
+
+    def apart(place, angle):
+        of = lines(np.array([*place, angle]))
+        return [np.linalg.det(np.delete(of, leg, axis=0)) for leg in range(4)]
+
+    places = []
+    for angle in (0.52, 0.525, 0.53):
+        places.append(least_squares(apart, near, args=(angle,), xtol=1e-15, ftol=1e-15, gtol=1e-15).x)
+        sigma = np.linalg.svd(lines(np.array([*places[-1], angle])))[1]
+        assert sigma[2] < 1e-9 and sigma[1] > 0.5
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 0.05
+
+
 def test_default_cut_off_blows_up_and_the_rank_does_not():
     """The fourth singular value is rounding, of the size of the default cut-off: where it lies above, it is inverted.
 
@@ -288,6 +314,16 @@ def test_a_condition_number_needs_a_length():
     condition = [np.linalg.cond(A / [1, 1, L]) for L in (0.1 * 2**0.5, 1.0, 1e-3)]
     assert_allclose(condition, [1.0, 10 / 2**0.5, 100 * 2**0.5], rtol=1e-12)
     assert_allclose(rk.antagonism_filter(A / [1, 1, 1e-3]), rk.antagonism_filter(A), atol=1e-14)
+    # The condition ranks poses by the length, the manipulability, det(A^T A)^(1/2), does not.
+    pose[2] = 0.3
+    turned = rk.complement(loops.J(np.r_[four_rrr.angles(pose), pose]), (9, 10, 11))[:4]
+    better, wider = [], []
+    for L in (0.1, 0.1 * 2**0.5, 1e-3):
+        scaled = [of / [1, 1, L] for of in (A, turned)]
+        better.append(bool(np.linalg.cond(scaled[1]) < np.linalg.cond(scaled[0])))
+        wider.append(np.prod([np.linalg.svd(of)[1] for of in scaled], axis=1))
+    assert better == [True, False, True]
+    assert_allclose([one / two for one, two in wider], wider[0][0] / wider[0][1], rtol=1e-9)
 
 
 def feedback(q, v, scale, line=1):
@@ -319,6 +355,26 @@ def test_feedback_feels_the_units_and_feed_forward_does_not():
     mine, theirs = feedback(q, error, np.ones(9)), feedback(q, error, DEGREES)
     assert np.linalg.norm(theirs - mine) / np.linalg.norm(mine) == pytest.approx(0.48, abs=0.005)
     assert back.min() < 0.48 < back.max()
+
+
+def test_units_reach_32_and_not_the_feed_forward_nor_28_with_the_gains_29():
+    """N q'' + N' q' = q'' for every projector onto the tangent space; (A~^T)^+ K e = R K_a e_a has drives only."""
+    motion, K = four_rrr.swing(dt=4e-3), np.diag(DRIVEN)
+    q, qd, qdd = motion.q[300], motion.qd[300], motion.qdd[300]
+    J, J_dot, G, _, _ = machine().terms(q, qd)
+    error = np.r_[OFFSET, np.random.default_rng(0).normal(0, 3e-3, 5)]
+    first, by_28, by_32 = [], [], []
+    for scale in (np.ones(9), DEGREES):
+        N, N_dot = rk.projector(J / scale), rk.projector_dot(J / scale, J_dot / scale)
+        first.append((N @ (scale * qdd)) / scale)
+        assert_allclose(first[-1] + N_dot @ (scale * qd) / scale, qdd, atol=1e-12)
+        pinv = np.linalg.pinv(N[:4].T, 1e-9)
+        by_28.append(pinv @ K @ (scale * error))
+        by_32.append(pinv @ N @ (G / scale[:, None] / scale) @ N @ K @ (scale * error))
+    assert np.abs(first[1] - first[0]).max() > 0.03
+    A = rk.complement(J, (0, 1, 2))[:4]
+    assert_allclose(by_28, [A @ np.linalg.pinv(A) @ OFFSET] * 2, atol=1e-12)
+    assert np.linalg.norm(by_32[1] - by_32[0]) > 0.1 * np.linalg.norm(by_32[0])
 
 
 def test_effective_gains_of_29_along_the_circle():
