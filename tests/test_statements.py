@@ -299,6 +299,22 @@ def test_no_machine_of_three_arms_makes_the_fight_small_for_all_offsets():
         assert_allclose(trace, 0.611 / 0.0259**2 * 7.05**2 * 5.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize("mode", [(1, 1, -1), (-1, 1, -1)])
+def test_one_elbow_the_other_way_is_singular_on_the_testbed_and_nowhere_with_a_wider_base(mode):
+    """Lesson 12: three distal links parallel, at the middle of a side for a base side of twice the links only."""
+    turn, grid = np.radians([210.0, 330.0, 90.0]), np.linspace(-0.25, 0.25, 251)
+    base, points = np.stack([np.cos(turn), np.sin(turn)], axis=-1), np.stack(np.meshgrid(grid, grid), axis=-1)
+
+    def least(radius, lengths):
+        robot = rk.Manipulator(base=radius * base, lengths=lengths, masses=0.1, mode=mode)
+        q = rk.inverse_kinematics(robot, points[rk.reachable(robot, points)])
+        return np.abs(rk.distal_cross_products(robot, q)).max(axis=-1).min()
+
+    assert least(0.4 / np.sqrt(3), [0.2, 0.2]) < 0.02
+    for radius, lengths in ((0.25, [0.2, 0.2]), (0.27, [0.2, 0.24]), (0.29, [0.18, 0.26])):
+        assert least(radius, lengths) > 0.09
+
+
 def test_the_third_arm_buys_acceleration_in_the_weakest_direction_and_pays_in_the_best():
     """Lesson 00: it has mass as well as a drive; against a pair, the worst direction gains in most places, not all."""
     x, y, inside = rk.workspace_grid(TESTBED, 40)

@@ -76,8 +76,8 @@ EXERCISES = {
             "The offsets cost K_P times their part along the null vector. What in a machine decides the signs of that "
             "vector?",
             "The working mode: one arm bent the other way mostly turns one sign, not always that of its own drive. Try "
-            "all three: one leaves little of (4, -2, 5), another doubles the cost. Such a mode is singular at the "
-            "middle of one base side (lesson 02).",
+            "all three: one leaves little of (4, -2, 5), another doubles the cost. On the testbed such a mode is "
+            "singular at the middle of one base side (lesson 02), with a wider base nowhere.",
             "mode=[1, 1, -1], base points 0.28 to 0.3 m from the origin, distal links longer than proximal ones: "
             "lengths=[0.18, 0.26].",
         ),
