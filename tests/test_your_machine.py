@@ -326,6 +326,19 @@ def test_a_condition_number_needs_a_length():
     assert_allclose([one / two for one, two in wider], wider[0][0] / wider[0][1], rtol=1e-9)
 
 
+@pytest.mark.parametrize(("link", "length"), [(0.4, 0.1 * 2**0.5), (0.5, 0.165)])
+def test_the_length_of_condition_1_is_that_of_the_corner_for_elbows_at_right_angles_only(monkeypatch, link, length):
+    """A^T A = c^2 diag(2, 2, 4 (lever / L)^2) in the centre; sqrt(2) lever = sqrt(2) r sin(elbow / 2)."""
+    monkeypatch.setattr(four_rrr, "LINK", link)
+    q = four_rrr.angles(np.zeros(3))
+    _, elbow, corner = np.moveaxis(four_rrr.legs(q), -2, 0)
+    along = (corner - elbow) / link
+    lever = corner[:, 0] * along[:, 1] - corner[:, 1] * along[:, 0]
+    assert np.linalg.cond(np.column_stack([along, lever / (2**0.5 * np.abs(lever[0]))])) == pytest.approx(1.0)
+    assert 2**0.5 * np.abs(lever) == pytest.approx(0.2 * np.sin(q[4:8] / 2))
+    assert 2**0.5 * np.abs(lever) == pytest.approx(length, abs=5e-4)
+
+
 def feedback(q, v, scale, line=1):
     """(32) for v, all of it in a colleague's units q' = scale q; drives in ours, so the torques compare."""
     J, _, G, _, _ = machine().terms(q, 0 * q)
