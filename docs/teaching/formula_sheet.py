@@ -23,7 +23,8 @@ ROWS = [
     (
         "independent joints",
         "(4), (5)",
-        r"$J_1\dot q_1+J_2\dot q_2=0,\quad \dot q=F\dot q_2,\quad F=(-J_1^{-1}J_2;\ I),\quad JF=0$",
+        r"$J_1\dot q_1+J_2\dot q_2=0,\quad \dot q=F\dot q_2,\quad JF=0,"
+        r"\quad F=(-J_1^{-1}J_2;\ I)$, the rows of $q_1$ first",
     ),
     ("minimal form", "(6)", r"$\bar G\ddot q_2+\bar C\dot q_2+\bar Q=A^Tc,\quad \dot q_a=A\dot q_2$"),
     ("its matrices", "(7)", r"$\bar G=F^TGF,\quad \bar C=F^T(CF+G\dot F),\quad \bar Q=F^TQ$"),
