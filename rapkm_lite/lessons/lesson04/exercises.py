@@ -247,8 +247,8 @@ EXERCISES = {
         close=1e-3,
         improve="project exactly, without a damping or a tolerance in the filter",
         mistakes={
-            "this is the copper loss of the antagonistic torques: it equals the saving in total (Pythagoras), not "
-            "drive by drive": _energy_with(lambda whole, kept, removed: removed),
+            "this is the copper loss of the antagonistic torques: for equal motors it is the saving in total "
+            "(Pythagoras), but not drive by drive": _energy_with(lambda whole, kept, removed: removed),
             "this is the copper loss that remains with the filter, not what it saves": (
                 _energy_with(lambda whole, kept, removed: kept)
             ),
