@@ -410,6 +410,28 @@ def test_17_leaves_nothing_at_every_pose_only_for_equal_gains():
     assert left([0.03, 0.02], [20.0, 7.0, 7.0]) > 0.1 and left(on_curve, [7.0, 20.0, 7.0]) > 0.1
     assert left([0.03, 0.02], [7.0, 7.0, 7.0]) < 1e-12
 
+    def missed(x, K_P):
+        """The printed (14) with the missing A^T against the solution of (13) with closed loops, errata."""
+        A, K = rk.control_matrix(TESTBED, rk.inverse_kinematics(TESTBED, x)), np.diag(K_P)
+        repaired = -np.linalg.solve(K, A @ np.linalg.pinv(A) @ K @ OFFSET)
+        return np.abs(repaired + A @ np.linalg.solve(A.T @ K @ A, A.T @ K @ OFFSET)).max()
+
+    assert missed(on_curve, [20.0, 7.0, 7.0]) < 1e-15 and missed([0.03, 0.02], [7.0, 7.0, 7.0]) < 1e-15
+    assert missed(on_curve, [7.0, 20.0, 7.0]) > 1e-3 and missed([0.03, 0.02], [20.0, 7.0, 7.0]) > 1e-3
+
+
+def test_torques_split_in_one_way_by_eta_and_not_by_the_right_angle_of_the_parts():
+    """Lesson 04: c - mu eta is at right angles to mu eta for mu = eta.c, and for mu = 0, which removes nothing."""
+    rng = np.random.default_rng(3)
+    for A in rk.control_matrix(TESTBED, PATH.q[::500]):
+        eta, c = np.cross(*A.T), rng.normal(0, 0.05, 3)
+        eta /= np.linalg.norm(eta)
+        named = np.linalg.solve(np.vstack([A.T, eta]), [*(A.T @ c), 0.0])
+        assert_allclose(named, rk.antagonism_filter(A) @ c, atol=1e-14)
+        null = (eta @ c) * eta
+        assert_allclose(named, c - null, atol=1e-14)
+        assert abs(null @ (c - null)) < 1e-16 and np.linalg.norm(null) > 1e-3  # while 0 @ (c - 0) is zero as well
+
 
 def test_the_feedback_of_19_in_the_angles_of_a_pair_stays_small_and_slackens_where_that_of_20_grows():
     """Lesson 05: A holds the rows of I_2 at the pair, so that A^T A = I + a a^T and |(A^T)^+| = 1."""
@@ -437,6 +459,34 @@ def test_a_fixed_pair_lasts_longer_with_the_offsets_reversed():
 
     assert [lasts(side, 1) for side in (215, 220)] == [True, False]
     assert [lasts(side, -1) for side in (230, 235)] == [True, False]
+
+
+def test_the_error_of_a_fixed_pair_ends_faster_or_slower_than_one_over_the_sine_by_the_sign_of_the_offsets():
+    """Lesson 05 and its question: from wrong angles, where the two distal circles about the elbows meet."""
+    offset = np.array([1e-3, -1e-3, 0.5e-3])
+
+    def times_sine(side, i, k, sign):
+        path = rk.triangle(FRICTIONLESS, side=1e-3 * side, dt=5e-3)
+        angle = path.q_a[:, [i, k]] - sign * offset[[i, k]]
+        elbows = FRICTIONLESS.base[[i, k]] + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        first, second = elbows[:, 0], elbows[:, 1]
+        half = (second - first) / 2
+        high = np.sqrt(0.2**2 / np.sum(half**2, axis=-1, keepdims=True) - 1) * half[:, ::-1] * [-1, 1]
+        off = min(np.linalg.norm(first + half + s * high - path.x, axis=-1).max() for s in (1, -1))
+        pair = rk.drive_pairs(FRICTIONLESS).index((i, k))
+        return off * np.abs(rk.distal_cross_products(FRICTIONLESS, path.q)[:, pair]).min()
+
+    for i, k, faster in ((0, 1, 1), (0, 2, 1), (1, 2, -1)):
+        assert times_sine(215, i, k, faster) > 1.1 * times_sine(200, i, k, faster)
+        assert times_sine(228, i, k, -faster) < 0.6 * times_sine(200, i, k, -faster)
+
+
+def test_the_fight_hardly_changes_when_all_offsets_change_their_signs():
+    """Lesson 06: within 0.3 J of up to 32, over the corners of the cube of offsets."""
+    corners = 8e-3 * (np.stack(np.unravel_index(np.arange(8), (2, 2, 2)), axis=-1) * 2.0 - 1.0)
+    path = rk.triangle(FRICTIONLESS, dt=2e-3)
+    fights = np.array([rk.antagonistic_energy(rk.simulate(FRICTIONLESS, rk.PD(7.05, 0.225), path, o)) for o in corners])
+    assert 0.05 < np.abs(fights - fights[::-1]).max() < 0.3 and round(fights.max()) == 32
 
 
 def test_line_2_of_32_has_complex_gains_in_part_of_the_workspace_and_line_1_nowhere():
