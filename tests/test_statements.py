@@ -168,8 +168,17 @@ def test_mirrored_branch_asks_for_more_than_a_drive_has():
 def test_pair_1_3_is_lost_at_every_rate(rate):
     law = rk.CTC((2 * np.pi * 5) ** 2, 2 * (2 * np.pi * 5), (0, 2))
     with pytest.raises(rk.SimulationError) as lost:
-        rk.simulate(FRICTIONLESS, law, rk.triangle(FRICTIONLESS, dt=1 / rate))
+        rk.simulate(FRICTIONLESS, law, path := rk.triangle(FRICTIONLESS, dt=1 / rate))
     assert lost.value.time < 1.1
+    # Until then it takes the mirror image of the path in the line through elbows 1 and 3, which leads to base point 1.
+    begin = rk.follow(FRICTIONLESS, *(v[path.t < 1.03] for v in (path.t, path.x, path.xd, path.xdd)))
+    elbows = FRICTIONLESS.base + rk.arm_vectors(FRICTIONLESS, path.q)[0]
+    along = elbows[:, 2] - elbows[:, 0]
+    foot = np.sum((path.x - elbows[:, 0]) * along, axis=1, keepdims=True) / np.sum(along**2, axis=1, keepdims=True)
+    mirror = 2 * (elbows[:, 0] + foot * along) - path.x
+    run, between = rk.simulate(FRICTIONLESS, law, begin), (begin.t > 0.3) & (begin.t < 1.03)
+    assert np.linalg.norm(run.x - mirror[: len(begin)], axis=1)[between].max() < 1e-4
+    assert np.linalg.norm(mirror[path.t >= lost.value.time][0] - FRICTIONLESS.base[0]) < 1e-4
 
 
 def test_a_place_of_rest_is_not_yet_rest():
