@@ -1,5 +1,6 @@
 """What the lessons may claim and what they may not: numbers that decide between a statement and a stronger one."""
 
+import itertools
 import tomllib
 
 import numpy as np
@@ -470,18 +471,38 @@ def test_a_fixed_pair_lasts_longer_with_the_offsets_reversed():
     assert [lasts(side, -1) for side in (230, 235)] == [True, False]
 
 
+def five_bar(pair, q_a, near):
+    """End-effector (k, 2) of two arms by base angles (k, 3): where circles about their elbows meet, the one `near`."""
+    angle = q_a[:, pair]
+    elbows = FRICTIONLESS.base[pair] + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    middle, half = elbows.mean(axis=1), (elbows[:, 1] - elbows[:, 0]) / 2
+    high = np.sqrt(0.2**2 / np.sum(half**2, axis=-1, keepdims=True) - 1) * half[:, ::-1] * [-1, 1]
+    both = np.stack([middle + high, middle - high])
+    return both[np.linalg.norm(both - near, axis=-1).argmin(axis=0), np.arange(len(q_a))]
+
+
+def test_five_bars_bulge_to_different_sides_on_one_edge_and_to_the_same_on_the_next():
+    """Lesson 04, fig. 3: the middle three quarters of an edge, as drives that turn evenly pass them."""
+    corners, share = PATH.x[[0, 1667, 3333]], np.linspace(0, 1, 41)[:, None]
+    apart = []
+    for start, end in itertools.pairwise(corners):
+        line = start + (0.125 + 0.75 * share) * (end - start)
+        angles = rk.inverse_kinematics(FRICTIONLESS, line[[0, -1]])[:, :3]
+        across = np.array([start[1] - end[1], end[0] - start[0]]) / np.linalg.norm(end - start)
+        moves = angles[0] + share * (angles[1] - angles[0])
+        apart.append([(five_bar(pair, moves, line) - start)[20] @ across for pair in ([0, 1], [1, 2])])
+    assert apart[0][0] * apart[0][1] < 0 < apart[1][0] * apart[1][1]
+    assert min(map(np.ptp, apart)) > 5e-3
+
+
 def test_the_error_of_a_fixed_pair_ends_faster_or_slower_than_one_over_the_sine_by_the_sign_of_the_offsets():
     """Lesson 05 and its question: from wrong angles, where the two distal circles about the elbows meet."""
     offset = np.array([1e-3, -1e-3, 0.5e-3])
 
     def times_sine(side, i, k, sign):
         path = rk.triangle(FRICTIONLESS, side=1e-3 * side, dt=5e-3)
-        angle = path.q_a[:, [i, k]] - sign * offset[[i, k]]
-        elbows = FRICTIONLESS.base[[i, k]] + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        first, second = elbows[:, 0], elbows[:, 1]
-        half = (second - first) / 2
-        high = np.sqrt(0.2**2 / np.sum(half**2, axis=-1, keepdims=True) - 1) * half[:, ::-1] * [-1, 1]
-        off = min(np.linalg.norm(first + half + s * high - path.x, axis=-1).max() for s in (1, -1))
+        met = five_bar([i, k], path.q_a - sign * offset, path.x)
+        off = np.linalg.norm(met - path.x, axis=-1).max()
         pair = rk.drive_pairs(FRICTIONLESS).index((i, k))
         return off * np.abs(rk.distal_cross_products(FRICTIONLESS, path.q)[:, pair]).min()
 
