@@ -110,7 +110,7 @@ def controller_choice(robot: Manipulator) -> Explorer:
         return {
             "largest error": f"{off.max():.2f} mm",
             "largest jump of a torque": marks.told(np.abs(np.diff(torque, axis=0)).max(), 1, strong) + " mN m",
-            "energy": " J, of which antagonism ".join(marks.told(v, 2, heat) for v in both) + " J",
+            "energy": shared.with_antagonism(robot, *(marks.told(v, 2, heat) for v in both)),
         }
 
     controls = {

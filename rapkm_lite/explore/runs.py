@@ -195,7 +195,7 @@ def via_points(robot: Manipulator) -> Explorer:
         return {
             "largest torque that only presses": marks.told(np.abs(pressing).max(), 1, heavier) + " mN m",
             "farthest from the desired position": f"{np.linalg.norm(off, axis=-1).max():.2f} mm",
-            "electric energy": f"{energy} J, of which antagonism {lost} J",
+            "electric energy": shared.with_antagonism(robot, energy, lost),
             "at the end": marks.per_drive(pressing[-1], 1, heavier) + " mN m",
         }
 

@@ -99,6 +99,17 @@ def hotter(robot: Manipulator, times: float) -> float:
     return float(times**2 * watts / testbed)
 
 
+def with_antagonism(robot: Manipulator, energy: str, antagonism: str) -> str:
+    """Both in J; of motors that are not equal the heat of all torques is not that of their two parts together.
+
+    >>> import rapkm_lite as rk
+    >>> with_antagonism(rk.load(), "5", "3"), with_antagonism(rk.load().replace(resistance=[1, 1, 2]), "5", "3")
+    ('5 J, of which antagonism 3 J', '5 J, antagonism 3 J')
+    """
+    part = "of which " if np.ptp(robot.resistance / robot.torque_constant**2) == 0.0 else ""
+    return f"{energy} J, {part}antagonism {antagonism} J"
+
+
 def least_torque(robot: Manipulator, torque: float) -> float:
     """How far a panel of torques goes at least: the testbed's number, less where the usual gains are lower."""
     return torque * min(1.0, heavier(robot))
