@@ -113,7 +113,8 @@ def test_coriolis_matrix_has_the_skew_property_and_the_right_quadratic_terms(rob
     C = rk.coriolis_matrix(robot, q, qd)
     G_dot = along(lambda p: rk.mass_matrix(robot, p), q, qd, 1e-3)
     S = G_dot - 2 * C
-    # A difference quotient is right to the rounding of what it takes the difference of, over the step.
+    # A difference quotient is right to the rounding of what it takes differences of, over the step: its weights add to
+    # two, and S + S^T has it twice.
     rounding = np.finfo(float).eps / 1e-3
     assert norm(S + T(S)).max() < 4 * rounding * norm(rk.mass_matrix(robot, q)).max()
     # d/dt dT/dqd - dT/dq = G qdd + C qd: the quadratic terms are Gdot qd - dT/dq.

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import null_space
 
 import rapkm_lite as rk
 from rapkm_lite.lessons.lesson10 import tasks
@@ -83,16 +84,14 @@ def test_a_gain_buys_nothing_but_the_fight():
         assert_allclose(run.c[-1] / k, tasks.geometry_fight(longer(1e-2), DRAWING, X, 1.0), rtol=0, atol=1e-9)
 
 
-def test_the_filter_needs_a_model_whose_null_vector_is_not_at_right_angles_to_the_true_one():
-    """Lesson 10: det(A_true^T A_model) is the product of both areas and of the cosine between the null vectors."""
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        true, model = (
-            rk.control_matrix(robot, rk.inverse_kinematics(robot, rng.uniform(-0.08, 0.08, 2)))
-            for robot in (DRAWING, DRAWING.replace(mode=[1, 1, -1], lengths=rng.uniform(0.19, 0.23, (3, 2))))
-        )
-        normals = [np.cross(*A.T) for A in (true, model)]
-        assert_allclose(np.linalg.det(true.T @ model), normals[0] @ normals[1], rtol=1e-9)
+@pytest.mark.parametrize("angle", [0.3, 1.5, np.pi / 2])
+def test_a_fight_rests_behind_the_filter_only_where_null_vectors_are_at_right_angles(angle):
+    """Lesson 10: torques R f with A^T R f = 0 are zero, unless the model's null vector leaves the true one as it is."""
+    A = rk.control_matrix(DRAWING, rk.inverse_kinematics(DRAWING, X))
+    true, across = np.linalg.qr(A, mode="complete")[0][:, [2, 0]].T
+    model = null_space([np.cos(angle) * true + np.sin(angle) * across])  # (3, 2), in the place of A
+    resting = 2 - np.linalg.matrix_rank(A.T @ rk.antagonism_filter(model), tol=1e-9)
+    assert resting == (1 if angle == np.pi / 2 else 0)
 
 
 @pytest.mark.parametrize("eps", [1e-3, 1e-2])

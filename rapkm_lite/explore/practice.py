@@ -41,6 +41,7 @@ def imperfections(robot: Manipulator) -> Explorer:
     """
     path = shared.fitting_triangle(robot, 120, duration=2.5, dt=2e-3)
     usual, strong = shared.usual_gains(robot), shared.torque_scale(robot)
+    heat = shared.hotter(robot, strong)
     dotted = {"color": ALARM, "linestyle": ":", "linewidth": 1.5}
 
     def draw(picture, longer, K_P, limit, fault, filter):
@@ -64,7 +65,7 @@ def imperfections(robot: Manipulator) -> Explorer:
             "farthest from the desired position": f"{off.max():.2f} mm{lost}",
             "largest torque": " of ".join(marks.told(v, 0, strong) for v in (np.abs(torque).max(), limit)) + " mN m",
             "torque that only presses, at the end": marks.per_drive(press, 1, strong) + " mN m",
-            "electric energy": marks.told(run.energy.sum(), 2, shared.hotter(robot, strong)) + " J",
+            "electric energy": marks.told(run.energy.sum(), 2, heat) + " J",
         }
 
     controls = {
@@ -90,6 +91,7 @@ def controller_choice(robot: Manipulator) -> Explorer:
     path = shared.fitting_triangle(robot, 120, duration=2.5)
     # 0.27 kg weighs an arm of the testbed: up to 200 g on three of them, and on two.
     mass, strong, heavier = shared.carried(robot), shared.heavier(robot), shared.rounded(robot.masses.sum() / 0.67)
+    heat = shared.hotter(robot, strong)
     laws = {
         "PD": lambda k, d: PD(mass * k, mass * d),
         "PD and filter": lambda k, d: AntagonismFilter(PD(mass * k, mass * d)),
@@ -106,7 +108,7 @@ def controller_choice(robot: Manipulator) -> Explorer:
         sensors = {"encoder": 2000, "velocity_filter": 5e-3} if coarse else {}
         run = simulate(loaded(load), laws[law](w**2, 2 * w), path, offset, model=robot, **sensors)
         off, torque = shared.draw_distance(picture, run, (2.0, shared.least_torque(robot, 60.0)))
-        both, heat = (run.energy.sum(), antagonistic_energy(run)), shared.hotter(robot, strong)
+        both = run.energy.sum(), antagonistic_energy(run)
         return {
             "largest error": f"{off.max():.2f} mm",
             "largest jump of a torque": marks.told(np.abs(np.diff(torque, axis=0)).max(), 1, strong) + " mN m",
@@ -143,6 +145,7 @@ def own_machine(robot: Manipulator) -> Explorer:
     out = along / away.mean()
     modes = {mode_name(mode): mode for mode in working_modes(robot)}
     offset, side = np.resize(OFFSET, N), 0.24 if N > 2 else 0.16
+    hotter = shared.hotter(robot, 1.0)
     way = triangle(load(), side, dt=0.02).x
 
     def draw(picture, radius, proximal, distal, load, mode):
@@ -169,7 +172,7 @@ def own_machine(robot: Manipulator) -> Explorer:
         heat = copper_loss(own, pressing[:-1], path.dt).sum()
         return {
             "largest torque that moves": f"{1e3 * np.abs(moving).max():.0f} mN m",
-            "cost of the offsets, at rest everywhere": marks.told(heat, 2, shared.hotter(robot, 1.0)) + " J",
+            "cost of the offsets, at rest everywhere": marks.told(heat, 2, hotter) + " J",
             "largest torques that press": marks.per_drive(1e3 * np.abs(pressing).max(axis=0), 0) + " mN m",
             "smallest σ_min on the triangle": f"{act.singular_values(A)[:, 1].min():.2f} rad/m",
         }
