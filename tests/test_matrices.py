@@ -137,6 +137,16 @@ def test_bad_matrices(call, sentence):
         call()
 
 
+@pytest.mark.parametrize("unit", [1e-20, 1.0, 1e12])
+def test_complement_does_not_feel_the_units_of_the_constraints(unit):
+    """J qd = 0 says the same in any unit; J1 is singular where its columns are parallel, to rounding."""
+    J = np.random.default_rng(6).normal(size=(2, 4))
+    assert_allclose(rk.complement(unit * J, [2, 3]), rk.complement(J, [2, 3]), rtol=1e-14)
+    J[:, 1] = J[:, 0] / 3
+    with pytest.raises(ValueError, match="is singular here"):
+        rk.complement(unit * J, [2, 3])
+
+
 def test_machines_are_unchanged_by_it():
     q = rk.inverse_kinematics(FRICTIONLESS, [0.03, 0.02])
     A = rk.redundant_control_matrix(MACHINES["four_arms"], rk.inverse_kinematics(MACHINES["four_arms"], [0.03, 0.02]))
