@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 ROWS = [
     ("The machine", "", ""),
     ("counting", "*", r"$n = 2N,\ \ r = 2(N-1),\ \ \delta = n-r = 2,\ \ m = N$ drives"),
-    ("constraints", "(1)", r"$h(q)=0,\quad J\dot q=0,\quad J\ddot q+\dot J\dot q=0$"),
+    ("constraints", "(1)", r"$h(q)=0,\quad J\dot q=0$, hence $J\ddot q+\dot J\dot q=0$"),
     ("cut tree", "(2)", r"$G\ddot q+C\dot q+Q+J^T\lambda=u,\quad u=(c,\,0)$"),
     (
         "independent joints",
@@ -62,7 +62,7 @@ ROWS = [
     ("projector", "*", r"$N_J=I-J^+J,\quad \dot N_J=-(J^+\dot JN_J)-(J^+\dot JN_J)^T$; $\tilde A$: its driven rows"),
     (
         "motion equations",
-        "(22)–(24)",
+        "(23), (24)",
         r"$\tilde G\ddot q+\tilde C\dot q+\tilde Q=\tilde A^Tc;"
         r"\quad \tilde G=N_JGN_J,\ \tilde C=N_J(CN_J+G\dot N_J),\ \tilde Q=N_JQ$",
     ),
