@@ -80,8 +80,8 @@ def lyapunov_function(robot: Manipulator, q, e, ed, K_P, eps: float = 0.0) -> np
     K_P : as in `RedundantAPD`; with the gains (29), (m,), it has rank m of 2N, and V is positive definite on errors
         tangent to V only, where the degree of actuation is delta.  eps : in 1/s, not negative.
     At a fixed desired pose V with eps = 0 falls under `RedundantAPD`, dV/dt = -ed^T K_D ed: not at all where ed = 0.
-    With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that a small eps makes the tracking exponential is
-    what the chapter states.  Raises ValueError at c-space singularities and for open loops.
+    With eps > 0 it falls there too, dV/dt = -eps e^T D K_P e / 2; that this makes the tracking exponential is what the
+    chapter states.  Raises ValueError at c-space singularities and for open loops.
 
     >>> import numpy as np, rapkm_lite as rk; robot = rk.load(); q = rk.inverse_kinematics(robot, [0.02, 0.05])
     >>> float(rk.lyapunov_function(robot, q, 0.01 * np.ones(6), np.zeros(6), K_P=7.0).round(6))

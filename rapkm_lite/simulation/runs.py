@@ -1,4 +1,4 @@
-"""Single runs of the sampled control loop: what comes out of one, and what is known when it is lost (section 3)."""
+"""Single runs of the sampled control loop: what comes out of one, and what is known when it is lost."""
 
 from __future__ import annotations
 

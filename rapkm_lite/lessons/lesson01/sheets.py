@@ -1,4 +1,4 @@
-"""The sheets of the configuration space V of (1), one per working mode, over the base angles."""
+"""The sheets of the configuration space V of (3), one per working mode, over the base angles."""
 
 from __future__ import annotations
 
