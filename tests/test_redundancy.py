@@ -256,6 +256,8 @@ def test_stiffness_with_weight_is_how_the_force_of_a_hanging_machine_changes(nam
         ),
         (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], 9.0, W=[np.eye(3)]), r"W has shape \(1, 3, 3\); allowed: "),
         (lambda: rk.allocate_torques([[1.0]], [1.00002], 1.0), r"needs 1 \+ 2e-05 times limit"),
+        (lambda: rk.allocate_torques(np.eye(4, 2), [2.0, 0.0], 1.0), "inside the force polygon of the limits"),
+        (lambda: rk.allocate_torques(np.eye(4, 3), [2.0, 0.0, 0.0], 1.0), "inside the polytope of forces"),
         (lambda: rk.allocate_torques(CENTRE, [1.0, 0.0], [1.0, 1.0]), "limit has shape"),
         (lambda: rk.allocate_torques(CENTRE, [1.0], 1.0), "wrench has shape"),
         (lambda: rk.allocate_torques([CENTRE], [1.0, 0.0], 1.0), "A has shape"),

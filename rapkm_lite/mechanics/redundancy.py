@@ -109,9 +109,10 @@ def _demand(A, wrench, limit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _beyond(wrench: np.ndarray, peak: float, limit: np.ndarray) -> ValueError:
     factor = f"{peak:.4g}" if peak > 1.001 else f"1 + {peak - 1.0:.2g}"
+    forces = "force polygon" if wrench.size == 2 else "polytope of forces"
     return ValueError(
         f"wrench = {wrench.tolist()} needs {factor} times limit = {limit.tolist()} N m at least; allowed: a wrench "
-        "inside the force polygon of the limits"
+        f"inside the {forces} of the limits"
     )
 
 
