@@ -89,6 +89,13 @@ def test_a_numba_that_does_not_import_costs_a_warning(plain):
     assert numbers[:2] == plain[:2] and words.count("Numba is installed but does not import") == 1
 
 
+def test_a_folder_left_behind_by_numba_costs_a_warning(plain, tmp_path):
+    (tmp_path / "numba" / "__pycache__").mkdir(parents=True)
+    (tmp_path / "numba" / "__init__.py").touch()
+    numbers, words = result(before=f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n")
+    assert numbers[:2] == plain[:2] and words.count("Numba is installed but does not import") == 1
+
+
 @pytest.mark.parametrize("before", [FORBIDDEN_NUMBA, EMPTY_NUMBA])
 def test_a_numba_that_cannot_be_looked_for_is_not_there(plain, before):
     numbers, words = result(before=before)

@@ -56,7 +56,7 @@ def compiled() -> bool:
     if COMPILED:
         try:
             with _uninterrupted():
-                import numba
+                from numba import njit  # the folder that an uninstalled Numba left behind would import, empty
         except Exception as error:
             warnings.warn(
                 f"Numba is installed but does not import ({type(error).__name__}: {error}): runs go through plain "
