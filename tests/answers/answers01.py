@@ -519,7 +519,7 @@ FORCES = [
         "wrong",
         "same sign for all",
         lambda *case: (lambda L: np.insert(L, 1, L.sum(axis=0), axis=0))(multipliers(*case)),
-        "the sign of the others",
+        "on all arms but arm 2 is opposite",
     ),
     (
         "wrong",

@@ -245,6 +245,9 @@ FORCES = {
     "the force on arm 2 has the sign of the others: the forces of the pin do not add to zero": _pins_with(
         lambda L: np.insert(-L, 1, -L.sum(axis=0), axis=0)
     ),
+    "the sign of the forces on all arms but arm 2 is opposite: J^T lambda stands on the left of (2)": _pins_with(
+        lambda L: np.insert(L, 1, L.sum(axis=0), axis=0)
+    ),
     "the force on arm 2 is missing: it is in all rows of J": _pins_with(lambda L: np.insert(-L, 1, 0.0, axis=0)),
     "these are the multipliers, one row for each gap; the force on arm 2 is missing, and mind the sign": (
         _pins_with(lambda L: L)
