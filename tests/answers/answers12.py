@@ -29,6 +29,12 @@ def least_squares(J, m, K_P, offset):
     return -K_P * (offset - T @ np.linalg.lstsq(T, offset, rcond=None)[0])
 
 
+def pinv_tosses(J, m, K_P, offset):
+    """A projector of one's own, and a cut-off of the size of its rounding."""
+    A = (np.eye(J.shape[1]) - J.T @ np.linalg.solve(J @ J.T, J))[:m]
+    return -K_P * (offset - np.linalg.pinv(A.T) @ (A.T @ offset))
+
+
 def three_rows(J, m, K_P, offset):
     A = rk.projector(J)[:m]
     return -K_P * (np.eye(m) - rk.explicit_pseudoinverse(A, (0, 1, 2)) @ A.T) @ offset
@@ -68,6 +74,7 @@ ANSWERS = {
         ("right", "pinv with a cut-off", with_cut_off),
         ("right", "least squares", least_squares),
         ("wrong", "three rows always", three_rows, ""),
+        ("wrong", "numpy's pinv of an own projector", pinv_tosses, ""),
         ("wrong", "sign", scaled(-1), "sign"),
         ("wrong", "mN m", scaled(1e3), "1000"),
         ("wrong", "half", scaled(0.5), "factor"),
