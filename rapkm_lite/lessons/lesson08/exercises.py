@@ -107,7 +107,7 @@ EXERCISES = {
         ),
         tolerance=1e-8,
         close=5e-3,
-        improve="leave the number of counts as it comes, without rounding",
+        improve="take np.pi for pi, and leave the number of counts as it comes, without rounding",
         mistakes={
             "the friction band is 2 f_c wide, from -f_c to f_c: a factor of 2 is missing": (
                 lambda K_P, friction: 2 * np.pi * K_P / friction
