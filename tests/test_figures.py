@@ -759,3 +759,11 @@ def test_a_run_of_one_sample_is_seen(world):
         assert {line.get_marker() for line in ax.lines} == {"o"} and ax.get_xlim() == (0.0, one.dt)
     plotting.plot_torque_norms({"lost": one})
     plotting.plot_filter_share(one, 0.5)
+
+
+def test_a_stiffness_without_frequency_is_refused(world):
+    path = rk.hold(world["robot"], [0.0, 0.0], 0.01)
+    for stiffness in (-2e3 * np.eye(2), [[0.0, 2e3], [2e3, 0.0]]):
+        refused_with("stiffness = .*; allowed: springs that pull back", plotting.loop_frequencies, path, stiffness)
+    free = plotting.loop_frequencies(path, np.diag([0.0, 2e3]))[0]  # a direction without a spring swings not at all
+    assert free[0] == 0.0 and free[1] > 1.0

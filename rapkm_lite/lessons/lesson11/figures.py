@@ -8,6 +8,7 @@ import numpy as np
 from ...control.stability import effective_gain
 from ...figures._shared import LEAST, no_finer, with_looks
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, axes_or_new
+from ...machine.arguments import short
 from ...mechanics.dynamics import minimal_dynamics, orthogonal_complement
 
 _LOOKS = (
@@ -22,14 +23,19 @@ def loop_frequencies(path, stiffness) -> np.ndarray:
     """Natural frequencies (k, 2) in Hz along a path (`Trajectory`) of k samples, the lower one first.
 
     stiffness : (2, 2) or (k, 2, 2) in N/m, what a loop makes of an error of the end-effector, whose inertia they move.
+    Raises ValueError for one that pushes away from the place: it has no frequency.
 
     >>> import numpy as np; import rapkm_lite as rk; from rapkm_lite import plotting
     >>> plotting.loop_frequencies(rk.hold(rk.load(), [0.0, 0.0], 0.01), 2e3 * np.eye(2))[0].round(2)
     array([12., 12.])
     """
     M, _, _ = minimal_dynamics(path.robot, path.q, 0 * path.q)
-    squares = np.real(np.linalg.eigvals(np.linalg.solve(M, np.broadcast_to(stiffness, M.shape))))
-    return np.sort(np.sqrt(squares), axis=-1) / (2 * np.pi)
+    springs = np.broadcast_to(np.asarray(stiffness, dtype=float), M.shape)
+    squares = np.real(np.linalg.eigvals(np.linalg.solve(M, springs)))
+    if squares.min() < -1e-12 * np.abs(squares).max():
+        words = f"stiffness = {short(stiffness)} pushes away from the place, by {squares.min():.3g} 1/s^2 at worst"
+        raise ValueError(f"{words}; allowed: springs that pull back")
+    return np.sort(np.sqrt(np.maximum(squares, 0.0)), axis=-1) / (2 * np.pi)
 
 
 def plot_loop_frequencies(path, springs: dict, nominal, ax=None):
