@@ -767,3 +767,7 @@ def test_a_stiffness_without_frequency_is_refused(world):
         refused_with("stiffness = .*; allowed: springs that pull back", plotting.loop_frequencies, path, stiffness)
     free = plotting.loop_frequencies(path, np.diag([0.0, 2e3]))[0]  # a direction without a spring swings not at all
     assert free[0] == 0.0 and free[1] > 1.0
+
+
+def test_a_limit_that_is_none_is_named_by_its_own_name(world):
+    refused_with("limit = -0.1; allowed: > 0", plotting.plot_accelerations, world["robot"], [[0.0, 0.0]], -0.1)

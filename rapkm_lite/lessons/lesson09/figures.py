@@ -12,6 +12,7 @@ from ...figures._shared import LEAST, no_finer
 from ...figures.machine import plot_path
 from ...figures.maps import grid_points, on_grid, pair_line, pair_name, plot_pair_curves
 from ...figures.style import AFTER, ALARM, BEFORE, NEUTRAL, arm_line, axes_or_new
+from ...machine.arguments import positive_number
 from ...mechanics.actuation import control_matrix, drive_pairs, force_polygon, weighted_pseudoinverse
 from ...mechanics.antagonism import common_sign
 from ...mechanics.dynamics import minimal_dynamics
@@ -96,7 +97,7 @@ def plot_accelerations(robot, places, limit: float, axes=None):
     >>> import rapkm_lite as rk; from rapkm_lite import plotting
     >>> ax = plotting.plot_accelerations(rk.load(), [[0.0, 0.0], [-0.05, 0.0]], 0.085)
     """
-    places = np.asarray(places, dtype=float)
+    places, limit = np.asarray(places, dtype=float), positive_number("limit", limit)
     if axes is None:
         axes = plt.subplots(1, len(places), figsize=(3.5 * len(places) + 1.2, 3.6), squeeze=False)[1][0]
     size = 0.0
