@@ -771,3 +771,10 @@ def test_a_stiffness_without_frequency_is_refused(world):
 
 def test_a_limit_that_is_none_is_named_by_its_own_name(world):
     refused_with("limit = -0.1; allowed: > 0", plotting.plot_accelerations, world["robot"], [[0.0, 0.0]], -0.1)
+
+
+def test_drives_disagree_at_a_pose_that_is_a_list(world):
+    robot, q = world["robot"], world["q"]
+    one, other = (plotting.plot_disagreement(robot, pose, OFFSET, 7.05) for pose in (q, q.tolist()))
+    for line, same in zip(one.lines, other.lines, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), same.get_xydata())

@@ -29,7 +29,8 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     >>> ax = plotting.plot_disagreement(robot, q, [4e-3, -2e-3, 5e-3], 7.05)
     """
     ax = axes_or_new(ax, figsize=(4.6, 4.4))
-    A, weight, offset = control_matrix(robot, q), required_wrench(robot, q, 0 * q, 0 * q), np.asarray(offset, float)
+    still = np.zeros(robot.n_joints)
+    A, weight, offset = control_matrix(robot, q), required_wrench(robot, q, still, still), np.asarray(offset, float)
     rest = 1e3 * np.linalg.lstsq(A, steady_state_error(A, K_P, offset, weight), rcond=None)[0]
     torque = 1e3 * steady_state_torque(A, K_P, offset, weight)
     size = np.linalg.norm(A, axis=1)
