@@ -374,6 +374,17 @@ def test_on_a_phone_a_slider_stands_below_what_it_moves(browser, address):
     assert seen.errors == []
 
 
+@pytest.mark.parametrize("width", [360, 390, 1024])
+def test_each_choice_of_the_filter_is_read_to_its_end(browser, address, width):
+    """A list that may be as wide as it likes is as wide as its longest choice."""
+    rooms = """() => {
+        const list = document.getElementById("filter"), now = list.getBoundingClientRect().width;
+        Object.assign(list.style, { width: "max-content", position: "absolute" });
+        return [now, list.getBoundingClientRect().width]; }"""
+    now, wanted = Page(browser, address, width).page.evaluate(rooms)
+    assert now >= wanted - 0.5
+
+
 @pytest.mark.parametrize("size", [(390, 844), (320, 256)])
 def test_the_filter_at_the_top_covers_nothing_that_the_keyboard_comes_to(browser, address, size):
     seen = Page(browser, address, size[0])
