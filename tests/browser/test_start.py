@@ -579,6 +579,16 @@ def test_paper_shows_the_picture_in_its_shape_and_no_controls(browser, address, 
     assert seen.page.evaluate(inside)
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_are_dark_on_white_paper_whatever_the_screen(browser, address, scheme):
+    seen = Page(browser, address, color_scheme=scheme)
+    seen.page.emulate_media(media="print", color_scheme=scheme)
+    for part in ("body", "pre"):
+        style = seen.page.evaluate(f"Object.assign({{}}, getComputedStyle(document.querySelector('{part}')))")
+        ink, paper = (max(map(int, re.findall(r"\d+", style[k])[:3])) for k in ("color", "backgroundColor"))
+        assert ink < 64 and paper > 224
+
+
 @pytest.mark.parametrize("width", [390, 1280])
 def test_the_button_that_plays_is_called_what_it_does(browser, address, width):
     seen = Page(browser, address, width)
