@@ -760,6 +760,21 @@ def test_opinions_agree_on_a_triangle_that_is_closed():
     assert explorer.numbers["torque at rest"] != "0.0 / 0.0 / 0.0 mN m"
 
 
+def test_triangle_of_opinions_is_shaded_though_its_corners_are_out_of_view():
+    """Its corners p lie on two lines A_i p = -offset_i each, and the place of rest in their midst."""
+    robot, explorer, point = rk.load(), made("three_opinions"), np.array([-0.1, -0.1])
+    A = rk.control_matrix(robot, rk.inverse_kinematics(robot, point))
+    offset = np.array([-12.0, -12.0, -12.0])
+    explorer.set(x=-100, y=-100, **{f"offset_{i + 1}": v for i, v in enumerate(offset)})
+    (shaded,) = (m.data.reshape(-1, 2) for m in marks(explorer) if (m.kind, m.panel) == ("polygon", "opinions"))
+    assert np.abs(shaded).max() > 3
+    # mm times rad/m are mrad.
+    assert np.sort(np.abs(shaded @ A.T + offset), axis=1)[:, :2] == pytest.approx(0, abs=1e-4)
+    rest = np.array([float(v) for v in re.findall(r"-?\d+\.\d+", explorer.numbers["rest"])])
+    weights = np.linalg.solve(np.vstack([shaded.T, np.ones(3)]), [*rest, 1.0])
+    assert weights.min() > 0
+
+
 def test_knobs_stay_in_their_panel_and_numbers_of_level_lines_apart():
     explorer = made("three_opinions")
     for corner in itertools.product((-12.0, 12.0), repeat=3):
