@@ -50,6 +50,39 @@ def test_other_kinds_of_numbers_count_as_what_they_are():
     assert_array_equal(rk.copper_loss(TESTBED, c, Decimal("0.5")), rk.copper_loss(TESTBED, c, 0.5))
 
 
+class Column:
+    """What a column of a pandas table is: iterable and an array on request, but no `Sequence`."""
+
+    def __init__(self, *values):
+        self.values = np.array(values)
+
+    def __array__(self, dtype=None, copy=None):
+        return self.values.astype(dtype) if dtype else self.values
+
+    def __iter__(self):
+        return iter(self.values)
+
+    def __len__(self):
+        return len(self.values)
+
+
+@pytest.mark.parametrize("pair", [Column(0, 2), [np.array(0), np.array(2)], (np.int8(0), np.uint64(2))])
+def test_indices_from_any_kind_of_array_count_as_what_they_are(pair):
+    assert_array_equal(rk.control_matrix(TESTBED, Q, pair), rk.control_matrix(TESTBED, Q, (0, 2)))
+    assert rk.feedback_norm(TESTBED, Q, pair) == rk.feedback_norm(TESTBED, Q, (0, 2))
+    assert rk.CTC(400.0, 40.0, pair) == rk.CTC(400.0, 40.0, (0, 2))
+    assert TESTBED.with_arms(pair) == TESTBED.with_arms((0, 2))
+    A_tilde = rk.redundant_control_matrix(TESTBED, Q)
+    assert_array_equal(rk.explicit_pseudoinverse(A_tilde, pair), rk.explicit_pseudoinverse(A_tilde, (0, 2)))
+
+
+@pytest.mark.parametrize("pair", [Column(0, 0), Column(0, 1.5), Column(False, True), Column(0, -1), Column("0", "2")])
+def test_indices_from_any_kind_of_array_are_checked_all_the_same(pair):
+    for call in (lambda: rk.control_matrix(TESTBED, Q, pair), lambda: TESTBED.with_arms(pair)):
+        with pytest.raises(ValueError, match=r"(independent|arms) = .*; allowed: .* different (joint|arm) indices"):
+            call()
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

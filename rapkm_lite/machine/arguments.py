@@ -190,13 +190,21 @@ def positive_definite(name: str, value, size: int) -> np.ndarray:
     return array
 
 
+def listed(value):
+    """Return what an array, or a pandas Series, which is no `Sequence`, holds as a list; anything else as it is."""
+    try:
+        return np.asanyarray(value).tolist() if hasattr(value, "__array__") else value
+    except Exception:
+        return value
+
+
 def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: str = "joint") -> tuple[int, ...]:
     """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
-    numbers = value.tolist() if isinstance(value, np.ndarray) else value
-    listed = isinstance(numbers, Sequence) and not isinstance(numbers, bytes | bytearray)
-    numbers = list(itertools.islice(numbers, 1001)) if listed else ()  # a range may be endless
+    numbers = listed(value)
+    several = isinstance(numbers, Sequence) and not isinstance(numbers, bytes | bytearray)
+    numbers = list(map(listed, itertools.islice(numbers, 1001))) if several else ()  # a range may be endless
     most = math.inf if n is None else n
-    exact = all(isinstance(i, int | np.integer) and not isinstance(i, bool) and 0 <= i < most for i in numbers)
+    exact = all(isinstance(i, int) and not isinstance(i, bool) and 0 <= i < most for i in numbers)
     fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
     if not fits:
         some = f"a list of one {what} index" if count == 1 else f"{count or 'two or more'} different {what} indices"

@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from ..machine.arguments import joint_indices, one_of, real_array, whole_number, wide_matrix
+from ..machine.arguments import joint_indices, listed, one_of, real_array, whole_number, wide_matrix
 from ..machine.values import frozen
 from . import cores
 from .linalg import product, singular_values, squares
@@ -54,7 +54,7 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     """Row indices of A~_1, (delta,) or (..., delta), of A~_2, and where each row of A~ stands in these."""
     m, lead = A_tilde.shape[-2], A_tilde.shape[:-2]
     if not isinstance(rows, np.ndarray) or rows.ndim < 2:
-        rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
+        rows = listed(rows)
         count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
         return _fixed_partition(joint_indices("rows", rows, m, count, "row"), m)
     rows = real_array("rows", rows).astype(rows.dtype)
