@@ -173,6 +173,17 @@ def test_every_lesson_has_its_room_and_its_exercises_bear_its_number():
         assert name.partition(".")[0] in numbers and all(exercise.hints)
 
 
+CURVES = "03.rest_error", "04.filtered_torques", "05.feedback_map", "06.placement"
+CURVES += "07.contradiction", "09.room", "11.model_error"
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_an_answer_that_is_a_curve_is_drawn_in_its_picture_when_it_is_not_right(name):
+    (path,) = (NOTEBOOKS / "solutions").glob(f"{name[:2]}_*.ipynb")
+    pictures = [cell.source for cell in code_cells(path) if "plotting.plot" in cell.source]
+    assert any(f'draw_own("{name}"' in source for source in pictures)
+
+
 @pytest.mark.parametrize("path", NUMBERED, **NAMES)
 def test_the_lesson_itself_gives_no_answer_its_name(path):
     """A loop variable of that name would be graded in place of an answer that is not there."""
