@@ -265,7 +265,7 @@ def copied(folder: Path) -> None:
     """Copy what the tests need, and read once what every child needs: nothing of the package, which changes."""
     for part in ("rapkm_lite", "tests", "data", "docs", "notebooks"):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc"))
-    for part in filter(Path.is_file, ROOT.glob("*.*")):
+    for part in filter(Path.is_file, ROOT.iterdir()):
         shutil.copy2(part, folder / part.name)
     os.environ["PYTHONPATH"] = str(folder)
     import coverage  # noqa: F401
