@@ -615,6 +615,30 @@ def test_a_step_of_a_users_does_not_pass_by_a_formula_of_a_users():
         rk.simulate(ROBOT, Called(lambda t, q_a, qd_a, d: np.zeros(3)), PATH)
 
 
+def test_a_law_that_would_wait_is_refused_before_it_runs():
+    async def law(t, q_a, qd_a, desired):
+        return np.zeros(3)
+
+    class Call:
+        async def __call__(self, t, q_a, qd_a, desired):
+            return np.zeros(3)
+
+    class Step(rk.Law):
+        async def step(self, memory, sample):
+            return np.zeros(3), memory
+
+    class Start(rk.Law):
+        async def start(self, model, dt):
+            return np.zeros(3)
+
+        def step(self, memory, sample):
+            return np.zeros(3), memory
+
+    for wrong in (law, Call(), Step(), Start(), rk.compiled(law), rk.AntagonismFilter(rk.compiled(law))):
+        with pytest.raises(ValueError, match=r"is a coroutine; allowed: def, not async def$"):
+            rk.simulate(ROBOT, wrong, PATH)
+
+
 def test_a_call_that_no_run_asks_for_is_refused():
     """A law is asked for its step: a class on one that only says what a call gives would run as the law below it."""
     for base, given in ((rk.Law, ()), (rk.PD, (7.0, 0.2)), (rk.CTC, (400.0, 40.0))):

@@ -239,6 +239,9 @@ def function(name: str, value: Any) -> Any:
 def callable_with(name: str, value: Any, *given: str) -> Any:
     """Return `value` when it can be called with the arguments `given`, by position, and has none of them elsewhere."""
     allowed = f"({', '.join(given)})"
+    if inspect.iscoroutinefunction(value) or inspect.iscoroutinefunction(type(value).__call__):
+        # What it answers would wait to be awaited; and Numba compiles it as if it did not.
+        raise ValueError(f"{name} = {short(value)} is a coroutine; allowed: def, not async def")
     try:
         inspect.signature(value).bind(*given)
         parameters = inspect.signature(value, follow_wrapped=False).parameters.values()
