@@ -410,6 +410,19 @@ def test_an_object_is_no_function_that_can_be_compiled():
         rk.simulate(ROBOT, rk.compiled(Table()), PATH)
 
 
+def test_what_numba_compiled_runs_in_python_as_it_was_written():
+    """Also where the run is repeated to find out what went wrong."""
+
+    def plain(t, q_a, qd_a, d):
+        return -7.0 * (q_a - d.q_a) if t < 0.0205 else np.nan * q_a
+
+    law = rk.compiled(pytest.importorskip("numba").njit(plain))
+    for one in (law, rk.AntagonismFilter(law), InPython(law)):
+        with pytest.raises(rk.SimulationError, match=r"^at t = 0\.0210 s .+\[0\] = nan; allowed") as lost:
+            rk.simulate(ROBOT, one, rk.hold(ROBOT, [0.0, 0.0]), OFFSET)
+        assert len(lost.value.partial) == 21
+
+
 def test_a_compiled_law_that_was_copied_remembers_as_much():
     law = rk.compiled(lambda t, q_a, qd_a, d, memory: -7.0 * (q_a - d.q_a), memory=3)
     make, arguments = law.__reduce__()

@@ -44,8 +44,13 @@ class CompiledLaw(LawValue):
         """The pose that the run has to find for it: "measured", "true" or None."""
         return None if self.at in (None, "desired") else self.at
 
+    @property
+    def _plain(self) -> Callable:
+        """The function for Python, which one that Numba compiled holds: itself it cannot be told what `d` is."""
+        return getattr(self.function, "py_func", self.function)
+
     def __call__(self, *arguments):
-        return self.function(*arguments)
+        return self._plain(*arguments)
 
     def start(self, model, dt):
         self.check()
@@ -88,7 +93,7 @@ class CompiledLaw(LawValue):
         if self.memory:
             given.append(memory)
         # It may write into what was measured, as it may compiled.
-        return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), desired, *given), memory
+        return self._plain(sample.t, sample.q_a.copy(), sample.qd_a.copy(), desired, *given), memory
 
     def __repr__(self):
         name = getattr(self.function, "__name__", type(self.function).__name__)
