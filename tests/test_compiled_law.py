@@ -410,6 +410,16 @@ def test_an_object_is_no_function_that_can_be_compiled():
         rk.simulate(ROBOT, rk.compiled(Table()), PATH)
 
 
+def test_what_numba_compiled_is_sent_to_the_decorator():
+    """Numba types all arguments, used or not, and there is no type of its own for a desired motion."""
+    law = pytest.importorskip("numba").njit(lambda t, q_a, qd_a, d: -7.0 * q_a)
+    for one in (law, rk.AntagonismFilter(law)):
+        with pytest.raises(
+            ValueError, match=r"what `desired` is; allowed: rapkm_lite\.compiled of it, or the function"
+        ):
+            rk.simulate(ROBOT, one, PATH)
+
+
 def test_what_numba_compiled_runs_in_python_as_it_was_written():
     """Also where the run is repeated to find out what went wrong."""
 

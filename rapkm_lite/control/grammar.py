@@ -97,6 +97,11 @@ class Function(Law):
     def start(self, model, dt):
         """A function that cannot be called so is refused before the run."""
         callable_with("law", self.function, "t", "q_a", "qd_a", "desired")
+        if getattr(self.function, "targetoptions", {}).get("nopython"):
+            raise ValueError(
+                f"law = {short(self.function)} is compiled by Numba, which does not know what `desired` is; "
+                "allowed: rapkm_lite.compiled of it, or the function itself"
+            )
 
     def step(self, memory, sample):
         return self.function(sample.t, sample.q_a.copy(), sample.qd_a.copy(), sample.desired), memory
