@@ -433,6 +433,19 @@ def test_what_numba_compiled_runs_in_python_as_it_was_written():
         assert len(lost.value.partial) == 21
 
 
+@pytest.mark.skipif(not COMPILED, reason="without Numba it divides by zero in Python")
+def test_what_runs_only_compiled_is_lost_like_any_other_law():
+    """Python raises for 1.0 / 0.0 at the first sample, which compiled code passes: it is not why the run was lost."""
+    law = rk.compiled(lambda t, q_a, qd_a, d: q_a * (-min(1.0 / t, 0.1) if t < 0.0205 else np.nan))
+    path = rk.hold(ROBOT, [0.0, 0.0])
+    for run in (rk.simulate, lambda *arguments: rk.sweep(*arguments[:3], [OFFSET, OFFSET])):
+        with pytest.raises(
+            rk.SimulationError, match=r"at t = 0\.0210 s the law <lambda> returned torques that"
+        ) as lost:
+            run(ROBOT, law, path, OFFSET)
+        assert len(lost.value.partial) == 21
+
+
 def test_a_compiled_law_that_was_copied_remembers_as_much():
     law = rk.compiled(lambda t, q_a, qd_a, d, memory: -7.0 * (q_a - d.q_a), memory=3)
     make, arguments = law.__reduce__()
