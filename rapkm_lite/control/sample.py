@@ -124,7 +124,7 @@ class Sample:
 class Controller:
     """A law at work: it keeps the law's memory and the last estimates of the end-effector position, `x` the last one.
 
-    `simulate` uses one per run.  Use your own in a loop of your own, called once per sample as
+    `simulate` uses one per run in Python.  Use your own in a loop of your own, called once per sample as
     ``controller(t, q_a, qd_a, desired, truth=(x, xd))`` with measured base angles and rates (N,); the true end-effector
     motion is needed for a law with pose="true" only.
     model : the controller's own manipulator.  dt : sampling time in s.

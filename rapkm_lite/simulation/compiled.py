@@ -19,7 +19,8 @@ from .setup import Outcome, Setup
 LAW_FAILED = -2
 """Status beside those of the engine: the law raised, or the user pressed Ctrl-C."""
 LANES = 32
-"""Runs side by side: few enough for a core's L1 cache, and enough that no register waits for another."""
+"""Runs side by side: few enough that a core keeps the rows of a law at hand, and enough that no register waits for
+another."""
 
 __all__ = [
     "COMPILED", "DONE", "LAW_FAILED", "LEFT_WORKSPACE", "NO_POSE", "SINGULAR", "TOO_STIFF", "Plant", "compiled",
