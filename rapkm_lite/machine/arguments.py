@@ -203,10 +203,8 @@ def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: 
     numbers = listed(value)
     several = isinstance(numbers, Sequence) and not isinstance(numbers, bytes | bytearray)
     numbers = list(map(listed, itertools.islice(numbers, 1001))) if several else ()  # a range may be endless
-    most = math.inf if n is None else n
-    exact = all(isinstance(i, int) and not isinstance(i, bool) and 0 <= i < most for i in numbers)
-    fits = exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)
-    if not fits:
+    exact = all(isinstance(i, int) and not isinstance(i, bool) and 0 <= i < (n or math.inf) for i in numbers)
+    if not (exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)):
         some = f"a list of one {what} index" if count == 1 else f"{count or 'two or more'} different {what} indices"
         raise ValueError(f"{name} = {short(value)}; allowed: {some} from 0 {'on' if n is None else f'to {n - 1}'}")
     return tuple(map(int, numbers))
@@ -240,7 +238,6 @@ def callable_with(name: str, value: Any, *given: str) -> Any:
     """Return `value` when it can be called with the arguments `given`, by position, and has none of them elsewhere."""
     allowed = f"({', '.join(given)})"
     if inspect.iscoroutinefunction(value) or inspect.iscoroutinefunction(type(value).__call__):
-        # What it answers would wait to be awaited; and Numba compiles it as if it did not.
         raise ValueError(f"{name} = {short(value)} is a coroutine; allowed: def, not async def")
     try:
         inspect.signature(value).bind(*given)
