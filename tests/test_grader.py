@@ -657,6 +657,18 @@ def test_folders_without_submissions_are_refused(tmp_path, capsys):
     assert "allowed: a folder with notebooks" in capsys.readouterr().err
 
 
+def test_a_package_that_is_missing_where_one_grades_is_named(tmp_path, monkeypatch):
+    # The answers are right: only what the cases are made with is not there.
+    (tmp_path / "without").mkdir()
+    (tmp_path / "without" / "sympy.py").write_text("raise ImportError('no SymPy here')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "without"))
+    solution = LESSONS[0].parent / "solutions" / "12_your_machine.ipynb"
+    grades = {one.exercise: one for one in grade_one(Submission("ada", solution, "12"), 30.0)}
+    for name in ("12.fight", "12.other_units"):
+        assert "cannot be judged here" in grades[name].sentence and "pip install sympy" in grades[name].sentence
+    assert grades["12.own_machine"].verdict == "ok"
+
+
 # What the worker does with one notebook.
 def right(A, c):
     return A @ np.linalg.solve(A.T @ A, A.T @ c)
