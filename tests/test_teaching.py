@@ -361,6 +361,15 @@ def test_the_title_of_a_folded_answer_does_not_tell_it():
     assert told == []
 
 
+def test_both_primes_of_a_formula_stand_over_its_index():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    formula = deck.mathml(r"\eta^T q_a''", block=False)
+    # One base with one subscript and one superscript: MathML Core, 3.4.1.
+    assert formula.count("<msubsup>") == 1 and "<msup><msubsup>" not in formula
+
+
 def test_what_a_question_is_about_is_said_with_it():
     pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
     from workshop import deck

@@ -31,6 +31,7 @@ def mathml(formula: str, block: bool) -> str:
     """A LaTeX formula as MathML."""
     plain = re.sub(r"\\tag\{(.*?)\}", r"\\qquad\\text{(\1)}", formula.strip())
     plain = plain.replace("{gather}", "{matrix}")  # latex2mathml knows no lines of formulas
+    plain = plain.replace("''", r"^{\prime\prime}")  # else the second prime stands beyond the index, raised once more
     return convert(plain, display="block" if block else "inline")
 
 
