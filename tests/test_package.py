@@ -50,9 +50,10 @@ def test_summary_for_people_names_the_machine_and_both_tables():
     assert done.returncode == 0, done.stderr
     for word in ("testbed", "default experiment, without filter", "Table 1, measured, with filter", "4.56", "2.24"):
         assert word in done.stdout
-    version, machine, drives = done.stdout.splitlines()[:3]
+    version, machine, drives, filtered = done.stdout.splitlines()[:4]
     setting = rk.experiment("testbed")
     assert rk.__version__ in version and repr(setting.robot) in machine and f" {setting.law!r}," in drives
+    assert filtered.split(maxsplit=1) == ["filter", repr(rk.AntagonismFilter(setting.law, pose="true"))]
 
 
 def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
@@ -61,7 +62,8 @@ def test_summary_for_people_says_what_the_filter_saves_and_at_which_offsets():
         "by hand": dict(zip(ROWS, [[4.0, 2.0, 2.0], [1.0, 0.5, 0.5]], strict=True)),
         "Table 1, measured": dict(zip(ROWS, rk.measured_energies(), strict=True)),
     }
-    text = as_text({"version": "0", "machine": "", "law": "", "offset_rad": list(OFFSET), "energy_J": tables})
+    words = dict.fromkeys(("version", "machine", "law", "filter"), "")
+    text = as_text({**words, "offset_rad": list(OFFSET), "energy_J": tables})
     assert re.findall(r"the filter saves (.*) %", text) == ["75", "51"]
     assert "encoder offsets (4, -2, 5) mrad" in text
 

@@ -361,6 +361,17 @@ def test_the_title_of_a_folded_answer_does_not_tell_it():
     assert told == []
 
 
+def test_no_line_of_a_slide_begins_with_the_comma_after_a_formula():
+    pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
+    from workshop import deck
+
+    page = deck.rendered("A step $2f_c$, then $x$ (as $y$).")
+    wholes = re.findall(r'<span class="whole"><math.*?</math>(.*?)</span>', page)
+    assert wholes == [",", ")."]
+    style = (ROOT / "notebooks/workshop/deck.html").read_text(encoding="utf-8")
+    assert page.count("<math") == 3 and re.search(r"\.whole {[^}]*nowrap", style)
+
+
 def test_both_primes_of_a_formula_stand_over_its_index():
     pytest.importorskip("latex2mathml", reason="formulas of slides need latex2mathml, see notebooks/README.md")
     from workshop import deck
@@ -462,7 +473,8 @@ def test_every_question_of_a_lesson_keeps_its_answer_on_the_slides(number):
     for place, text in zip(places, asked, strict=True):
         behind = itertools.takewhile(lambda slide: slide.kind in ("picture", "answer"), made[place + 1 :])
         page = "".join(slide.page() for slide in [made[place], *behind])
-        folded = " ".join("".join(re.findall(r"<details>.*?</details>", page, re.S)).split())
+        folded = "".join(re.findall(r"<details>.*?</details>", page, re.S))
+        folded = " ".join(re.sub(r"</?span[^>]*>", "", folded).split())
         assert folded, text.splitlines()[0]
         # Up to the next heading or exercise each folded remark answers this question.
         here = re.split(r"^##|^\*\*Exercise", text, flags=re.M)[0]

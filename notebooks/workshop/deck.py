@@ -44,6 +44,8 @@ def rendered(source: str) -> str:
         return f"\x02{len(formulas) - 1}\x03"
 
     page = str(_markdown(_MATH.sub(hold, source)))
+    # No line begins with the comma after a formula.
+    page = re.sub("(\x02\\d+\x03[.,;:!?)]+)", r'<span class="whole">\1</span>', page)
     page = re.sub("\x02(\\d+)\x03", lambda match: formulas[int(match[1])], page)
     return re.sub(r"</?a\b[^>]*>", "", page)
 

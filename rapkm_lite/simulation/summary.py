@@ -12,7 +12,7 @@ ROWS = "without filter", "with filter"
 
 
 def summary() -> dict:
-    """Machine, law and energies per drive in J, as plain values; rows without / with filter (16) at the true pose.
+    """Machine, law, filter (16) at the true pose, and energies per drive in J without / with it, as plain values.
 
     The default experiment is ``data/testbed.toml`` with the lessons' offsets of (4, -2, 5) mrad.
 
@@ -25,6 +25,7 @@ def summary() -> dict:
     return {
         "machine": repr(setting.robot),
         "law": repr(setting.law),
+        "filter": repr(laws[1]),
         "offset_rad": list(OFFSET),
         "energy_J": {
             "default experiment": dict(zip(ROWS, [run.energy.tolist() for run in runs], strict=True)),
@@ -41,6 +42,7 @@ def as_text(values: dict) -> str:
         f"rapkm_lite {values['version']}",
         f"machine   {values['machine']}",
         f"drives    {values['law']}, encoder offsets ({offsets}) mrad",
+        f"filter    {values['filter']}",
         "",
         f"{'electric energy in J':36}{'drive 1':>9}{'drive 2':>9}{'drive 3':>9}{'sum':>9}",
     ]
