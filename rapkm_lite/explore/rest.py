@@ -119,7 +119,7 @@ def three_opinions(robot: Manipulator) -> Explorer:
             picture.text("opinions", *seen[-1], f"{i + 1}", **look)
         if N == 3 and np.abs(cross(normal, np.roll(normal, 1, axis=0))).min() > 1e-9:
             corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j in range(N) for k in range(j)]
-            if max(np.ptp(corners, axis=0)) < 1000 * half:
+            if max(np.ptp(corners, axis=0)) < 1000 * half:  # else two lines are all but parallel
                 picture.polygon("opinions", corners, facecolor="#DCE6F0", zorder=0.5)
         picture.line("opinions", 0, 0, color=NEUTRAL, marker="+", markersize=13, markeredgewidth=2, zorder=5)
         tip = {"marker": "s", "markersize": 8, "markerfacecolor": "white", "markeredgewidth": 1.8}
