@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import re
+import warnings
 from collections import namedtuple
 from collections.abc import Hashable
 from inspect import isfunction
@@ -121,9 +123,12 @@ def _pointer(function, N: int, matrices: bool, memory: int):
             pass
 
     try:
-        made = cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
-        if any("bool" in str(signature.return_type) for signature in law.nopython_signatures):
-            raise errors.TypingError("a truth value is no torque, though C would take it for one")
+        with warnings.catch_warnings():
+            # The keys of a dictionary are no numbers, which is no news of the user's own lines: the sentence is below.
+            warnings.filterwarnings("ignore", category=errors.NumbaWarning, module=".*engine.pointer")
+            made = cfunc(types.void(types.Array(types.float64, 1, "C")), error_model="numpy")(call)
+        if any(re.search("bool|^Dict|bytes", str(found.return_type)) for found in law.nopython_signatures):
+            raise errors.TypingError("truth values, dictionaries and bytes are no torques, though C would take them")
         return made
     except Exception as error:
         found = [signature.return_type for signature in getattr(law, "nopython_signatures", ())]

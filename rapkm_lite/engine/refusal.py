@@ -33,6 +33,9 @@ _TYPES = (
     (r"\b(?:float|int|uint)\d+\b", "a number"),
     (r"\bcomplex\d+\b", "a complex number"),
     (r"\b(?:reflected )?list\(.*\)", "a list"),
+    (r"\bset\(.*\)", "a set"),
+    (r"DictType\[.*", "a dictionary"),
+    (r"(?:readonly )?bytes\(.*\)", "bytes"),
     (r"\bnone\b", "nothing"),
 )
 
