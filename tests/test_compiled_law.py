@@ -377,6 +377,22 @@ def imports(t, q_a, qd_a, d):
     return -7.0 * math.cos(t) * q_a
 
 
+def keyed(t, q_a, qd_a, d):
+    return {"drive 1": q_a[0]}
+
+
+def counted(t, q_a, qd_a, d):
+    return {0: q_a[0], 1: q_a[1], 2: q_a[2]}
+
+
+def collected(t, q_a, qd_a, d):
+    return {q_a[0], q_a[1], q_a[2]}
+
+
+def as_bytes(t, q_a, qd_a, d):
+    return b"abc"
+
+
 REFUSED = {
     summed: 'numpy.einsum is not known here, line # of test_compiled_law.py: return -7.0 * np.einsum("i->i", e)',
     labelled: 'add(a string, an array) is not known here, line # of test_compiled_law.py: c = "7" + q_a',
@@ -392,6 +408,10 @@ REFUSED = {
     by_name: "arguments after * are not known here",
     square: "it returns an array with 2 dimensions",
     compared: "it returns truth values",
+    keyed: "it returns a dictionary)",
+    counted: "it returns a dictionary)",
+    collected: "it returns a set)",
+    as_bytes: "it returns bytes)",
 }
 
 
@@ -446,6 +466,34 @@ def test_what_runs_only_compiled_is_lost_like_any_other_law():
         assert len(lost.value.partial) == 21
 
 
+@pytest.mark.skipif(not COMPILED, reason="without Numba the function and what it calls run in Python")
+@pytest.mark.parametrize("first", [0.0, 0.0205])
+@pytest.mark.parametrize("ends", ["raises", "answers nothing finite"])
+def test_a_law_that_cannot_run_in_python_is_told_by_what_it_did_compiled(first, ends):
+    """Numba takes `d` from compiled code and not from Python: that it does not is not why the run was lost."""
+    kind = ends == "raises"
+    pull = pytest.importorskip("numba").njit(lambda q_a, d: -7.0 * (q_a - d.q_a))
+
+    @rk.compiled
+    def law(t, q_a, qd_a, d):
+        c = -7.0 * (q_a - d.q_a)
+        if t >= first:
+            c = pull(q_a, d) * np.nan
+            if kind:
+                raise ValueError("mine")
+        return c
+
+    path = rk.hold(ROBOT, [0.0, 0.0])
+    samples = int(np.count_nonzero(path.t < first))
+    reason = "the law law returned torques that are not 3 finite numbers, or raised an exception there"
+    with pytest.raises(rk.SimulationError) as lost:
+        rk.simulate(ROBOT, law, path, OFFSET)
+    assert (lost.value.time, lost.value.reason, lost.value.__cause__) == (path.t[samples], reason, None)
+    assert len(lost.value.partial) == samples
+    study = rk.sweep(ROBOT, law, path, [OFFSET, OFFSET], failed="mask")
+    assert study.reasons == (reason,) * 2
+
+
 def test_a_compiled_law_that_was_copied_remembers_as_much():
     law = rk.compiled(lambda t, q_a, qd_a, d, memory: -7.0 * (q_a - d.q_a), memory=3)
     make, arguments = law.__reduce__()
@@ -485,6 +533,7 @@ def test_an_input_singularity_is_refused_as_in_python(inverse):
 
 
 @pytest.mark.skipif(not COMPILED, reason="without Numba nothing is compiled")
+@pytest.mark.filterwarnings("error")  # the sentence comes alone
 @pytest.mark.parametrize("function", REFUSED, ids=lambda function: function.__name__)
 def test_what_does_not_compile_is_one_sentence_with_its_line(function):
     words = re.escape(REFUSED[function]).replace(r"\#", r"(\d+)")

@@ -161,7 +161,8 @@ def compiled(function=None, *, at: str | None = None, memory: int = 0):
     read only: Python refuses writes into them, compiled code lets them through, for that sample.
     What Numba can compile is allowed: numbers, NumPy arrays, loops; nothing else from outside but functions under
     ``@numba.njit`` and constants, such as the sampling time of the path, which the function is not told, and which stay
-    what they were at the first run.
+    what they were at the first run.  Hand such functions arrays, such as d.q_a: d and at as a whole they take in the
+    compiled loop only.
     Where Python raises for plain numbers, as at 1.0 / 0.0 or math.sqrt(-1.0), compiled code goes on with infinity, NaN
     or, for whole numbers, which have 64 bits there, with 0.
     Random numbers of `numpy.random` would differ from run to run: noise belongs in an array, an entry per sample.

@@ -75,19 +75,24 @@ def again_in_python(setup: Setup, law, outcome: Outcome) -> tuple[Outcome, BaseE
     """How a run ended in which a compiled law gave no finite torques, and what the law raised in Python there.
 
     The compiled law cannot say it, so the same run is repeated up to there; what it raises at the first sample goes to
-    the caller, as in `closed_loop`, unless it passed that one when it was compiled.
+    the caller, as in `closed_loop`, unless it passed that one when it was compiled.  What Numba raises is no answer: it
+    compiled `d` and `at` in the law, but takes them from Python for no function under ``@numba.njit``.
     """
     with np.errstate(all="ignore"):
         try:
             again, cause = closed_loop(setup.begin(outcome.sample + 1), law)
         except KeyboardInterrupt as stop:  # before the repetition has begun
             return outcome, stop
-        except Exception:  # at the first sample, where 1.0 / 0.0 raises in Python alone
-            if outcome.sample == 0:
+        except Exception as error:  # at the first sample, where 1.0 / 0.0 raises in Python alone
+            if outcome.sample == 0 and not _of_numba(error):
                 raise
             return outcome, None
-    if again.status == LAW_FAILED and again.sample == outcome.sample:
+    if again.status == LAW_FAILED and again.sample == outcome.sample and not _of_numba(cause):
         return outcome._replace(status=LAW_FAILED), cause
     if again.status == LEFT_WORKSPACE and cause is not None:
         return again, cause
     return outcome, None if isinstance(cause, Exception) else cause
+
+
+def _of_numba(error: BaseException | None) -> bool:
+    return type(error).__module__.startswith("numba.")
