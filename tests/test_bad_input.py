@@ -149,7 +149,23 @@ def test_leading_axes_of_matrices():
 
 @pytest.mark.parametrize(
     "independent",
-    [(0, 0), (0,), (0, 1, 2), (0, 6), (-1, 2), (0.5, 1), "01", 3, (True, False), [], (None, 1), ((0, 1), (1, 2))],
+    [
+        (0, 0),
+        (0,),
+        (0, 1, 2),
+        (0, 6),
+        (-1, 2),
+        (0.5, 1),
+        (0.0, 0),
+        (np.nan, 1.0),
+        (0.0, np.inf),
+        "01",
+        3,
+        (True, False),
+        [],
+        (None, 1),
+        ((0, 1), (1, 2)),
+    ],
     ids=str,
 )
 def test_choice_of_coordinates(independent):
@@ -166,7 +182,9 @@ ROWS = [
     np.full((5, 2), 3),
     np.array([[0, 1]] * 4),
     np.zeros((5, 3), int),
-    np.array([[0.0, 1.0]] * 5),
+    np.array([[0.5, 1.0]] * 5),
+    np.array([[0.0, np.nan]] * 5),
+    np.array([[0.0, 0.0]] * 5),
     np.array([[-1, 1]] * 5),
     np.zeros((5, 0), int),
 ]

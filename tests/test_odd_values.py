@@ -66,7 +66,10 @@ class Column:
         return len(self.values)
 
 
-@pytest.mark.parametrize("pair", [Column(0, 2), [np.array(0), np.array(2)], (np.int8(0), np.uint64(2))])
+@pytest.mark.parametrize(
+    "pair",
+    [Column(0, 2), [np.array(0), np.array(2)], (np.int8(0), np.uint64(2)), (0.0, 2.0), np.array([-0.0, 2]), [0, 2.0]],
+)
 def test_indices_from_any_kind_of_array_count_as_what_they_are(pair):
     assert_array_equal(rk.control_matrix(TESTBED, Q, pair), rk.control_matrix(TESTBED, Q, (0, 2)))
     assert rk.feedback_norm(TESTBED, Q, pair) == rk.feedback_norm(TESTBED, Q, (0, 2))
@@ -74,6 +77,12 @@ def test_indices_from_any_kind_of_array_count_as_what_they_are(pair):
     assert TESTBED.with_arms(pair) == TESTBED.with_arms((0, 2))
     A_tilde = rk.redundant_control_matrix(TESTBED, Q)
     assert_array_equal(rk.explicit_pseudoinverse(A_tilde, pair), rk.explicit_pseudoinverse(A_tilde, (0, 2)))
+    both, rows = np.stack([A_tilde, A_tilde]), np.stack([np.asarray(pair), [0, 1]])
+    assert_array_equal(
+        rk.explicit_pseudoinverse(both, rows), rk.explicit_pseudoinverse(both, np.array([(0, 2), (0, 1)]))
+    )
+    drives = tuple(rk.DeadDrive(drive, 0.5) for drive in pair)
+    assert drives == (rk.DeadDrive(0, 0.5), rk.DeadDrive(2, 0.5))
 
 
 @pytest.mark.parametrize("pair", [Column(0, 0), Column(0, 1.5), Column(False, True), Column(0, -1), Column("0", "2")])

@@ -101,7 +101,7 @@ def _check(parameter: inspect.Parameter, known: Known, strict: bool = False) -> 
         check(name, value)
     elif kind.startswith("int"):
         run = known.get("run") if name == "k" else None
-        whole_number(name, value, -1 if default == -1 else 0, _MOST if run is None else len(run.c) - 1)
+        known[name] = whole_number(name, value, -1 if default == -1 else 0, _MOST if run is None else len(run.c) - 1)
     elif kind.startswith("Callable"):
         function(name, value)
     elif name in _RULES:
@@ -175,9 +175,9 @@ def _arms(name: str, value, known: Known) -> None:
     listed = value.ndim == 1 if isinstance(value, np.ndarray) else isinstance(value, list | tuple | range)
     N = _drives(known)
     if listed and len(value) == 1:
-        whole_number(name, value[0], 0, math.inf if N is None else N - 1)
+        known[name] = [whole_number(name, value[0], 0, math.inf if N is None else N - 1)]
     else:
-        joint_indices(name, list(value) if isinstance(value, range) else value, N, None, "arm")
+        known[name] = joint_indices(name, list(value) if isinstance(value, range) else value, N, None, "arm")
 
 
 def _signs(name: str, value, known: Known) -> None:

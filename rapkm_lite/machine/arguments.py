@@ -200,10 +200,10 @@ def listed(value):
 
 def joint_indices(name: str, value, n: int | None, count: int | None = 2, what: str = "joint") -> tuple[int, ...]:
     """Return `value` as `count` different 0-based indices of joints (drives, arms: `what`), below `n` if known."""
-    numbers = listed(value)
-    several = isinstance(numbers, Sequence) and not isinstance(numbers, bytes | bytearray)
+    several = isinstance(numbers := listed(value), Sequence) and not isinstance(numbers, bytes | bytearray)
     numbers = list(map(listed, itertools.islice(numbers, 1001))) if several else ()  # a range may be endless
-    exact = all(isinstance(i, int) and not isinstance(i, bool) and 0 <= i < (n or math.inf) for i in numbers)
+    plain = all(isinstance(i, int | float) and not isinstance(i, bool) for i in numbers)
+    exact = plain and all(0 <= i // 1 == i < (n or math.inf) for i in numbers)  # 2.0 is 2, as in `whole_number`
     if not (exact and len(set(numbers)) == len(numbers) and (len(numbers) == count if count else len(numbers) >= 2)):
         some = f"a list of one {what} index" if count == 1 else f"{count or 'two or more'} different {what} indices"
         raise ValueError(f"{name} = {short(value)}; allowed: {some} from 0 {'on' if n is None else f'to {n - 1}'}")

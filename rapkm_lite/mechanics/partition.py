@@ -57,13 +57,14 @@ def _partition(rows, A_tilde: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
         rows = listed(rows)
         count = len(rows) if isinstance(rows, list | tuple) and 1 <= len(rows) <= m else 2
         return _fixed_partition(joint_indices("rows", rows, m, count, "row"), m)
-    rows = real_array("rows", rows).astype(rows.dtype)
+    numbers = real_array("rows", rows)
     batch = f" or ({', '.join(map(str, lead))}, delta)" if lead else ""
-    if rows.dtype.kind not in "iu" or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
+    if np.any(numbers % 1.0) or rows.shape[:-1] != lead or not 1 <= rows.shape[-1] <= m:
         raise ValueError(f"rows is an array {rows.shape} of {rows.dtype}; allowed: indices (delta,){batch}")
-    bad = np.any((rows < 0) | (rows >= m) | (np.diff(np.sort(rows, axis=-1), prepend=-1) == 0), axis=-1)
+    bad = np.any((numbers < 0) | (numbers >= m) | (np.diff(np.sort(numbers), prepend=-1) == 0), axis=-1)
     if np.any(bad):
         raise ValueError(f"rows holds {rows[bad][0].tolist()}; allowed: different indices from 0 to {m - 1}")
+    rows = numbers.astype(int)
     taken = (np.arange(m) == rows[..., None]).any(axis=-2)
     others = np.argsort(taken, axis=-1, kind="stable")[..., : m - rows.shape[-1]]
     return rows, others, np.argsort(np.concatenate([rows, others], axis=-1), axis=-1)
