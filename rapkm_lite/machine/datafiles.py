@@ -101,9 +101,9 @@ def _table(name: str, values):
 def _entries(name: str, values) -> dict:
     of_kind(name, values, dict, f"a table [{name}]")
     for key, value in values.items():
-        if name == "fault" and key not in UNITS_OF[name] and isinstance(value, dict) and "unit" in value:
-            hint = _nearest(key, UNITS_OF[name])
-            words = f"which is not known here{hint}; allowed: a number in the unit of its class"
+        if name == "fault" and UNITS_OF[name].get(key) is None and isinstance(value, dict) and "unit" in value:
+            words = f"not known here{_nearest(key, UNITS_OF[name])}; allowed: a number in the unit of its class"
+            words = "but is a word; allowed: a word alone" if key == "kind" else f"which is {words}"
             raise ValueError(f"{key} in [[fault]] has the unit {short(value['unit'])}, {words}")
     return {key: _plain(f"{key} in [{name}]", value, UNITS_OF[name].get(key)) for key, value in values.items()}
 
