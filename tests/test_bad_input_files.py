@@ -5,6 +5,7 @@ import errno
 import os
 import re
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -218,6 +219,8 @@ def test_a_unit_of_a_fault_is_checked_and_named(said, kind):
         entries = FAULTS[kind] | {key: f"{{value = {FAULTS[kind][key]}, unit = 'furlong'}}"}
         more = f"[[fault]]\nkind = '{kind}'\n" + "".join(f"{k} = {v}\n" for k, v in entries.items())
         assert f"{key} in [fault] has the unit 'furlong'" in said(text(more=more))
+    more = f"[[fault]]\nkind = {{value = '{kind}', unit = 's'}}\n"
+    assert "kind in [[fault]] has the unit 's', but is a word; allowed: " in said(text(more=more))
 
 
 @pytest.mark.parametrize(
@@ -343,6 +346,18 @@ def test_no_two_records_of_a_log_have_one_time(t):
 def test_columns_of_a_log_fit_together(t, q_a, others, words):
     with pytest.raises(ValueError, match=words):
         rk.Log("odd", np.arange(np.prod(t)).reshape(t), np.zeros(q_a), np.zeros(others), np.zeros(others))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name and devices are files of Unix")
+def test_a_log_may_come_through_a_pipe_and_a_device_without_end_is_none(tmp_path):
+    pipe = tmp_path / "gain.csv"
+    os.mkfifo(pipe)
+    writer = Thread(target=rk.write_log, args=(rk.mystery_run("gain"), pipe), daemon=True)
+    writer.start()
+    assert rk.read_log(pipe) == rk.mystery_run("gain")
+    writer.join()
+    with pytest.raises(ValueError, match=r"the log '/dev/zero' cannot be read \(.*\); allowed: a CSV file"):
+        rk.read_log("/dev/zero")
 
 
 def test_lists_of_a_log_are_kept_as_arrays_that_nobody_writes_into():

@@ -78,7 +78,8 @@ def read_log(source: str | Path) -> Log:
     try:
         # Spreadsheets write a byte order mark before the header, editors an empty line at the end.
         with path.open(newline="", encoding="utf-8-sig") as file:
-            header, *lines = list(csv.reader(file)) or [[]]
+            # A pipe may bring it; of a device that never ends a line not more than a line's worth is read.
+            header, *lines = list(csv.reader(iter(lambda: file.readline(10**6), ""))) or [[]]
     except (OSError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or ("not UTF-8 text" if isinstance(error, UnicodeError) else error)
         raise ValueError(f"the log {short(str(source))} cannot be read ({reason}); allowed: a CSV file") from None
