@@ -529,8 +529,27 @@ def test_a_sample_of_a_run_lies_within_the_run():
     run = rk.simulate(path.robot, rk.PD(7.05, 0.225), path)
     ax = plotting.plot_mirror(run, 6000, (0, 1))[0]
     assert ax.get_title() == "6.00 s"
+    assert plotting.plot_mirror(run, 6000.0, (0.0, 1.0))[0].get_title() == "6.00 s"  # a whole number
     refused_with("k = 6001; allowed: .*to 6000", plotting.plot_mirror, run, 6001, (0, 1))
     refused_with(r"pair = \(0, 1\): the path crosses its curve 0 times", plotting.film_mirror, run, (0, 1))
+
+
+@pytest.mark.parametrize("arms", [(2.0,), [0.0, 2.0], np.array([0.0, 1.0])])
+def test_arms_in_a_picture_may_be_whole_numbers_of_any_kind(world, arms):
+    drawn = [plotting.plot_machine(world["robot"], world["q"], arms=some) for some in (arms, list(map(int, arms)))]
+    one, other = ([line.get_xydata().tolist() for line in ax.lines] for ax in drawn)
+    assert one == other
+    plt.close("all")
+
+
+@pytest.mark.parametrize("text", ["a", "a" * 10**6], ids=["short", "long"])
+def test_a_dict_is_asked_for_before_anything_is_drawn(world, text):
+    """A figure with an axes for each of a million letters would take minutes."""
+    refused_with("models = 'a.*; allowed: a dict", plotting.plot_geometry_maps, world["robot"], text, 7.05)
+    refused_with("columns = 'a.*; allowed: a dict", plotting.plot_law_bands, ["PD"], text)
+    given = [0.1, 0.0, 0.0], [0.5, 0.5, 0.5], 0.2, (-0.1, 0.1)
+    refused_with("marks = 'a.*; allowed: a dict", plotting.plot_room, *given, text)
+    assert not plt.get_fignums()
 
 
 def test_what_stands_side_by_side_has_as_many_parts_as_the_picture(world):

@@ -47,7 +47,7 @@ def plot_clipping(free, clipped, limit, axes=None):
     return axes
 
 
-def plot_room(c, n, limit, room, marks, ax=None):
+def plot_room(c, n, limit, room, marks: dict, ax=None):
     """Torques c + mu n (m,) in mN m over the share mu of the null vector n, the limit, and the room between its ends.
 
     c : the torques of least size, N m.  limit : N m.  room : (2,) N m.  marks : dict of label -> mu in N m.

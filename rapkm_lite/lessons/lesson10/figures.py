@@ -15,7 +15,7 @@ from ...mechanics.closure import estimate_pose
 from ...mechanics.kinematics import inverse_kinematics, wrap
 
 
-def plot_geometry_maps(robot, models, K_P, axes=None, n: int = 101):
+def plot_geometry_maps(robot, models: dict, K_P, axes=None, n: int = 101):
     """Norm of the rest torques of PD drives over the workspace, without weight, one map for each wrong model.
 
     models : dict of title -> Manipulator, which demands the angles.  K_P : one gain of all drives in N m/rad.

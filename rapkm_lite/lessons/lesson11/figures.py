@@ -59,7 +59,7 @@ def plot_loop_frequencies(path, springs: dict, nominal, ax=None):
     return ax
 
 
-def plot_law_bands(names, columns, axes=None):
+def plot_law_bands(names, columns: dict, axes=None):
     """Medians and the middle 80 % of many runs, one row for each law.
 
     names : of the laws.  columns : dict of axis label -> list of samples, one array for each law; the axes are
