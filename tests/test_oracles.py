@@ -172,8 +172,9 @@ def test_mjcf_starts_amid_the_base_points_where_it_can():
 def test_mjcf_refuses_what_it_cannot_export():
     with pytest.raises(ValueError, match="robot = 3"):
         rk.to_mjcf(3)
-    with pytest.raises(ValueError, match="timestep"):
-        rk.to_mjcf(MACHINES["testbed"], timestep=0.0)
+    for timestep in (0.0, 1e-13, 0.1000001, 1e10, np.nan):
+        with pytest.raises(ValueError, match=r"timestep = .*; allowed: "):
+            rk.to_mjcf(MACHINES["testbed"], timestep=timestep)
     with pytest.raises(ValueError, match="q has shape"):
         rk.to_mjcf(MACHINES["testbed"], q=[0.0])
     with pytest.raises(ValueError, match=r"q leaves the loops open by .*close_loops"):

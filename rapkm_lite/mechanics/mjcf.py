@@ -22,9 +22,9 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
 
     q : (2N,) rad, where MuJoCo starts, at rest, and the keyframe "start"; default: with the end-effector at the
     mean of the base points, or, where not all arms reach that bent, where the arms bend most evenly.
-    timestep : s; its integrator is RK4.  From 1 ms on the springs that close the loops grow softer with it, and gaps
-    of the tips larger, as with the forces: under PD on the triangle in 5 s some ten nanometres at 1 ms, tenths of a
-    micrometre at 5 ms, and some fifty times that on a circle of 0.1 m in 1 s.
+    timestep : s, up to 0.1; its integrator is RK4.  From 1 ms on the springs that close the loops grow softer with it,
+    and gaps of the tips larger, as with the forces: under PD on the triangle in 5 s some ten nanometres at 1 ms, tenths
+    of a micrometre at 5 ms, and some fifty times that on a circle of 0.1 m in 1 s.
     Raises ValueError for values out of range, point masses, a q with open loops, and where the default finds no place.
 
     >>> import rapkm_lite as rk
@@ -35,6 +35,8 @@ def to_mjcf(robot: Manipulator, q=None, timestep: float = 2.5e-4) -> str:
 
     N = manipulator(robot).n_arms
     timestep = positive_number("timestep", timestep)
+    if not 1e-12 <= timestep <= 0.1:  # no springs that RK4 integrates in longer ones hold the tips together
+        raise ValueError(f"timestep = {timestep:g} s; allowed: 1e-12 to 0.1 s")
     pose = _home(robot) if q is None else exact_array("q", q, robot.n_joints)
     _ = at(robot, pose)._closed
     arms = "".join(_arm(robot, i, pose) for i in range(N))
