@@ -144,6 +144,8 @@ def test_dead_drive():
     wanted[100:, 1] = 0.0  # t[100] = 0.1 s
     assert_allclose(run.c, wanted, rtol=0, atol=1e-14)
     assert np.abs(run.c[99, 1]) > 0.0
+    late, healthy = (observed(faults)[0] for faults in ([rk.DeadDrive(1, PATH.t[-1] + PATH.dt)], []))
+    assert_array_equal(late.c, healthy.c)  # after the end of the path
     assert_array_equal(run.energy, rk.copper_loss(ROBOT, run.c[:-1], PATH.dt) + rk.mechanical_work(run))
 
 

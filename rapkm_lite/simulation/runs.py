@@ -180,14 +180,16 @@ def simulate(
 
     law : a law of `rapkm_lite.control`, a `Law` of your own, or any callable ``(t, q_a, qd_a, desired) -> c`` with c
         (N,) in N m.  An object in Python is copied for the run and the copy is `Run.law`: equal calls, equal numbers.
-        (A function that remembers in variables outside cannot be copied: write an object, or a `Law` with `start`.)
+        (What a function notes in variables outside, or an object in a list of its class, goes on from run to run:
+        note it in the object itself, made in ``__init__``, or in the memory of a `Law` with `start`.)
     offset : calibration offsets (N,) in rad, measured minus true angle.
     encoder : counts per turn (quantization to the nearest count), or None for ideal angles.
     model : the controller's own manipulator, when it differs from the machine; it also sets the desired angles, from
         which set-points of `Trajectory.with_set_points` stay as far as they are from the path's.
     velocity_filter : time constant in s of the rate from backward differences of the measured angles, through a
         first-order low-pass that begins with the true ones (its step: see `Sensors`); None for the true rates.
-    faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.
+    faults : a list of `TorqueLimit`, `DeadDrive`, `EncoderDropout`, `OffsetJump`; drives count from 0.  One that
+        begins after the end of the path changes nothing.
     sensors : offset, encoder and velocity_filter as one value, instead of the three.
     A hold is one Runge-Kutta step of order 4: on a circle of 0.1 m in 1 s under PD it errs by less than 1 nm at
     dt = 2 ms, by less than 0.2 micrometres at 10 ms.  Near an input singularity laws with a model hold torques that
