@@ -65,6 +65,10 @@ class Column:
     def __len__(self):
         return len(self.values)
 
+    def __contains__(self, label):
+        """Not what it holds is asked for, but how its rows are called."""
+        return label in range(7, 7 + len(self))
+
 
 @pytest.mark.parametrize(
     "pair",
@@ -75,6 +79,8 @@ def test_indices_from_any_kind_of_array_count_as_what_they_are(pair):
     assert rk.feedback_norm(TESTBED, Q, pair) == rk.feedback_norm(TESTBED, Q, (0, 2))
     assert rk.CTC(400.0, 40.0, pair) == rk.CTC(400.0, 40.0, (0, 2))
     assert TESTBED.with_arms(pair) == TESTBED.with_arms((0, 2))
+    at = rk.at(TESTBED, Q, rk.at(TESTBED, Q).F @ [0.3, -0.2])
+    assert_array_equal(rk.complement_dot(at.J, at.J_dot, pair), rk.complement_dot(at.J, at.J_dot, (0, 2)))
     A_tilde = rk.redundant_control_matrix(TESTBED, Q)
     assert_array_equal(rk.explicit_pseudoinverse(A_tilde, pair), rk.explicit_pseudoinverse(A_tilde, (0, 2)))
     both, rows = np.stack([A_tilde, A_tilde]), np.stack([np.asarray(pair), [0, 1]])

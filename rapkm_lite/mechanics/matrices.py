@@ -44,6 +44,7 @@ def complement_dot(J, J_dot, independent) -> np.ndarray:
            [ 0.,  0.]])
     """
     J, J_dot = _jacobians(J, J_dot)
+    independent = joint_indices("independent", independent, J.shape[-1], J.shape[-1] - J.shape[-2])
     return cores.joint_complement_dot(J, J_dot, complement(J, independent), independent)
 
 
