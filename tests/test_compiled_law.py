@@ -393,6 +393,31 @@ def as_bytes(t, q_a, qd_a, d):
     return b"abc"
 
 
+gains = [7.0, 7.0, 7.0]
+
+
+def listed(t, q_a, qd_a, d):
+    e = q_a - d.q_a
+    return -gains[0] * e
+
+
+def _enclosing():
+    own = [7.0, 7.0, 7.0]
+
+    def enclosed(t, q_a, qd_a, d):
+        e = q_a - d.q_a
+        return -own[0] * e
+
+    return enclosed
+
+
+enclosed = _enclosing()
+
+
+def nested(t, q_a, qd_a, d):
+    return [q_a, q_a, q_a]
+
+
 REFUSED = {
     summed: 'numpy.einsum is not known here, line # of test_compiled_law.py: return -7.0 * np.einsum("i->i", e)',
     labelled: 'add(a string, an array) is not known here, line # of test_compiled_law.py: c = "7" + q_a',
@@ -412,6 +437,9 @@ REFUSED = {
     counted: "it returns a dictionary)",
     collected: "it returns a set)",
     as_bytes: "it returns bytes)",
+    nested: "it returns a list)",
+    listed: "gains is a list; an array would be known, line # of test_compiled_law.py: return -gains[0] * e",
+    enclosed: "own is a list; an array would be known, line # of test_compiled_law.py: return -own[0] * e",
 }
 
 
