@@ -288,8 +288,9 @@ def test_curves_carry_the_numbers_of_the_run_in_the_unit_of_the_axis(runs):
 def test_new_axes_where_none_are_given():
     path = rk.circle(rk.load(), 0.05, 0.2)
     run = rk.simulate(path.robot, rk.PD(7.05, 0.225), path)
-    lines = plotting.lines_per_drive(run, run.c, None, "torque in N m", "PD").get_lines()
-    assert [np.array_equal(line.get_ydata(), c) for line, c in zip(lines, run.c.T, strict=True)] == [True] * 3
+    for values in (run.c, run.c.tolist()):
+        lines = plotting.lines_per_drive(run, values, None, "torque in N m", "PD").get_lines()
+        assert [np.array_equal(line.get_ydata(), c) for line, c in zip(lines, run.c.T, strict=True)] == [True] * 3
     assert plotting.plane_axes(path.robot, None).get_xlim() == plotting.plane_limits(path.robot)["xlim"]
 
 

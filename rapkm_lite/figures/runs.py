@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from ._shared import LEAST, least_torque, no_finer
@@ -42,7 +43,7 @@ def lines_per_drive(run, values, ax: Axes | None, ylabel: str, title: str, least
     'torque in N m'
     """
     ax = axes_or_new(ax)
-    for i, line in enumerate(values.T):
+    for i, line in enumerate(np.transpose(values)):
         ax.plot(run.t, line, label=f"drive {i + 1}", marker="o" if len(run) == 1 else None, **arm_line(i))
     N = run.robot.n_arms
     rows = math.ceil(N / max(1, int(ax.get_window_extent().width / ax.figure.dpi / 1.04)))  # inches for one entry
