@@ -55,6 +55,18 @@ def searched_map(robot, q, pair):
     return np.stack([shortest(column) for column in Gbar.T], axis=1)
 
 
+def by_rows(chosen):
+    """From A and Gbar of the end-effector, by way of the rows of A that belong to the pair."""
+
+    def answer(robot, q, pair):
+        A_x, G_x = parts(robot, q, None)
+        back = np.linalg.inv(A_x[chosen(pair)])
+        A = A_x @ back
+        return tuple(map(tuple, np.einsum("ij,jk,kl,lm,mn->in", A, np.linalg.inv(A.T @ A), back.T, G_x, back)))
+
+    return answer
+
+
 def two_drives(robot, q, pair):
     A, Gbar = parts(robot, q, pair)
     Phi = np.zeros((robot.n_arms, 2))
@@ -71,6 +83,9 @@ MAPS = [
     ("right", "inverse", phi_of(lambda A, G: A @ np.linalg.inv(A.T @ A) @ G)),
     ("right", "transposed pseudoinverse", phi_of(lambda A, G: np.linalg.pinv(A).T @ G)),
     ("right", "weights of one", phi_of(lambda A, G: rk.weighted_pseudoinverse(A, np.eye(len(A))) @ G)),
+    ("right", "rows of the pair", by_rows(list)),
+    ("close", "rows of the pair by a mask", by_rows(sorted)),
+    ("close", "pair sorted", lambda r, q, p: phi(r, q, sorted(p))),
     ("close", "slightly damped", phi_of(lambda A, G: A @ np.linalg.solve(A.T @ A + 1e-6 * np.eye(2), G))),
     ("wrong", "inverse forgotten", phi_of(lambda A, G: A @ G), "inverse"),
     ("wrong", "Gbar forgotten", phi_of(lambda A, G: np.linalg.pinv(A.T)), "Gbar is missing"),

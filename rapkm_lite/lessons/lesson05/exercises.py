@@ -30,7 +30,7 @@ def _minimal(robot, q, pair) -> tuple[np.ndarray, np.ndarray]:
 
 
 def feedback_map(robot, q, pair) -> np.ndarray:
-    """A (A^T A)^-1 Gbar (m, 2): torques per feedback acceleration of the angles of `pair`, in N m per rad/s^2."""
+    """A (A^T A)^-1 Gbar (m, 2): torques per acceleration of the angles of `pair`, as ordered, N m per rad/s^2."""
     A, Gbar = _minimal(robot, q, pair)
     return weighted_pseudoinverse(A) @ Gbar
 
@@ -43,7 +43,8 @@ def _pairs_at_poses(rng) -> list[tuple]:
         cases += [Case(words, robot, q, pair) for q, pair in zip(poses(robot, rng, 3), some, strict=True)]
     robot = load().replace(friction=0.0)
     near = inverse_kinematics(robot, [0.1, -0.069])  # the links of drives 1 and 2 are parallel at x = 0.1013 m
-    return [*cases, Case("a pose near the curve of the pair", robot, near, (0, 1))]
+    turned = Case("a pair in the other order", robot, poses(robot, rng, 1)[0], (2, 0), beyond=True)
+    return [*cases, turned, Case("a pose near the curve of the pair", robot, near, (0, 1))]
 
 
 def _acceleration(Phi, robot, q, pair) -> tuple[float, str]:
