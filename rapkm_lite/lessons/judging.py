@@ -13,7 +13,7 @@ import numpy as np
 from .answers import NOTHING, REFERENCE, Answer, Ended, NotYet, Result, copied, fitting, given, guarded, numbers
 from .detectors import coarse, named, where
 from .exercise import Case, Exercise, Measured, arms
-from .seen import Seen, largest, ratio_of
+from .seen import Seen, largest, ratio_of, rounding
 
 _OWN = " (is it the robot of the arguments, and does robot.n_arms or robot.n_joints stand where it counts?)"
 
@@ -207,7 +207,8 @@ def _sign(mistake: Callable, seen: Seen) -> int:
     except Exception:
         return 0
     signs = () if seen.agree(made, seen.want) else (1, -1)
-    return next((sign for sign in signs if seen.same([sign * m for m in made])), 0)
+    least = rounding(seen.want)  # where a mistake leaves nothing else, no two ways to make it agree in a digit
+    return next((sign for sign in signs if seen.agree([sign * m for m in made], seen.got, least=least)), 0)
 
 
 def _known_mistake(exercise: Exercise, seen: Seen) -> None:

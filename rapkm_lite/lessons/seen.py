@@ -26,9 +26,9 @@ class Seen:
         """True when the model gives the same as the answer in every case."""
         return self.agree(model, self.got)
 
-    def agree(self, model: list[np.ndarray], got: list[np.ndarray]) -> bool:
-        """True when two lists of arrays, one for each case, hold the same."""
-        least = rounding(map(np.asarray, model))
+    def agree(self, model: list[np.ndarray], got: list[np.ndarray], *, least: float = 0.0) -> bool:
+        """True when two lists of arrays, one for each case, hold the same, or but for `least`."""
+        least = max(least, rounding(map(np.asarray, model)))
         return all(alike(m, g, self.slack, least) for m, g in zip(model, got, strict=True))
 
     def argument(self, k: int) -> list[np.ndarray]:

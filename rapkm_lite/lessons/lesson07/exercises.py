@@ -86,11 +86,9 @@ EXERCISES = {
             "the rates A xd are missing: a delay in s is no angle": (
                 lambda A, xd, delay, K_P: -K_P * prestress_projector(A) @ delay
             ),
-            "the delays are averaged: equal delays contradict nothing": (
+            "this is zero but for rounding: rates contradict nothing, alone or with equal (averaged) delays; project "
+            "the products of each rate with its own delay": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, np.full(len(A), delay.mean()), K_P)
-            ),
-            "the projection comes before the delays: the rates contradict nothing, their products with delays do": (
-                lambda A, xd, delay, K_P: -K_P * delay * (prestress_projector(A) @ (A @ xd))
             ),
             "1000 times too large (units): delays come in s, torques are in N m": (
                 lambda A, xd, delay, K_P: tasks.delay_torque(A, xd, 1e3 * delay, K_P)
