@@ -35,10 +35,10 @@ def by_a_solver(robot, model, x, K_P):
     return K_P * (wanted - rk.inverse_kinematics(robot, gap.x)[: robot.n_arms])
 
 
-def by_simulation(robot, model, x, K_P):
-    """What PD drives hold 6 s after they were told to go there, in steps of 1 ms."""
+def by_simulation(robot, model, x, K_P, duration=6.0):
+    """What PD drives hold some seconds after they were told to go there, in steps of 1 ms."""
     wanted = rk.inverse_kinematics(model, x)[: model.n_arms]
-    path = rk.hold(robot, x, 6.0)
+    path = rk.hold(robot, x, duration)
     told = path.with_set_points(np.tile(wanted, (len(path), 1)))
     damping = 0.225 * np.sqrt(K_P / 7.05)
     return rk.simulate(robot.replace(friction=0.0), rk.PD(K_P, damping), told).c[-1]
@@ -99,7 +99,8 @@ ANSWERS = {
                 )
             ),
         ),
-        ("close", "first order, projector at x", by_projection),
+        ("close", "first order, projector at x", by_projection, "instead of a first-order step"),
+        ("close", "not yet at rest", lambda *case: by_simulation(*case, 1.0), "more time to come to rest"),
         ("close", "the null vector of three arms", three_only),
         ("right", "a solver that stops early", by_a_solver),
         ("wrong", "sign", scaled(-1), "opposite sign"),

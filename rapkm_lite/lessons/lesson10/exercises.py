@@ -25,7 +25,8 @@ EXERCISES = {
         invariant=tasks.pushes,
         tolerance=1e-8,
         close=0.1,
-        improve="take the pose that fits best, rk.estimate_pose, instead of a first-order step from x",
+        improve="give a simulated machine more time to come to rest; in a formula take the pose that fits best, "
+        "rk.estimate_pose, instead of a first-order step from x",
         mistakes={
             "the sign is turned, as if robot and model changed places: the model demands, the machine closes loops": (
                 lambda robot, model, x, K_P: tasks.geometry_fight(model, robot, x, K_P)
