@@ -139,6 +139,7 @@ def test_the_tables_count_mistakes_and_points(graded, tmp_path):
     write_csv(tmp_path / "grades.csv", graded)
     rows = list(csv.DictReader((tmp_path / "grades.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(graded) and {row["verdict"] for row in rows} <= {"ok", "close", "wrong", "todo"}
+    assert {row["points"] for row in rows} <= {"0.0", "5.0", "10.0"} >= {row["of"] for row in rows}
     assert "1 x the answer has the opposite sign" in by_exercise(graded)
     line = next(line for line in by_student(graded).splitlines() if line.startswith("ben"))
     assert line.split()[2] == "10"
@@ -658,7 +659,7 @@ def test_folders_without_submissions_are_refused(tmp_path, capsys):
 
 
 def test_a_package_that_is_missing_where_one_grades_is_named(tmp_path, monkeypatch):
-    # The answers are right: only what the cases are made with is not there.
+    """The answers of the solution are right: only what the cases are made with is not there. A stub is none yet."""
     (tmp_path / "without").mkdir()
     (tmp_path / "without" / "sympy.py").write_text("raise ImportError('no SymPy here')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "without"))
@@ -667,6 +668,8 @@ def test_a_package_that_is_missing_where_one_grades_is_named(tmp_path, monkeypat
     for name in ("12.fight", "12.other_units"):
         assert "cannot be judged here" in grades[name].sentence and "pip install sympy" in grades[name].sentence
     assert grades["12.own_machine"].verdict == "ok"
+    blank = grade_one(Submission("ben", LESSONS[0].parent / "12_your_machine.ipynb", "12"), 30.0)
+    assert [(one.verdict, one.mistake) for one in blank] == [("todo", "")] * 3
 
 
 # What the worker does with one notebook.

@@ -97,9 +97,9 @@ def grade_one(submission: Submission, seconds: float, stop: Event | None = None)
     for name, exercise in exercises().items():
         if name.startswith(f"{submission.lesson}."):
             word, sentence, mistake = results.get(name, ("wrong", "the notebook could not be run to here", "not run"))
-            points = exercise.points if word in ("ok", "close") else 0.0
-            said = sentence, mistake, str(submission.path)
-            grades.append(Grade(submission.student, name, word, points, exercise.points, *said))
+            of = float(exercise.points)
+            points = of if word in ("ok", "close") else 0.0
+            grades.append(Grade(submission.student, name, word, points, of, sentence, mistake, str(submission.path)))
     return grades
 
 
