@@ -665,6 +665,8 @@ def test_a_wrong_answer_is_drawn_dotted_and_a_right_one_is_not(capsys):
     capsys.readouterr()
     draw_own(name, lambda f: ([0], f(A, c)), plt.subplots()[1])
     assert "cannot be drawn here (ZeroDivisionError)" in capsys.readouterr().out
+    draw_own(name, lambda f: ([0, 1], [np.nan, np.nan]), plt.subplots()[1])
+    assert "cannot be drawn here" in capsys.readouterr().out
     plt.close("all")
 
 

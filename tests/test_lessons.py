@@ -173,7 +173,7 @@ def test_every_lesson_has_its_room_and_its_exercises_bear_its_number():
         assert name.partition(".")[0] in numbers and all(exercise.hints)
 
 
-CURVES = "03.rest_error", "04.filtered_torques", "05.feedback_map", "06.placement"
+CURVES = "01.pin_forces", "03.rest_error", "04.filtered_torques", "05.feedback_map", "06.placement"
 CURVES += "07.contradiction", "09.room", "11.model_error"
 
 

@@ -31,8 +31,10 @@ def draw_own(name: str, curve: Callable[..., Any], ax, per_arm: bool = False) ->
         return
     try:
         x, y = (np.asarray(v, dtype=float) for v in curve(own))
+        if not np.any(np.isfinite(y)):
+            raise ValueError("nothing to be seen")
         limits = ax.get_xlim(), ax.get_ylim()
-        lines = ax.plot(x, y, linestyle=(0, (0.01, 1.6)), dash_capstyle="round", color=ALARM, linewidth=3.0, zorder=5)
+        lines = ax.plot(x, y, linestyle=(0, (0.01, 1.6)), dash_capstyle="round", color=ALARM, linewidth=3.0, zorder=8)
     except Exception as error:
         print(f"Your own {name} cannot be drawn here ({type(error).__name__}); the lesson goes on with the package's.")
         return

@@ -529,7 +529,7 @@ FORCES = [
     ),
     ("wrong", "arm 2 nothing", lambda *case: np.insert(-multipliers(*case), 1, 0.0, axis=0), "it is in all rows of J"),
     ("wrong", "multipliers", multipliers, "these are the multipliers"),
-    ("wrong", "minus multipliers", lambda *case: -multipliers(*case), "these are the multipliers"),
+    ("wrong", "minus multipliers", lambda *case: -multipliers(*case), "on the other arms, one row for each gap; that"),
     ("wrong", "multipliers as they come", lambda *case: rk.forward_dynamics(*case)[1], "shape"),
     (
         "wrong",

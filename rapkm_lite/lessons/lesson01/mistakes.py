@@ -252,6 +252,7 @@ FORCES = {
     "these are the multipliers, one row for each gap; the force on arm 2 is missing, and mind the sign": (
         _pins_with(lambda L: L)
     ),
+    "these are the forces on the other arms, one row for each gap; that on arm 2 is missing": _pins_with(lambda L: -L),
     "arm 2 is given the mean of the others, not their sum": _pins_with(
         lambda L: np.insert(-L, 1, L.mean(axis=0), axis=0)
     ),
