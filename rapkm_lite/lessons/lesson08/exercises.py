@@ -116,6 +116,9 @@ EXERCISES = {
             "the reciprocal: this is the size of something per count, not the counts per turn": (
                 lambda K_P, friction: friction / (np.pi * K_P)
             ),
+            "gain and friction have changed places: the stiffer the drive, the more counts it needs": (
+                lambda K_P, friction: np.pi * friction / K_P
+            ),
             "this is the largest step of the angle in rad, not the counts per turn": (
                 lambda K_P, friction: 2 * friction / K_P
             ),

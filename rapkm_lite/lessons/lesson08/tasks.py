@@ -151,9 +151,8 @@ def driven(answer) -> Trajectory:
     """The path that a student's function chooses."""
     path = given(answer, (load(),))
     if not isinstance(path, Trajectory):
-        raise Ended(
-            "wrong", f"the answer is a {type(path).__name__}; a path is wanted, like rk.triangle(robot)", "type"
-        )
+        words = f"the answer is of type {type(path).__name__}; a path is wanted, like rk.triangle(robot)"
+        raise Ended("wrong", words, "type")
     return path
 
 
