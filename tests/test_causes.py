@@ -649,6 +649,12 @@ def test_a_right_model_and_right_encoders_are_not_blamed():
     assert "controller's model" not in said and "offset =" not in said
 
 
+def test_a_machine_that_falls_without_torques_is_said_to():
+    falling = ROBOT.replace(gravity=[0.0, -9.81])
+    with pytest.raises(rk.SimulationError, match="all torques were zero"):
+        rk.simulate(falling, lambda t, q_a, qd_a, d: np.zeros(3), rk.hold(falling, [0.0, 0.0], 2.0))
+
+
 @pytest.mark.parametrize("offset", [None, OFFSET, [4e-3, 0.0, 0.0]], ids=["none", "some", "one"])
 def test_offsets_are_to_be_looked_at_where_there_are_any(offset):
     """Gains that throw the machine out within the first sample, so that no loop near the desired state is left."""

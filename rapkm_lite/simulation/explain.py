@@ -57,7 +57,9 @@ def explain(setup: Setup, law, status: int, k: int, cause: Exception | None = No
         raised = ", or raised an exception there" if isinstance(written, CompiledLaw) else ""
         name = getattr(getattr(written, "function", written), "__name__", None) or short(written)
         return f"the law {name} returned torques that are not {setup.robot.n_arms} finite numbers{raised}"
-    words = next(_causes(setup, law, status, k, written is None, c), f"look at gains{_too(setup)} and the path")
+    pushed = c.any() or not len(c)
+    open_end = f"look at gains{_too(setup)} and the path" if pushed else "no drive pushed, all torques were zero"
+    words = next(_causes(setup, law, status, k, written is None, c), open_end)
     return f"{REASONS[status]} ({words})"
 
 
