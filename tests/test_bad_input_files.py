@@ -169,13 +169,14 @@ def test_the_first_column_that_is_missing_is_named(tmp_path, missing):
     """Of three drives: two columns of each kind do not make it a log of two drives, nor do three more a fourth."""
     kinds = [f"q{i} {what} in rad" for what in ("measured", "desired") for i in (1, 2, 3)]
     header, file = ["t in s", *kinds, *(f"c{i} in N m" for i in (1, 2, 3))], tmp_path / "own.csv"
+    words = rf"{', '.join(header)} \(of a file in another form, make a Log\)"
     left = header[: missing - 1] + header[missing:]
     held = repr(header[missing]) if missing < 10 else "nothing"
     file.write_text(",".join(left), encoding="utf-8")
-    with pytest.raises(ValueError, match=rf"line 1, column {missing} holds {held}; .* header {', '.join(header)}$"):
+    with pytest.raises(ValueError, match=rf"line 1, column {missing} holds {held}; .* header {words}$"):
         rk.read_log(file)
     file.write_text(",".join([*header, "a", "b", "c"]), encoding="utf-8")
-    with pytest.raises(ValueError, match=rf"line 1, column 11 holds 'a'; .* header {', '.join(header)}$"):
+    with pytest.raises(ValueError, match=rf"line 1, column 11 holds 'a'; .* header {words}$"):
         rk.read_log(file)
 
 
@@ -187,6 +188,17 @@ def test_a_log_says_how_long_it_is():
 def test_a_log_has_a_record_and_a_drive(shape):
     with pytest.raises(ValueError, match=r"allowed: \(k,\) and \(k, N\) with k, N >= 1"):
         rk.Log("empty", np.zeros(shape[0]), *np.zeros((3, *shape)))
+
+
+@pytest.mark.parametrize(
+    ("t", "line", "words"), [("0 0.1 0.1 0.1", 4, r"0\.1 s comes 0\.1"), ("0 1 5 4 5", 5, "5 s comes 4")]
+)
+def test_times_of_a_log_that_do_not_increase_are_no_gap(tmp_path, t, line, words):
+    """Not even where the usual step is 0, or where a gap comes first."""
+    rows = ["t in s,q1 measured in rad,q1 desired in rad,c1 in N m", *(f"{time},0,0,0" for time in t.split())]
+    (tmp_path / "own.csv").write_text("\n".join(rows), encoding="utf-8")
+    with pytest.raises(ValueError, match=rf"line {line}, column 1: after {words} s; allowed: times that increase$"):
+        rk.read_log(tmp_path / "own.csv")
 
 
 def test_a_gap_of_a_log_is_half_a_step_too_long(tmp_path):

@@ -13,6 +13,8 @@ from .arguments import of_kind, one_of, real_array, shaped, short
 from .datafiles import data_path
 from .values import Array, Value, frozen
 
+OTHERWISE = " (of a file in another form, make a Log)"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log(Value):
@@ -121,13 +123,12 @@ def _check_times(path: Path, t: np.ndarray) -> None:
     """Time increases, and records come evenly, but for jitter: a rest with a hole in it may be two."""
     steps = np.diff(t)
     usual = np.median(steps) if len(steps) else 0.0
-    wrong = np.flatnonzero((steps <= 0.0) | (steps > 1.5 * usual))
-    if len(wrong):
-        k = wrong[0]
-        raise ValueError(
-            f"the log {path.name!r}, line {k + 3}, column 1: after {t[k]:g} s comes {t[k + 1]:g} s, though records "
-            f"come every {usual:g} s; allowed: a log without gaps, or one file for each part"
-        )
+    gap = f", though records come every {usual:g} s; allowed: a log without gaps, or one file for each part"
+    for wrong, words in ((steps <= 0.0, "; allowed: times that increase"), (steps > 1.5 * usual, gap)):
+        for k in np.flatnonzero(wrong)[:1]:
+            raise ValueError(
+                f"the log {path.name!r}, line {k + 3}, column 1: after {t[k]:g} s comes {t[k + 1]:g} s{words}"
+            )
 
 
 def _names(path: Path, header: list[str]) -> list[str]:
@@ -135,7 +136,7 @@ def _names(path: Path, header: list[str]) -> list[str]:
     if len(header) == 1 and set(";\t") & set(header[0]):
         raise ValueError(
             f"the log {path.name!r}, line 1 has no commas; allowed: values with commas between them, with decimal "
-            "points (of a file in another form, make a Log)"
+            f"points{OTHERWISE}"
         )
     names = [name.strip(" \t") for name in header]
     drives = max(sum(name.endswith(end) for name in names) for end in ("measured in rad", "desired in rad", "in N m"))
@@ -144,7 +145,8 @@ def _names(path: Path, header: list[str]) -> list[str]:
         if name != want:
             got = "nothing" if name is None else short(name)
             raise ValueError(
-                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header {', '.join(wanted)}"
+                f"the log {path.name!r}, line 1, column {column} holds {got}; allowed: the header "
+                f"{', '.join(wanted)}{OTHERWISE}"
             )
     return wanted
 
