@@ -151,6 +151,16 @@ def test_pale_lines_of_the_arms_keep_their_colours_in_a_film():
         assert np.abs(shown - pale).max(axis=1).min() < 30
 
 
+def test_a_film_is_saved_under_the_name_of_its_form(tmp_path):
+    film = plotting.film(turning, [0.0, 1.0], "A hand turns.", figsize=(2, 2))
+    for name in ("own.gif", "own.mp4", "own", 3):
+        with pytest.raises(ValueError, match=r"path = .*; allowed: a file name that ends in \.webp"):
+            film.save(tmp_path / name if name != 3 else name)
+    assert not list(tmp_path.iterdir())
+    film.save(tmp_path / "own.webp")
+    assert Image.open(tmp_path / "own.webp").n_frames == 2
+
+
 def test_the_poster_is_the_last_frame_and_paper_stays_white():
     film = plotting.film(turning, [0.0, 1.0, 2.0], "A hand turns.", figsize=(2, 2))
     alone = plotting.film(turning, [2.0, 2.0], "A hand turns.", figsize=(2, 2))

@@ -17,10 +17,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
-from ..machine.arguments import whole_number
+from ..machine.arguments import of_kind, short, whole_number
 from .style import ARM_COLOURS, STYLE
 
 LARGEST = 120_000  # bytes; a notebook holds several films
+_WEBP = "a file name that ends in .webp, the form of a film"
 _FEWEST = 8  # frames, of a film that would be larger with all
 # Where the kernel itself runs in a browser (Pyodide), drawing a frame takes most of a second.
 _MOST_FRAMES = 8 if sys.platform == "emscripten" else None
@@ -41,7 +42,9 @@ class Film:
     note: str = ""
 
     def save(self, path: str | Path) -> None:
-        """Write the animated WebP to a file."""
+        """Write the animated WebP to a file; raises ValueError unless its name ends in ".webp"."""
+        if Path(of_kind("path", path, str | Path, _WEBP)).suffix.lower() != ".webp":
+            raise ValueError(f"path = {short(str(path))}; allowed: {_WEBP}")
         Path(path).write_bytes(self.moving)
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
