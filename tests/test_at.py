@@ -274,6 +274,58 @@ def test_what_was_asked_before_does_not_stay_with_other_coordinates():
     assert other == fresh.using((0, 2)) and hash(other) == hash(fresh.using((0, 2)))
 
 
+SHAPE = ("a", "d", "x", "J", "F", "A", "N", "A_tilde", "A_tilde_T_pinv", "G")
+
+
+def test_geometry_of_a_pose_asked_again_is_that_of_its_own_angles_and_machine():
+    """The last poses keep their geometry; one among many, as [q, q], is computed for itself."""
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    longer = TESTBED.replace(lengths=1.1 * TESTBED.lengths)
+    work = q.copy()
+    for robot, x in ((TESTBED, [0.02, 0.05]), (longer, [0.02, 0.05]), (TESTBED, [0.01, 0.03]), (TESTBED, [0.02, 0.05])):
+        work[:] = rk.inverse_kinematics(robot, x)  # the same array, with other numbers
+        for pose in (rk.at(robot, work), rk.at(robot, work, work), rk.at(robot, work)):
+            alone = rk.at(robot, np.stack([work, work]), np.stack([work, work]))
+            for name in SHAPE:
+                assert_allclose(getattr(pose, name), getattr(alone, name)[0], rtol=1e-12, atol=1e-13, err_msg=name)
+    assert np.array_equal(rk.redundant_control_matrix(TESTBED, q), rk.at(TESTBED, q, q).A_tilde)
+
+
+def test_what_is_handed_out_belongs_to_one_pose_alone():
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    first, second = rk.at(TESTBED, q), rk.at(TESTBED, q)
+    wanted = {name: getattr(first, name).copy() for name in SHAPE}
+    for name in SHAPE:
+        array = getattr(first, name)
+        if array.base is None:
+            array.setflags(write=True)  # what nobody should do
+            array[:] = 0.0
+        elif not array.base.flags.writeable:
+            with pytest.raises(ValueError, match="WRITEABLE"):
+                array.setflags(write=True)
+    for name in SHAPE:
+        assert np.array_equal(getattr(second, name), wanted[name]), name
+    with pytest.raises(ValueError, match="WRITEABLE"):
+        first.q.setflags(write=True)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda pose: pickle.loads(pickle.dumps(pose))])
+def test_a_copied_pose_has_its_geometry(copied):
+    pose = rk.at(TESTBED, rk.inverse_kinematics(TESTBED, [0.02, 0.05]))
+    N = pose.N
+    assert np.array_equal(copied(pose).N, N) and copied(pose) == pose
+
+
+def test_a_pose_that_is_refused_is_refused_again():
+    q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
+    q[5] = 0.0
+    for _ in range(2):
+        with pytest.raises(ValueError, match="boundary of the workspace"):
+            rk.orthogonal_complement(TESTBED, q)
+        with pytest.raises(ValueError, match="leaves the loops open"):
+            rk.nullspace_projector(TESTBED, q)
+
+
 def test_coordinates_may_be_given_at_once():
     q = rk.inverse_kinematics(TESTBED, [0.02, 0.05])
     pose = At(TESTBED, q, None, (0, 2))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, overload
+from typing import Any
 
 import numpy as np
 
@@ -13,39 +12,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from . import cores
 from .linalg import linear
-
-Kept = TypeVar("Kept")
-
-
-class quantity(Generic[Kept]):
-    """A property that is computed when asked for, then kept, with its arrays read-only."""
-
-    needs_rates = False
-
-    def __init__(self, function: Callable[[Any], Kept]):
-        self.function, self.name, self.__doc__ = function, function.__name__, function.__doc__
-
-    @overload
-    def __get__(self, pose: None, cls: type) -> quantity[Kept]: ...
-    @overload
-    def __get__(self, pose: At, cls: type) -> Kept: ...
-
-    def __get__(self, pose, cls):
-        if pose is None:
-            return self
-        if self.needs_rates and pose.qd is None:
-            raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
-        value: Any = self.function(pose)
-        pose.__dict__[self.name] = value
-        for array in value if type(value) is tuple else (value,):
-            array.setflags(False)
-        return value
-
-
-class rate(quantity[Kept]):
-    """A `quantity` that needs qd."""
-
-    needs_rates = True
+from .quantity import geometry, quantity, rate
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,7 +60,7 @@ class At(Value):
         return f"At({self.robot.name!r}, {count}{', with rates' if self.qd is not None else ''}{coordinates})"
 
     # Geometry.
-    @quantity
+    @geometry
     def _v(self):
         return cores.link_vectors(self.robot.tree, self.q)
 
@@ -141,19 +108,19 @@ class At(Value):
         tree = self.robot.tree
         return linear(self._v * self._rates, tree.jacobian_dot, tree.r, tree.n)
 
-    @quantity
+    @geometry
     def _closed(self):
         """The vectors of the links, where they close the loops; rates and torques have no meaning elsewhere."""
         return cores.closed(self.robot.tree, self._v)
 
     # Minimal coordinates.
-    @quantity
+    @geometry
     def _levers(self):
         levers = cores.inner_levers(self.robot.tree, self.q)
         _ = self._closed
         return levers
 
-    @quantity
+    @geometry
     def _over(self):
         """The base joint of an arm turns at d . xd / (a x d), its distal link at -a . xd / (a x d)."""
         return self._v / self._levers
@@ -212,7 +179,7 @@ class At(Value):
         return linear(self._v, tree.weight) + tree.friction * np.tanh(self.qd / self.robot.friction_velocity)
 
     # Redundant coordinates.
-    @quantity
+    @geometry
     def _row_space(self):
         _ = self._closed
         return cores.row_space(self.J, self.robot.tree.longest)
@@ -264,8 +231,8 @@ def at(robot: Manipulator, q, qd=None) -> At:
     (True, (3, 6))
     """
     n = manipulator(robot).n_joints
-    q = real_array("q", q, n).copy()
-    q.setflags(write=False)
+    q = real_array("q", q, n)
+    q = np.frombuffer(q.tobytes()).reshape(q.shape)  # that no flag makes writable: its `geometry` may be shared
     if qd is not None:
         qd = real_array("qd", qd, n).copy()
         qd.setflags(write=False)

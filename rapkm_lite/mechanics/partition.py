@@ -34,9 +34,10 @@ def explicit_pseudoinverse(A_tilde, rows) -> np.ndarray:
     where = "an input singularity, or dependent rows; allowed: the full degree of actuation, rows by select_independent"
     A1T_pinv = cores.right_inverse("A~_1, the chosen rows of A_tilde,", A1.mT, where).mT
     B = product(A1T_pinv, A2.mT)
-    # Do they make the others, to 1e-6, near an input singularity to the rounding of B?  Each matrix by itself.
-    left, size, inverse = squares(product(B.mT, A1) - A2), squares(A_tilde), squares(A1T_pinv)
-    if np.any(left > np.maximum(1e-12, 1e-28 * size * inverse) * size):
+    # Do they make the others, to 1e-6?  Each matrix by itself; near an input singularity to the rounding of B.
+    left, size = squares(product(B.mT, A1) - A2), squares(A_tilde)
+    short = left > 1e-12 * size
+    if short is not False and np.any(short & (left > 1e-28 * size**2 * squares(A1T_pinv))):
         raise ValueError(f"rows holds {first.shape[-1]} of the rows, below the rank of A_tilde; allowed: delta of them")
     small, right = product(B.mT, B), product(B.mT, A1T_pinv)
     bottom = right / (1.0 + small) if small.shape[-1] == 1 else np.linalg.solve(np.eye(small.shape[-1]) + small, right)

@@ -198,5 +198,5 @@ def _weight_hessian(pose: At) -> np.ndarray:
 
 def base_angle_hessians(pose: At) -> np.ndarray:
     """d2 q_i / dx2 of the base angles, (..., N, 2, 2) in rad/m^2: how the rows of A change along x and along y."""
-    rates = [at(pose.robot, pose.q, pose.F[..., k]).F_dot for k in (0, 1)]
-    return np.stack(rates, axis=-1)[..., : pose.robot.n_arms, :, :]
+    F_dot = at(pose.robot, pose.q[..., None, :], pose.F.mT).F_dot  # moving along x, and along y
+    return np.moveaxis(F_dot[..., : pose.robot.n_arms, :], -3, -1)
