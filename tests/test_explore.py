@@ -844,6 +844,9 @@ def test_a_machine_of_ones_own_begins_with_the_given_one_as_near_as_its_sliders_
     assert values == explore.own_machine().values | {"radius": 290, "proximal": 180, "distal": 260, "mode": "(+, +, −)"}
     large = explore.own_machine(robot.replace(base=10 * robot.base, lengths=10 * robot.lengths, centers=None))
     assert (large.values["radius"], large.values["distal"]) == (320, 300)
+    # With the shortest links that the sliders know the triangle would be out of reach.
+    small = explore.own_machine(many_arms(6, 0.25))
+    assert [small.values[name] for name in ("radius", "proximal", "distal")] == [230, 200, 200] and not small.problem
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -1325,6 +1328,21 @@ def test_titles_and_labels_are_whole(name, robot):
             assert 0 <= box.x0 and box.x1 <= shown.bbox.x1 and 0 <= box.y0 and box.y1 <= shown.bbox.y1, text
 
 
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("times, mass", [(0.25, 0.005), (25.0, 80.0)])
+def test_numbers_along_an_axis_stand_apart_and_words_are_not_cut(name, times, mass):
+    robot = many_arms(6, times).replace(masses=mass, inertias=None)
+    shown = laid_out(getattr(explore, name)(robot))
+    for ax in shown.axes:
+        boxes = [t.get_window_extent() for t in ax.get_xticklabels() if t.get_text() and t.get_visible()]
+        inside = [box for box in boxes if ax.bbox.x0 - 1 < (box.x0 + box.x1) / 2 < ax.bbox.x1 + 1]
+        assert not any(a.overlaps(b) for a, b in itertools.pairwise(inside)), ax.get_title("left")
+        for text in ax.texts:
+            box, room = text.get_window_extent(), ax.bbox if text.get_clip_on() else shown.bbox
+            whole = room.x0 - 2 <= box.x0 and box.x1 <= room.x1 + 2
+            assert whole or box.x1 <= room.x0 or box.x0 >= room.x1, text
+
+
 def test_a_middle_out_of_reach_gives_way_to_a_place_with_room():
     robot = rk.Manipulator([[-0.3, 0.0], [0.3, 0.0], [0.0, 0.05]], [[0.3, 0.3], [0.3, 0.3], [0.15, 0.35]], masses=0.1)
     assert not rk.reachable(robot, robot.base.mean(axis=0))
@@ -1384,7 +1402,7 @@ def test_numbers_of_light_and_heavy_machines_are_those_of_the_testbed_times_the_
     ):
         one, times = getattr(explore, make)(robot).numbers, getattr(explore, make)(other).numbers
         for name, power in told.items():
-            ours, theirs = ([float(v) for v in re.findall(r"-?[\d.]+(?:e[+-]\d+)?", n[name])] for n in (one, times))
+            ours, theirs = ([float(v) for v in re.findall(r"-?[\d.]+(?:e-?\d+)?", n[name])] for n in (one, times))
             slack = 0.5 * 10.0 ** -len(one[name].split(" ")[0].partition(".")[2])
             for a, b in zip(ours, theirs, strict=True):
                 assert abs(a - b / heavier**power) <= 1.01 * slack + 5.1e-3 * abs(a), (

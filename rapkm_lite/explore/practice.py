@@ -134,7 +134,7 @@ def own_machine(robot: Manipulator) -> Explorer:
     """A machine in the middle of the triangle, the torques that move it, and those of offsets, which only press.
 
     It begins with the layout of the base joints and the working mode of the given machine, and with the mean of each of
-    its lengths, as near as the sliders come.
+    its lengths, as near as the sliders come; with those of the testbed where these would not reach the triangle.
 
     >>> from rapkm_lite import explore; explore.own_machine().numbers["cost of the offsets, at rest everywhere"]
     '3.58 J'
@@ -148,11 +148,18 @@ def own_machine(robot: Manipulator) -> Explorer:
     hotter = shared.hotter(robot, 1.0)
     way = triangle(load(), side, dt=0.02).x
 
-    def draw(picture, radius, proximal, distal, load, mode):
+    def built(radius, proximal, distal, **more) -> Manipulator:
         lengths = 1e-3 * np.array([proximal, distal])
-        base = centre + 1e-3 * radius * out
         rods = {"lengths": lengths, "masses": ROD * lengths, "centers": None, "inertias": None}
-        own = robot.replace(base=base, load=load, mode=modes[mode], **rods)
+        return robot.replace(base=centre + 1e-3 * radius * out, **rods, **more)
+
+    start = _nearest(away, 200, 320), *(_nearest(lengths, 150, 300) for lengths in robot.lengths.T)
+    own = built(*start)
+    if not reachable(own, marks.middle(own) + way).all():
+        start = 230, 200, 200
+
+    def draw(picture, radius, proximal, distal, load, mode):
+        own = built(radius, proximal, distal, load=load, mode=modes[mode])
         middle = marks.middle(own)
         picture.line("machine", *(middle + way).T, color=NEUTRAL, linewidth=1.2, zorder=1)
         if reachable(own, middle):
@@ -185,9 +192,9 @@ def own_machine(robot: Manipulator) -> Explorer:
         "pressing": shared.over_time("torque in mN m", title="Only presses"),
     }
     controls = {
-        "radius": slider("base joints from the middle in mm", 200, 320, 5, _nearest(away, 200, 320)),
-        "proximal": slider("proximal links in mm", 150, 300, 5, _nearest(robot.lengths[:, 0], 150, 300)),
-        "distal": slider("distal links in mm", 150, 300, 5, _nearest(robot.lengths[:, 1], 150, 300)),
+        "radius": slider("base joints from the middle in mm", 200, 320, 5, start[0]),
+        "proximal": slider("proximal links in mm", 150, 300, 5, start[1]),
+        "distal": slider("distal links in mm", 150, 300, 5, start[2]),
         "load": slider("load in kg", 0.0, 1.0, 0.1, 0.5),
         "mode": choice("working mode", modes, mode_name(robot.mode)),
     }

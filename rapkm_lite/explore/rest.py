@@ -204,7 +204,7 @@ def landscape(robot: Manipulator) -> Explorer:
         for k, share in enumerate(shares):
             picture.bar("shares", k + 1, share, 0.6, facecolor=NEUTRAL)
             words = marks.told(share, 2, 2 * levels[0])
-            picture.text("shares", k + 1, share, words, ha="center", va="bottom", fontsize=9)
+            picture.text("shares", k + 1, share, words, ha="center", va="bottom", fontsize=9 if len(words) < 7 else 7)
         picture.fit("shares", 1.2 * shares, symmetric=False, least=levels[0])
         step = min(0.22, 0.88 / robot.n_arms)
         directions *= np.where(directions.sum(axis=0) < 0, -1, 1)

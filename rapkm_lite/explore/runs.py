@@ -143,8 +143,8 @@ def animation(robot: Manipulator) -> Explorer:
         down = max(0.06 * times, 0.065 * (high - low))  # where drives are far from the workspace, words need more room
         corner = np.array([picture.xlim("plane")[1] - 1.15 * scale * unit, high - down])
         picture.arrow("plane", corner, [scale * unit, 0], wide, facecolor=AFTER)
-        words = {"ha": "center", "va": "bottom", "fontsize": 10}
-        picture.text("plane", corner[0] + scale * unit / 2, corner[1] + 0.015 * times, f"{unit:g} N", **words)
+        words = {"ha": "right", "va": "bottom", "fontsize": 10}
+        picture.text("plane", corner[0] + scale * unit, corner[1] + 0.015 * times, f"{unit:g} N", **words)
 
     panels = {
         "plane": plane_limits(robot, 0.05) | {"title": "Forces of the drives, and their sum"},

@@ -104,8 +104,8 @@ def bars(picture, panel: str, groups, width: float = 0.42, form: str = ".2f", ti
     """
     width = positive_number("width", width)
     zero_line(picture, panel)
-    size = 9 if sum(len(values) for values, _ in groups) < 8 else 7
     said = [[_bar_words(value, form, times) for value in values] for values, _ in groups]
+    size = 9 if sum(map(len, said)) < 8 and max(len(words) for row in said for words in row) < 7 else 7
     for k, (values, style) in enumerate(groups):
         for i, value in enumerate(values):
             at, words = i + 1 + (k - (len(groups) - 1) / 2) * width, said[k][i]
@@ -121,12 +121,22 @@ def _bar_words(value: float, form: str, times: float = 1.0) -> str:
     """A number without a negative zero; what rounding left of a tie does not tell equal numbers apart.
 
     >>> _bar_words(-11750.04, ".1f"), _bar_words(23517667.0, ".1f")
-    ('−11750', '2.35e+07')
+    ('−11750', '2.35e7')
     """
     if _far(times):
         return told(value, 2, times).replace("-", "−")
-    form = form if abs(value) < 1000 else ".0f" if abs(value) < 1e6 else ".3g"
+    if abs(value) >= 1000:
+        return _three_digits(value).replace("-", "−")
     return re.sub("^−(?=[0.]+$)", "", format(np.round(value, 9), form).replace("-", "−"))
+
+
+def _three_digits(value: float) -> str:
+    """Three significant digits; whole from 1000 to a million, beyond with a short exponent.
+
+    >>> _three_digits(0.04762), _three_digits(127000.4), _three_digits(2.351e7)
+    ('0.0476', '127000', '2.35e7')
+    """
+    return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else re.sub(r"e\+?(-?)0*", r"e\1", f"{value:.3g}")
 
 
 def _far(times: float) -> bool:
@@ -139,11 +149,11 @@ def told(value: float, digits: int, times: float = 1.0) -> str:
     times : how many times the testbed's such numbers are; what would be zero there is zero here.
 
     >>> told(-0.001, 2), told(1234.5678, 2), told(1.2345e-7, 2, 4e-8), told(1e-12, 2, 4e-8), told(7654321.0, 1, 1e5)
-    ('0.00', '1234.57', '1.23e-07', '0', '7.65e+06')
+    ('0.00', '1234.57', '1.23e-7', '0', '7.65e6')
     """
     if _far(times):
         value = value if abs(value / times) > 0.5 * 10**-digits else 0.0
-        return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
+        return _three_digits(value)
     return f"{np.round(np.round(value, digits + 6), digits) + 0.0:.{digits}f}"
 
 

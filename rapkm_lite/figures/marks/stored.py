@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 from PIL import Image, features
 
@@ -55,9 +56,7 @@ def figure(picture: Picture, problem: str = "") -> Figure:
             frame = picture.frames[name]
             ax.set(**settings | {"xlim": frame[:2], "ylim": frame[2:]})
             ax.set_autoscale_on(False)
-            digits = max(map(len, ax.xaxis.get_major_formatter().format_ticks(list(ax.get_xticks()))), default=0)
-            if digits > 5 and "xticks" not in settings:
-                ax.locator_params(axis="x", nbins=4)  # Matplotlib has room for three digits in mind
+            _thin_out(ax)
             # As on the canvas, without ticks there are no axes.
             if len(ax.get_xticks()) == 0:
                 ax.spines[:].set_visible(False)
@@ -66,11 +65,20 @@ def figure(picture: Picture, problem: str = "") -> Figure:
         if any(mark.kind == "scale" for mark in picture.fixed) and (engine := made.get_layout_engine()):
             # A colour bar takes room from axes of equal scales, whose title is then above the place it had.
             engine.execute(made)
+            for ax in axes.values():  # which are larger now, some of them
+                _thin_out(ax)
         if problem:
             box = {"boxstyle": "round,pad=0.8", "facecolor": "white", "edgecolor": ALARM, "linewidth": 1.5}
             words = textwrap.fill(problem, int(10 * picture.size[0]))
             made.text(0.5, 0.04, words, ha="center", va="bottom", color=ALARM, fontsize=11.5, zorder=100, bbox=box)
     return made
+
+
+def _thin_out(ax) -> None:
+    """Fewer ticks along x where their numbers are long: Matplotlib has room for three digits in mind."""
+    digits = max(map(len, ax.xaxis.get_major_formatter().format_ticks(list(ax.get_xticks()))), default=0)
+    if digits > 5 and isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
+        ax.locator_params(axis="x", nbins=4)
 
 
 def png(picture: Picture, problem: str = "") -> bytes:
