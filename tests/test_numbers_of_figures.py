@@ -470,6 +470,26 @@ def test_bars_of_energies_stand_at_their_drive_with_their_number():
     assert [text.get_text() for text in ax.texts] == ["1.25", "2.00", "0.50", "0.25"]
 
 
+def test_long_numbers_of_many_drives_stand_apart():
+    """Twelve bars with seven characters each."""
+    ax = plotting.plot_energies({"a": 3.1234e-4 * np.ones(6), "b": 2.9876e-4 * np.ones(6)})
+    ax.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    assert not any(box.overlaps(ax.get_legend().get_window_extent()) for box in boxes)
+
+
+@pytest.mark.parametrize("times", [1e-4, 1e4])
+def test_torques_of_light_and_heavy_machines_are_told_with_their_digits(times):
+    """By (14) torques at rest are as many times as large as the gain."""
+    q, offset = pose([0.02, 0.05]), [4e-3, -2e-3, 5e-3]
+    told = [
+        [float(t.get_text().split(": ")[1].split()[0].replace("−", "-")) for t in ax.get_legend().get_texts()]
+        for ax in (plotting.plot_disagreement(ROBOT, q, offset, K_P) for K_P in (7.05, 7.05 * times))
+    ]
+    assert_allclose(told[1], times * np.array(told[0]), rtol=0.02)
+
+
 # Computed torque.
 def test_arrows_show_where_the_drives_of_a_pair_feel_nothing():
     """Both base joints of the pair stand still, to first order, while the end-effector moves along the arrow."""
@@ -496,6 +516,18 @@ def test_the_map_of_the_feedback_is_its_decimal_logarithm():
     pair, (G, _, _) = rk.control_matrix(ROBOT, q, (0, 1)), rk.minimal_dynamics(ROBOT, q, 0 * q, (0, 1))
     norm = np.linalg.norm(np.linalg.pinv(pair.T) @ G, 2)
     assert level[i, j] == pytest.approx(np.log10(norm), abs=1e-9)
+
+
+@pytest.mark.parametrize("decades", [-4, 3])
+def test_the_map_of_the_feedback_keeps_its_colours_for_light_and_heavy_machines(decades):
+    """Without friction the map is linear in all masses; its colours move with it by decades."""
+    robot = ROBOT.replace(friction=0.0)
+    other = robot.replace(
+        masses=10.0**decades * robot.masses, inertias=None, rotor_inertia=10.0**decades * robot.rotor_inertia
+    )
+    limits = [plotting.plot_feedback_map(machine, (0, 1), n=41).collections[0].get_clim() for machine in (robot, other)]
+    assert_allclose(limits[0], [-2.2, 0.0], atol=1e-12)
+    assert_allclose(np.subtract(limits[1], limits[0]), decades, atol=1e-12)
 
 
 def test_redundant_coordinates_are_the_smooth_curve_of_the_feedback():

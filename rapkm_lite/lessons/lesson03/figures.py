@@ -39,11 +39,12 @@ def plot_disagreement(robot, q, offset, K_P, ax=None, title: str = ""):
     pairs = [(j, k) for j in range(len(A)) for k in range(j) if abs(cross(normal[j], normal[k])) > 0.3]
     corners = [np.linalg.solve(normal[[j, k]], level[[j, k]]) for j, k in pairs]
     corners = np.array([*corners, [0.0, 0.0], rest])
+    digits = "z.1f" if 0.1 < np.abs(torque).max() < 1e5 else ".3g"
     centre, half = (corners.min(axis=0) + corners.max(axis=0)) / 2, 0.72 * np.ptp(corners, axis=0).max() + 1e-3
     for i in range(len(A)):
         along = np.array([-normal[i, 1], normal[i, 0]])
         foot = centre + (level[i] - normal[i] @ centre) * normal[i]
-        label = f"drive {i + 1}: {np.round(torque[i], 1) + 0.0:.1f} mN m".replace("-", "−")
+        label = f"drive {i + 1}: {torque[i]:{digits}} mN m".replace("-", "−")
         ax.plot(*(foot + np.outer([-4 * half, 4 * half], along)).T, label=label, **arm_line(i))
         target = rest + (level[i] - normal[i] @ rest) * normal[i]
         ax.plot(*np.stack([rest, target]).T, color=arm_colour(i), lw=5, alpha=0.55, solid_capstyle="butt", zorder=3)

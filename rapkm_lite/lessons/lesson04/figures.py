@@ -254,16 +254,20 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
     count, N = len(rows), max(map(len, rows.values()))
     size = max(high, -low, 1e-18)  # below is rounding, with mg and mm, too
     width, digits = 0.8 / count, "z.2f" if 0.1 <= size < 1e4 else "z.2g"
+    said = {label: [f"{energy:{digits}}".replace("-", "−") for energy in row] for label, row in rows.items()}
+    upright = count * N * max(len(text) for row in said.values() for text in row) > 60
     words: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 9 if count < 3 else 8}
+    words |= {"rotation": 90} if upright else {}
     fills = [{"alpha": 1.0}, {"alpha": 0.45}, {"alpha": 1.0, "hatch": "///"}, {"alpha": 0.45, "hatch": "///"}]
     for k, (label, energies) in enumerate(rows.items()):
         for i, energy in enumerate(energies):
             at = i + (k - (count - 1) / 2) * width
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
-            ax.text(at, max(energy, 0.0), f"{energy:{digits}}".replace("-", "−"), **words)
+            ax.text(at, max(energy, 0.0), said[label][i], **words)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
     ax.set_xticks(range(N), [f"drive {i + 1}" for i in range(N)])
-    ax.set(ylabel="electric energy in J", title=title, ylim=(min(0.0, 1.25 * low), max(1.3 * high, 0.1 * size)))
+    top = max((1.7 if upright else 1.3) * high, 0.1 * size)
+    ax.set(ylabel="electric energy in J", title=title, ylim=(min(0.0, 1.25 * low), top))
     ax.grid(axis="x", visible=False)
     ax.legend(ncols=2, loc="upper left")
     return ax

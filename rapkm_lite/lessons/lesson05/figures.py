@@ -84,8 +84,10 @@ def plot_feedback_map(robot, pair, ax=None, n: int = 220):
     >>> ax = plotting.plot_feedback_map(rk.load(), (0, 1), n=21)
     """
     x, y, inside, points = grid_points(robot, n, driven=True)
-    level = on_grid(inside, np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair)))
-    ax = plot_map(x, y, level, ax, label="log10 of the norm in N m per rad/s²", vmin=-2.2, vmax=0.0)
+    level = np.log10(feedback_norm(robot, inverse_kinematics(robot, points), pair))
+    top = np.round(np.median(level) + 1.8)  # 0 for machines like the testbed, other decades for much heavier or lighter
+    look = {"label": "log10 of the norm in N m per rad/s²", "vmin": top - 2.2, "vmax": top}
+    ax = plot_map(x, y, on_grid(inside, level), ax, **look)
     plot_pair_curves(robot, ax, pairs=[pair], on_map=True)
     return _frame(robot, ax)
 
