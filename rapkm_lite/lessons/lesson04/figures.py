@@ -251,22 +251,19 @@ def plot_energies(rows: dict, ax=None, title: str = ""):
     """
     ax = axes_or_new(ax)
     low, high = min(np.min(e) for e in rows.values()), max(np.max(e) for e in rows.values())
-    count, N = len(rows), max(map(len, rows.values()))
-    size = max(high, -low, 1e-18)  # below is rounding, with mg and mm, too
+    count, N, size = len(rows), max(map(len, rows.values())), max(high, -low, 1e-18)  # below is rounding, with mg, too
     width, digits = 0.8 / count, "z.2f" if 0.1 <= size < 1e4 else "z.2g"
-    said = {label: [f"{energy:{digits}}".replace("-", "−") for energy in row] for label, row in rows.items()}
-    upright = count * N * max(len(text) for row in said.values() for text in row) > 60
-    words: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 9 if count < 3 else 8}
-    words |= {"rotation": 90} if upright else {}
+    upright = count * N * max(len(f"{energy:{digits}}") for energies in rows.values() for energy in energies) > 60
+    words: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 9 - (count > 2), "rotation": 90 * upright}
     fills = [{"alpha": 1.0}, {"alpha": 0.45}, {"alpha": 1.0, "hatch": "///"}, {"alpha": 0.45, "hatch": "///"}]
     for k, (label, energies) in enumerate(rows.items()):
         for i, energy in enumerate(energies):
             at = i + (k - (count - 1) / 2) * width
             ax.bar(at, energy, 0.92 * width, color=arm_colour(i), edgecolor="white", **fills[k % len(fills)])
-            ax.text(at, max(energy, 0.0), said[label][i], **words)
+            ax.text(at, max(energy, 0.0), f"{energy:{digits}}".replace("-", "−"), **words)
         ax.bar(np.nan, 0, color="#777777", edgecolor="white", label=label, **fills[k % len(fills)])
     ax.set_xticks(range(N), [f"drive {i + 1}" for i in range(N)])
-    top = max((1.7 if upright else 1.3) * high, 0.1 * size)
+    top = max((1.3 + 0.4 * upright) * high, 0.1 * size)
     ax.set(ylabel="electric energy in J", title=title, ylim=(min(0.0, 1.25 * low), top))
     ax.grid(axis="x", visible=False)
     ax.legend(ncols=2, loc="upper left")
@@ -278,7 +275,6 @@ def plot_table1(table, ax=None, title: str = "Table 1"):
 
     >>> import rapkm_lite as rk; from rapkm_lite import plotting; ax = plotting.plot_table1(rk.table1())
     """
-    rows = {}
-    for k, when in enumerate(("without filter", "with filter")):
-        rows |= {f"measured, {when}": table.measured[k], f"simulated, {when}": table.simulated[k]}
+    times = enumerate(("without filter", "with filter"))
+    rows = {f"{what}, {when}": getattr(table, what)[k] for k, when in times for what in ("measured", "simulated")}
     return plot_energies(rows, axes_or_new(ax, figsize=(9.0, 3.6)), title)
