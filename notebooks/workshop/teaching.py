@@ -121,7 +121,8 @@ def mistakes_page() -> str:
     for name, exercise in sorted(exercises().items()):
         points = f"{exercise.points:g} points"
         text += [f"## {name}\n", f"Kind: {kinds.get(name, 'design' if exercise.judge else 'derive')}, {points}.\n"]
-        text += [f"- {sentence}" for sentence in exercise.mistakes] or [
+        sentences = [*exercise.mistakes, exercise.near, exercise.partly]
+        text += [f"- {sentence}" for sentence in sentences if sentence] or [
             "Its check compares with limits, or with the log."
         ]
         text.append("")

@@ -169,12 +169,14 @@ def named(seen: Seen, secret: bool = False) -> str:
         return next(filter(None, (detect(seen) for detect in PLAIN + (() if secret else FITTED))), "")
 
 
-def where(seen: Seen, right: list[bool]) -> str:
-    """Words for where an answer is right and where it is not: kinds of cases, numbers of drives, single entries."""
+def where(seen: Seen, right: list[bool], partly: str = "") -> str:
+    """Words for where an answer is right and where it is not: kinds of cases, single entries; or `partly`."""
     if not any(right):
         return _wrong_lines(seen)
     labels = [(getattr(case, "label", ""), fine) for case, fine in zip(seen.cases, right, strict=True)]
     good, bad = ({label for label, fine in labels if fine == wanted} for wanted in (True, False))
+    if partly and good & bad:
+        return partly
     kinds = f", and wrong for {', '.join(sorted(bad))}" if all(bad) and not good & bad else ""
     return f"it is right in {sum(right)} of {len(right)} cases{kinds}"
 

@@ -87,6 +87,7 @@ class Exercise:
         design: the share of its limit by which a measured number may miss it.
     improve : the sentence that says what would improve a close answer.
     near : the sentence that says why an answer which is off by a share of at most `close` is wrong all the same.
+    partly : the sentence for an answer that is right in some cases of a kind and wrong in others, with no other name.
     mistakes : sentence that names a mistake -> function of the case that makes it (of a design: function of the answer
         that is true when the mistake was made).
     judge : of a design: answer -> list of `Measured`, from runs in closed loop; cases, invariant and tolerance are
@@ -109,6 +110,7 @@ class Exercise:
     close: float = 0.0
     improve: str = "ask more of your method: a smaller tolerance, more steps, more samples"
     near: str = ""
+    partly: str = ""
     mistakes: dict[str, Callable] = field(default_factory=dict)
     judge: Callable | None = None
     raw: bool = False

@@ -233,7 +233,7 @@ def _explained(exercise: Exercise, seen: Seen, right: list[bool]) -> None:
         _known_mistake(exercise, rough)
     # What fits much better goes first: two numbers may be nearly opposite, and their order the mistake.
     words = words or named(replace(seen, slack=loose / 5), exercise.secret) or named(rough, exercise.secret)
-    words = words or ("" if exercise.secret else where(seen, right))
+    words = words or ("" if exercise.secret else where(seen, right, exercise.partly))
     if words:
         raise Ended("wrong", "; ".join(filter(None, [words, _off(exercise, seen)])), words)
 

@@ -35,6 +35,14 @@ def pinv_tosses(J, m, K_P, offset):
     return -K_P * (offset - np.linalg.pinv(A.T) @ (A.T @ offset))
 
 
+def rounding_decides(J, m, K_P, offset):
+    """An error of 1e-12 at every other pose, which the default cut-off takes for a fourth direction."""
+    U, sigma, V = np.linalg.svd(rk.projector(J)[:m], full_matrices=False)
+    sigma[J.shape[1] - J.shape[0] :] = 1e-12 * (offset[0] > 0)
+    A = U * sigma @ V
+    return -K_P * (offset - np.linalg.pinv(A.T) @ (A.T @ offset))
+
+
 def three_rows(J, m, K_P, offset):
     A = rk.projector(J)[:m]
     return -K_P * (np.eye(m) - rk.explicit_pseudoinverse(A, (0, 1, 2)) @ A.T) @ offset
@@ -75,6 +83,7 @@ ANSWERS = {
         ("right", "least squares", least_squares),
         ("wrong", "three rows always", three_rows, ""),
         ("wrong", "numpy's pinv of an own projector", pinv_tosses, ""),
+        ("wrong", "rounding decides", rounding_decides, "rounding decides a rank"),
         ("wrong", "sign", scaled(-1), "sign"),
         ("wrong", "mN m", scaled(1e3), "1000"),
         ("wrong", "half", scaled(0.5), "factor"),

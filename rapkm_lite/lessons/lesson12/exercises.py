@@ -25,6 +25,8 @@ EXERCISES = {
         tolerance=1e-9,
         close=1e-3,
         improve="project exactly; a cut-off of 1e-9 for pinv will do",
+        partly="at some poses of a machine it is right and at others not, as when rounding decides a rank: the default "
+        "cut-off of pinv does not know it; one of 1e-9 does, and so does (27)",
         mistakes={
             "the sign: a drive is pulled back by its offset": lambda J, m, K_P, offset: -tasks.fight(J, m, K_P, offset),
             "nothing is projected: part of these torques moves the machine": (
