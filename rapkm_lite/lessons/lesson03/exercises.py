@@ -135,6 +135,7 @@ EXERCISES = {
             "these offsets point along eta: this is the part that fights, not the one that shifts": tasks.along_eta,
             "the offsets are 1000 times too large: units, mrad given for rad or mm for m": tasks.unseen_times(1e-3),
             "the offsets are 1000 times too small (units)": tasks.unseen_times(1e3),
+            "the offsets are the same at every place: A turns with the pose, take that at x": tasks.alike_everywhere,
         },
     ),
 } | READINGS

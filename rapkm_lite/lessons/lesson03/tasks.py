@@ -116,11 +116,16 @@ def betrayal(offsets) -> list[Measured]:
     ]
 
 
-def asked(offsets):
+def asked(offsets, place=(0.04, -0.05)):
     """The offsets of a design at one place of the testbed, with eta there."""
     robot = load().replace(friction=0.0)
-    x = np.array([0.04, -0.05])
+    x = np.array(place)
     return numbers(given(offsets, (robot, x))), null_vector(robot, inverse_kinematics(robot, x))
+
+
+def alike_everywhere(offsets) -> bool:
+    """True where the offsets of a design do not follow the place."""
+    return bool(np.array_equal(asked(offsets)[0], asked(offsets, (-0.06, 0.02))[0]))
 
 
 def along_eta(offsets) -> bool:
