@@ -77,6 +77,13 @@ def test_it_opens_from_disk_and_asks_for_nothing(browser, address, width, scheme
     assert seen.requests == [] and seen.errors == []
 
 
+def test_without_javascript_nothing_offers_what_it_cannot_do(browser, address):
+    page = browser.new_context(java_script_enabled=False).new_page()
+    page.goto(address)
+    assert page.locator("noscript p").is_visible() and page.get_by_text("Read the lessons").is_visible()
+    assert not any(control.is_visible() for control in page.locator("input, select, button").all())
+
+
 @pytest.mark.parametrize("scale", [1, 1.25, 2])
 def test_a_canvas_has_the_pixels_of_its_place_and_is_not_stretched(browser, address, scale):
     """Else the browser would resample it, and its words would be blurred."""
