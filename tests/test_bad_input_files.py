@@ -323,7 +323,7 @@ def test_a_name_stays_in_the_data_folder(name):
 @pytest.mark.parametrize("source", ["a\0b.toml", "nowhere/mine.toml", "x" * 5000 + ".toml", ".toml"], ids=range(4))
 def test_a_path_that_cannot_be_read(source):
     for read in (rk.load, rk.experiment):
-        with pytest.raises(ValueError, match=r"source: the file .*; allowed: a TOML file"):
+        with pytest.raises(ValueError, match=r"source: the file .* cannot be read \(.+\); allowed: a TOML file"):
             read(source)
 
 
