@@ -83,9 +83,9 @@ def read_toml(source: str | Path) -> dict:
         # Editors may write a byte order mark before the first line.
         tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, RecursionError, ValueError) as error:
-        # A NUL in the path is the one thing that no system has words for.
-        unread = getattr(error, "strerror", "\0" in str(path) and error)
-        words = f"cannot be read ({unread})" if unread else f"is not valid TOML: {error}"
+        unread = isinstance(error, OSError) or "\0" in str(path)  # the one thing that no system has words for
+        reason = getattr(error, "strerror", None) or error
+        words = f"cannot be read ({reason})" if unread else f"is not valid TOML: {error}"
         raise ValueError(f"source: the file {short(str(path))} {words}; allowed: a TOML file") from None
     known("TOML table", tables, ["name", "about", *UNITS_OF])
     return {key: _table(key, value) for key, value in tables.items()}
