@@ -12,8 +12,8 @@ from ...mechanics.kinematics import inverse_kinematics
 def plot_turning_NN(robot, drive: int, ax=None, n: int = 121):
     """How far one drive (0-based) turns per metre of the end-effector at most, over the workspace.
 
-    >>> import rapkm_lite as rk
-    >>> ax = plot_turning_NN(rk.load(), 0, n=21)
+    >>> import rapkm_lite as rk; from rapkm_lite import plotting
+    >>> ax = plotting.plot_turning_NN(rk.load(), 0, n=21)
     """
     x, y, inside, points = grid_points(robot, n)
     A = control_matrix(robot, inverse_kinematics(robot, points))
