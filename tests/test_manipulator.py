@@ -159,7 +159,8 @@ def test_shipped_machines_load_and_say_where_each_number_comes_from(name):
     tables = tomllib.loads(rk.data_path(f"{name}.toml").read_text(encoding="utf-8"))
     for table in ("manipulator", "control", "path"):
         for key, entry in tables[table].items():
-            assert set(entry) == {"value", "unit", "source"}, key
+            kept = set(entry) if isinstance(entry, dict) else entry
+            assert kept == {"value", "unit", "source"}, f"[{table}] {key}"
     assert rk.load(rk.data_path(f"{name}.toml")).n_arms == robot.n_arms
     assert np.all(np.isfinite(rk.experiment(name).trajectory.qdd))
 

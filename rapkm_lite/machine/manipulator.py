@@ -237,8 +237,8 @@ def load(source: str | Path = "testbed") -> Manipulator:
     """Read a machine from ``data/<source>.toml`` or from a path that ends in ``.toml``.
 
     The file has a table ``[manipulator]`` with the arguments of `Manipulator`; a value may be plain or
-    ``{value = ..., unit = "...", source = "..."}``.  Tables ``[control]``, ``[path]``, ``[sensor]`` and ``[[fault]]``
-    are left to `rapkm_lite.experiment`.
+    ``{value = ..., unit = "...", source = "..."}``.  A `name` stands above the table.  Tables ``[control]``,
+    ``[path]``, ``[sensor]`` and ``[[fault]]`` are left to `rapkm_lite.experiment`.
 
     Raises ValueError for an unknown key, a missing value, a wrong unit or a value out of range.
 
