@@ -293,6 +293,7 @@ CHOICES = [
         "not multiplied by the weights",
     ),
     ("wrong", "wish added whole", lambda A, f, W, c0: pinv_w(A, W) @ f + c0, "projector"),
+    ("wrong", "wish added whole, no weights", lambda A, f, W, c0: np.linalg.pinv(A.T) @ f + c0, "and without weights"),
     ("wrong", "sign of the wish", lambda A, f, W, c0: textbook(A, f, W, -c0), "sign"),
     ("wrong", "sign of the force", lambda A, f, W, c0: textbook(A, -f, W, c0), "sign"),
     (

@@ -98,6 +98,18 @@ MAPS = [
     ("wrong", "end-effector", lambda r, q, p: phi(r, q, None), "pass the pair to both"),
     (
         "wrong",
+        "Gbar of the first pair",
+        lambda r, q, p: np.linalg.pinv(parts(r, q, p)[0].T) @ parts(r, q, (0, 1))[1],
+        "Gbar is always that of drives 1 and 2",
+    ),
+    (
+        "wrong",
+        "A of the first pair",
+        lambda r, q, p: np.linalg.pinv(parts(r, q, (0, 1))[0].T) @ parts(r, q, p)[1],
+        "A is always that of drives 1 and 2",
+    ),
+    (
+        "wrong",
         "mixed A",
         lambda r, q, p: np.linalg.pinv(parts(r, q, None)[0].T) @ parts(r, q, p)[1],
         "A is that of the end-effector, Gbar",

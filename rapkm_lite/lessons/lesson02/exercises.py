@@ -153,6 +153,9 @@ EXERCISES = {
             "the whole wish is added, and a part of it changes the force: the projector is missing": (
                 lambda A, f, W, c0: weighted_pseudoinverse(A, W) @ f + c0
             ),
+            "the whole wish is added, which changes the force (the projector is missing), and without weights": (
+                lambda A, f, W, c0: weighted_pseudoinverse(A) @ f + c0
+            ),
             "the sign of the wish c0 is opposite": lambda A, f, W, c0: tasks.best_torques(A, f, W, -c0),
             "the sign of the force f is opposite": lambda A, f, W, c0: tasks.best_torques(A, -f, W, c0),
             "the wish is projected without the weights (the projector of W = I)": (

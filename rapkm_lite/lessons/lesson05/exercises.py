@@ -166,6 +166,16 @@ EXERCISES = {
             "the pair is ignored: these are always the angles of drives 1 and 2": (
                 lambda robot, q, pair: feedback_map(robot, q, (0, 1))
             ),
+            "Gbar is always that of drives 1 and 2, A that of the pair: both must be in its angles (frame)": (
+                lambda robot, q, pair: (
+                    weighted_pseudoinverse(control_matrix(robot, q, pair)) @ _minimal(robot, q, (0, 1))[1]
+                )
+            ),
+            "A is always that of drives 1 and 2, Gbar that of the pair: both must be in its angles (frame)": (
+                lambda robot, q, pair: (
+                    weighted_pseudoinverse(control_matrix(robot, q, (0, 1))) @ _minimal(robot, q, pair)[1]
+                )
+            ),
             "this is Gbar, the force; the torques need the factor (A^T)^+": _mapped(lambda L, G, L_x, G_x: G),
         },
     ),
