@@ -22,7 +22,7 @@ from ..machine.arguments import (
 )
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores, linalg
-from .at import at
+from .at import asked
 from .linalg import many_inverses, minors, product
 
 
@@ -38,7 +38,7 @@ def control_matrix(robot: Manipulator, q, independent=None) -> np.ndarray:
            [-5.09, -0.87],
            [ 5.77, -2.19]])
     """
-    return at(robot, q).using(independent).A.copy()
+    return asked(robot, q).using(independent).A.copy()
 
 
 def redundant_control_matrix(robot: Manipulator, q) -> np.ndarray:
@@ -50,7 +50,7 @@ def redundant_control_matrix(robot: Manipulator, q) -> np.ndarray:
     >>> rk.redundant_control_matrix(robot, q).shape
     (3, 6)
     """
-    return at(robot, q).A_tilde.copy()
+    return asked(robot, q).A_tilde.copy()
 
 
 def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.ndarray:
@@ -66,7 +66,7 @@ def degree_of_actuation(robot: Manipulator, q, tolerance: float = 1e-7) -> np.nd
     2
     """
     tolerance = small_number("tolerance", tolerance)
-    sigma = np.linalg.svd(at(robot, q).A_tilde, compute_uv=False)
+    sigma = np.linalg.svd(asked(robot, q).A_tilde, compute_uv=False)
     return np.sum(sigma > tolerance, axis=-1)
 
 
@@ -97,7 +97,7 @@ def control_vector_fields(robot: Manipulator, q, independent=None) -> np.ndarray
     >>> rk.control_vector_fields(robot, q).shape
     (2, 3)
     """
-    pose = at(robot, q).using(independent)
+    pose = asked(robot, q).using(independent)
     _ = pose.F  # raises where the choice is singular
     # As joint accelerations T (T^T G T)^-1 T_a^T in an orthonormal basis T of the motions: Gbar = F^T G F squares the
     # condition number of F, which the choice of coordinates makes large, while the fields stay as they are.
@@ -129,7 +129,7 @@ def distal_cross_products(robot: Manipulator, q) -> np.ndarray:
     >>> rk.distal_cross_products(robot, q).round(3)
     array([ 0.96 , -0.969,  0.507])
     """
-    return minors(at(robot, q).d / robot.lengths[:, 1:])
+    return minors(asked(robot, q).d / robot.lengths[:, 1:])
 
 
 def singular_values(A) -> np.ndarray:
@@ -231,7 +231,7 @@ def required_wrench(robot: Manipulator, q, qd, qdd) -> np.ndarray:
 def _driven(robot: Manipulator, q, qd, qdd):
     """The pose, and the wrench of a motion."""
     q, qd, qdd = joint_vectors(manipulator(robot).n_joints, q=q, qd=qd, qdd=qdd)
-    pose = at(robot, q, qd)
+    pose = asked(robot, q, qd)
     F = pose.F
     cores.check_tangent(robot.tree, pose.J, qd)
     return pose, matvec(F.mT, matvec(pose.G, qdd) + matvec(pose.C, qd) + pose.Q)

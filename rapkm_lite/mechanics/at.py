@@ -12,7 +12,7 @@ from ..machine.manipulator import Manipulator, manipulator
 from ..machine.values import Value
 from . import cores
 from .linalg import linear
-from .quantity import geometry, quantity, rate
+from .quantity import geometry, quantity, rate, shelf
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,7 +192,8 @@ class At(Value):
     @rate
     def N_dot(self) -> np.ndarray:
         """dN_J/dt of the text after (24), (..., 2N, 2N), 1/s."""
-        return cores.projector_dot(*self._row_space, self.J_dot, self.N)
+        Q, R = self._row_space
+        return cores.projector_dot(Q, R, self.J_dot, self.N)
 
     @quantity
     def A_tilde(self) -> np.ndarray:
@@ -231,8 +232,8 @@ def at(robot: Manipulator, q, qd=None) -> At:
     (True, (3, 6))
     """
     n = manipulator(robot).n_joints
-    q = real_array("q", q, n)
-    q = np.frombuffer(q.tobytes()).reshape(q.shape)  # that no flag makes writable: its `geometry` may be shared
+    q = real_array("q", q, n).copy()
+    q.setflags(write=False)
     if qd is not None:
         qd = real_array("qd", qd, n).copy()
         qd.setflags(write=False)
@@ -240,4 +241,15 @@ def at(robot: Manipulator, q, qd=None) -> At:
             check_leading(q=q.shape[:-1], qd=qd.shape[:-1])
     pose = object.__new__(At)
     pose.__dict__.update(robot=robot, q=q, qd=qd, independent=None)
+    return pose
+
+
+def asked(robot: Manipulator, q, qd=None) -> At:
+    """`at` for the functions of the chapter: a law asks several of them at one pose, and each makes an `At` of its own.
+
+    Those at the last few single poses share their geometry.
+    """
+    pose = at(robot, q, qd)
+    if pose.q.ndim == 1:
+        pose.__dict__["_geometry"] = shelf(robot.tree, pose.q.tobytes())
     return pose

@@ -10,7 +10,7 @@ import numpy as np
 from ..machine.arguments import check_leading, matvec, real_array, small_number
 from ..machine.manipulator import Manipulator, manipulator
 from . import cores
-from .at import at
+from .at import asked
 
 
 def mass_matrix(robot: Manipulator, q) -> np.ndarray:
@@ -20,7 +20,7 @@ def mass_matrix(robot: Manipulator, q) -> np.ndarray:
     >>> bool(np.all(np.linalg.eigvalsh(rk.mass_matrix(robot, q)) > 0.0))
     True
     """
-    return at(robot, q).G.copy()
+    return asked(robot, q).G.copy()
 
 
 def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
@@ -31,7 +31,7 @@ def coriolis_matrix(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(C, 0.1 * rk.coriolis_matrix(robot, q, q))
     True
     """
-    return at(robot, q, qd).C.copy()
+    return asked(robot, q, qd).C.copy()
 
 
 def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
@@ -43,7 +43,7 @@ def generalized_forces(robot: Manipulator, q, qd) -> np.ndarray:
     >>> rk.generalized_forces(robot, q, 10 + 0 * q).round(4)
     array([0.0042, 0.0042, 0.0042, 0.    , 0.    , 0.    ])
     """
-    return at(robot, q, qd).Q.copy()
+    return asked(robot, q, qd).Q.copy()
 
 
 def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray:
@@ -59,7 +59,7 @@ def orthogonal_complement(robot: Manipulator, q, independent=None) -> np.ndarray
     array([[1., 0.],
            [0., 1.]])
     """
-    return at(robot, q).using(independent).F.copy()
+    return asked(robot, q).using(independent).F.copy()
 
 
 def orthogonal_complement_dot(robot: Manipulator, q, qd, independent=None) -> np.ndarray:
@@ -72,7 +72,7 @@ def orthogonal_complement_dot(robot: Manipulator, q, qd, independent=None) -> np
     array([[0., 0.],
            [0., 0.]])
     """
-    return at(robot, q, qd).using(independent).F_dot.copy()
+    return asked(robot, q, qd).using(independent).F_dot.copy()
 
 
 def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -87,7 +87,7 @@ def minimal_dynamics(robot: Manipulator, q, qd, independent=None) -> tuple[np.nd
     array([[ 0.42, -0.04],
            [-0.04,  0.3 ]])
     """
-    Gbar, Cbar, Qbar = at(robot, q, qd).using(independent).minimal
+    Gbar, Cbar, Qbar = asked(robot, q, qd).using(independent).minimal
     return Gbar.copy(), Cbar.copy(), Qbar.copy()
 
 
@@ -99,7 +99,7 @@ def constraint_rank(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarra
     4
     """
     limit = small_number("tolerance", tolerance) * manipulator(robot).lengths.max()
-    return np.sum(np.linalg.svd(at(robot, q).J, compute_uv=False) > limit, axis=-1)
+    return np.sum(np.linalg.svd(asked(robot, q).J, compute_uv=False) > limit, axis=-1)
 
 
 def degree_of_freedom(robot: Manipulator, q, tolerance: float = 1e-9) -> np.ndarray:
@@ -127,7 +127,7 @@ def nullspace_projector(robot: Manipulator, q) -> np.ndarray:
     >>> np.allclose(N @ N, N), int(N.trace().round())
     (True, 2)
     """
-    return at(robot, q).N.copy()
+    return asked(robot, q).N.copy()
 
 
 def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
@@ -140,7 +140,7 @@ def nullspace_projector_dot(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(N @ N_dot + N_dot @ N, N_dot)
     True
     """
-    return at(robot, q, qd).N_dot.copy()
+    return asked(robot, q, qd).N_dot.copy()
 
 
 def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -155,7 +155,7 @@ def redundant_dynamics(robot: Manipulator, q, qd) -> tuple[np.ndarray, np.ndarra
     >>> np.allclose(rk.nullspace_projector(robot, q) @ G, G)
     True
     """
-    G, C, Q = at(robot, q, qd).redundant
+    G, C, Q = asked(robot, q, qd).redundant
     return G.copy(), C.copy(), Q.copy()
 
 
@@ -171,7 +171,7 @@ def forward_dynamics(robot: Manipulator, q, qd, c) -> tuple[np.ndarray, np.ndarr
     >>> qdd.round(1)
     array([ 8.5, -2.9, -2. , -8.6, -5.9,  9.2])
     """
-    pose, c = at(robot, q, real_array("qd", qd)), real_array("c", c, robot.n_arms)
+    pose, c = asked(robot, q, real_array("qd", qd)), real_array("c", c, robot.n_arms)
     lead = check_leading(q=pose.q.shape[:-1], qd=pose.qd.shape[:-1], c=c.shape[:-1])
     _ = pose.N  # raises where J has lost rank
     cores.check_tangent(robot.tree, pose.J, pose.qd)
@@ -192,7 +192,7 @@ def kinetic_energy(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(rk.kinetic_energy(robot, q, q), q @ rk.mass_matrix(robot, q) @ q / 2)
     True
     """
-    pose = at(robot, q, real_array("qd", qd))
+    pose = asked(robot, q, real_array("qd", qd))
     return np.einsum("...i,...ij,...j->...", pose.qd, pose.G, pose.qd) / 2
 
 
@@ -203,6 +203,6 @@ def potential_energy(robot: Manipulator, q) -> np.ndarray:
     >>> float(rk.potential_energy(robot.replace(gravity=[0.0, -9.81]), q).round(3))
     0.172
     """
-    pose = at(robot, q)
+    pose = asked(robot, q)
     moments = robot.arm_moments / robot.lengths
     return -((moments[:, :1] * pose.a + moments[:, 1:] * pose.d) @ robot.gravity).sum(axis=-1)

@@ -15,7 +15,7 @@ from ..machine.arguments import check_leading, entry, real_array, short
 from ..machine.manipulator import Manipulator, manipulator
 from ..machine.reach import within
 from . import cores
-from .at import at
+from .at import asked
 from .cores import wrap as wrap
 from .linalg import linear
 
@@ -43,7 +43,7 @@ def arm_vectors(robot: Manipulator, q) -> tuple[np.ndarray, np.ndarray]:
     >>> np.allclose(robot.base + a + d, [0.02, 0.05])
     True
     """
-    pose = at(robot, q)
+    pose = asked(robot, q)
     return pose.a.copy(), pose.d.copy()
 
 
@@ -54,7 +54,7 @@ def tips(robot: Manipulator, q) -> np.ndarray:
     >>> np.allclose(rk.tips(robot, q), [0.02, 0.05])
     True
     """
-    pose = at(robot, q)
+    pose = asked(robot, q)
     return robot.base + pose.a + pose.d
 
 
@@ -67,7 +67,7 @@ def forward_kinematics(robot: Manipulator, q) -> np.ndarray:
     >>> rk.forward_kinematics(robot, q).round(12)
     array([0.02, 0.05])
     """
-    return at(robot, q).x.copy()
+    return asked(robot, q).x.copy()
 
 
 def loop_constraints(robot: Manipulator, q) -> np.ndarray:
@@ -78,12 +78,12 @@ def loop_constraints(robot: Manipulator, q) -> np.ndarray:
     >>> bool(np.abs(rk.loop_constraints(robot, rk.inverse_kinematics(robot, [0.02, 0.05]))).max() < 1e-15)
     True
     """
-    return linear(at(robot, q)._v, robot.tree.gaps) + robot.tree.gap
+    return linear(asked(robot, q)._v, robot.tree.gaps) + robot.tree.gap
 
 
 def tip_jacobians(robot: Manipulator, q) -> np.ndarray:
     """d tip_i / d (base angle i, elbow angle i), (..., N, 2, 2) in m/rad."""
-    columns = at(robot, q).tip_columns
+    columns = asked(robot, q).tip_columns
     return np.stack([columns[..., : robot.n_arms], columns[..., robot.n_arms :]], axis=-1).swapaxes(-3, -2)
 
 
@@ -94,7 +94,7 @@ def constraint_jacobian(robot: Manipulator, q) -> np.ndarray:
     >>> rk.constraint_jacobian(robot, q).shape
     (4, 6)
     """
-    return at(robot, q).J.copy()
+    return asked(robot, q).J.copy()
 
 
 def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
@@ -105,7 +105,7 @@ def constraint_jacobian_dot(robot: Manipulator, q, qd) -> np.ndarray:
     >>> np.allclose(rk.constraint_jacobian_dot(robot, q, 2 * q), 2 * J_dot)
     True
     """
-    return at(robot, q, qd).J_dot.copy()
+    return asked(robot, q, qd).J_dot.copy()
 
 
 def reachable(robot: Manipulator, x) -> np.ndarray:

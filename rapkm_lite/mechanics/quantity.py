@@ -29,12 +29,8 @@ class quantity(Generic[Kept]):
             return self
         if self.needs_rates and pose.qd is None:
             raise ValueError(f"{self.name} needs the rates, qd = None; allowed: at(robot, q, qd) with qd (..., 2N)")
-        pose.__dict__[self.name] = value = self.of(pose)
-        return value
-
-    def of(self, pose) -> Any:
-        """The quantity at a pose that does not have it yet."""
         value: Any = self.function(pose)
+        pose.__dict__[self.name] = value
         for array in value if type(value) is tuple else (value,):
             array.setflags(False)
         return value
@@ -47,23 +43,19 @@ class rate(quantity[Kept]):
 
 
 class geometry(quantity[Kept]):
-    """A `quantity` of q alone that is not handed out: the next `At` of the same single pose takes it over.
+    """A `quantity` of q alone that is not handed out: what is `asked` next at the same single pose takes it over."""
 
-    Every function of the chapter makes an `At` of its own, and a law calls several of them at one pose.
-    """
-
-    def of(self, pose) -> Any:
-        """The quantity as it is kept for this pose, or else computed."""
-        kept = pose.__dict__.get("_geometry")
+    def __get__(self, pose, cls) -> Any:
+        kept = None if pose is None else pose.__dict__.get("_geometry")
         if kept is None:
-            kept = pose.__dict__["_geometry"] = _lately(pose.robot.tree, pose.q.tobytes()) if pose.q.ndim == 1 else {}
-        value = kept.get(self.name)
-        if value is None:
-            value = kept[self.name] = super().of(pose)
-        return value
+            return super().__get__(pose, cls)
+        if self.name not in kept:
+            kept[self.name] = super().__get__(pose, cls)
+        pose.__dict__[self.name] = kept[self.name]
+        return kept[self.name]
 
 
 @functools.lru_cache(maxsize=4)
-def _lately(tree: Tree, q: bytes) -> dict[str, Any]:
+def shelf(tree: Tree, q: bytes) -> dict[str, Any]:
     """Where the `geometry` of a pose is kept while it is among the last few."""
     return {}
